@@ -1,5 +1,5 @@
-"""Motion on the ground: the paper's jumps come out, methods agree, and touch-downs and take-offs
-are found.
+"""Motion on the ground: the paper's jump comes out, methods agree, touch-downs and take-offs are
+found, and runs that are stopped or paused are what they are whole.
 """
 
 from functools import cache
@@ -8,46 +8,39 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from tests.support.models import model_folder
+from serpentail.simulation import compiled_run
+from tests.support import zoo
+from tests.support.rows import row
 
 DEGREES = np.pi / 180
 GAMMA, CROUCH, STRETCH = 210 * DEGREES, -15 * DEGREES, -75 * DEGREES
-FUNCTIONS = ["energy", "momentum", "rollout", "implicit", "pfl", "tail_points"]
 KICK = st.Legs.ramp(GAMMA, (CROUCH, STRETCH), at=0.4, rate=-70)
 PASSIVE = st.Damping(1e-3)
 
 
-@cache
-def rat(*contacts, **options):
-    return st.load(model_folder(1, 3, contacts=list(contacts), functions=FUNCTIONS, **options))
+def rat():
+    """The model whose feet alone touch the ground."""
+    return zoo.model("feet")
 
 
 @cache
 def crouched():
     """Settled in a crouch: q, v, bristles; the paper's start of the kick."""
-    model = rat("feet")
-    q = np.zeros(model.nq)
+    q, legs = np.zeros(9), st.Legs.fixed(GAMMA, CROUCH)
     q[2:5] = 0.0178, np.cos(0.11), np.sin(0.11)
-    legs = st.Legs.fixed(GAMMA, CROUCH)
-    return st.simulate(
-        model, q, np.zeros(model.nv), controller=PASSIVE, legs=legs, t_span=1.5, rtol=1e-6
-    )
+    acting = {"controller": PASSIVE, "legs": legs}
+    return st.simulate(rat(), q, np.zeros(8), t_span=1.5, rtol=1e-6, **acting)
 
 
 def kick(model=None, **settings):
     still = crouched()
-    settings = {
-        "controller": PASSIVE,
-        "legs": KICK,
-        "t_span": 1.2,
-        "bristles0": still.contact.bristles[-1],
-    } | settings
-    return st.simulate(model or rat("feet"), still.q[-1], 0 * still.v[-1], **settings)
+    bristles = still.contact.bristles[-1]
+    own = {"controller": PASSIVE, "legs": KICK, "t_span": 1.2, "bristles0": bristles}
+    return st.simulate(model or rat(), still.q[-1], 0 * still.v[-1], **own | settings)
 
 
 def test_a_crouched_rat_comes_to_rest():
-    flight = crouched()
-    weight = (0.10572 + 0.00351) * 9.8
+    flight, weight = crouched(), (0.10572 + 0.00351) * 9.8
     assert flight.info["method"] == "ros34pw2" and "contact" in flight.info["reason"]
     assert np.abs(flight.v[-1, :6]).max() < 1e-3 and np.abs(flight.v[-1, 6:]).max() < 1e-2
     assert flight.contact.forces[-1].sum(axis=0) == pytest.approx([0, 0, weight], abs=2e-3)
@@ -58,25 +51,24 @@ def test_a_crouched_rat_comes_to_rest():
 def test_the_kick_is_the_papers():
     """Sect. 4: take-off, about 0.6 m, and landing at 1.08 s or so (Eq. 48)."""
     flight = kick(rtol=1e-6, output_step=0.01)
-    take_off, touch_down = flight.events
-    assert (take_off["kind"], touch_down["kind"]) == ("take_off", "touch_down")
-    assert take_off["group"] == touch_down["group"] == "feet"
-    assert take_off["time"] == pytest.approx(0.404, abs=1e-3) and touch_down[
-        "time"
-    ] == pytest.approx(1.095, abs=2e-3)
-    apex = flight.q[:, 2].max()
-    assert apex == pytest.approx(0.632, abs=2e-3)
+    off, down = flight.events
+    assert [(e["kind"], e["group"]) for e in (off, down)] == [
+        ("take_off", "feet"),
+        ("touch_down", "feet"),
+    ]
+    assert off["time"] == pytest.approx(0.404, abs=1e-3)
+    assert down["time"] == pytest.approx(1.095, abs=2e-3)
+    assert flight.q[:, 2].max() == pytest.approx(0.632, abs=2e-3)
     at = int(np.argmin(np.abs(flight.t - 0.5)))
-    assert flight.v[at, 3] == pytest.approx(26.2, abs=0.1) and flight.tail[at, 0] == pytest.approx(
-        -0.558, abs=2e-3
-    )
-    airborne = (flight.t > take_off["time"]) & (flight.t < touch_down["time"])
+    assert flight.v[at, 3] == pytest.approx(26.2, abs=0.1)
+    assert flight.tail[at, 0] == pytest.approx(-0.558, abs=2e-3)
+    airborne = (flight.t > off["time"]) & (flight.t < down["time"])
     assert not flight.contact.forces[airborne].any() and flight.contact.forces[flight.t < 0.4].any()
 
 
-@pytest.mark.parametrize(
-    ("settings", "limit"),
-    [
+def test_methods_agree():
+    reference = kick(method="dop853", t_span=0.5)
+    rows = [
         ({"method": "ros34pw2", "rtol": 1e-6}, 1e-4),
         ({"method": "ros34pw2"}, 3e-3),
         # Rounding decides where steps end next to a change of contact, and so the error: of 300
@@ -84,26 +76,10 @@ def test_the_kick_is_the_papers():
         ({"method": "tsit5", "rtol": 1e-9}, 1e-5),
         ({"method": "lsoda"}, 1e-6),
         ({"method": "implicit_euler", "step": 2e-5}, 6e-2),
-    ],
-    ids=lambda x: "-".join(map(str, x.values())) if isinstance(x, dict) else None,
-)
-def test_methods_agree(settings, limit):
-    reference = kick(method="dop853", t_span=0.5)
-    flight = kick(t_span=0.5, **settings)
-    assert np.abs(flight.q - reference.q).max() < limit
-
-
-def test_a_run_stops_at_take_off():
-    whole, part = kick(rtol=1e-6), kick(rtol=1e-6, stop_at=[("take_off", "feet")])
-    assert part.t[-1] == part.events[-1]["time"] == pytest.approx(whole.events[0]["time"], abs=1e-9)
-    assert len(part.events) == 1 and (np.diff(part.t) > 0).all()
-    np.testing.assert_allclose(part.q[:-1], whole.q[: len(part.q) - 1], atol=1e-12)
-    assert np.abs(part.contact.forces[-1]).max() < 1e-3
-
-
-def test_events_do_not_depend_on_the_samples():
-    often, seldom = kick(output_step=1e-3), kick(output_step=0.3)
-    assert often.events == seldom.events
+    ]
+    for settings, limit in rows:
+        with row(settings):
+            assert np.abs(kick(t_span=0.5, **settings).q - reference.q).max() < limit
 
 
 def test_fixed_steps_never_blow_up():
@@ -113,98 +89,135 @@ def test_fixed_steps_never_blow_up():
         assert flight.q[:, 2].max() < 2 and flight.contact.depth.max() < 0.2
 
 
-def test_arguments_are_left_alone():
+def test_a_model_in_single_precision_lands_too():
+    q, v = np.zeros(9), np.zeros(8)
+    q[2:5], v[:4] = (0.13, np.cos(0.2), np.sin(0.2)), (0.3, 0.2, 0, 1)
+    how = {"legs": st.Legs.fixed(GAMMA, CROUCH), "controller": PASSIVE, "t_span": 0.25}
+    runs = [st.simulate(zoo.model(n), q, v, **how) for n in ("ground", "single_ground")]
+    assert 0 < np.abs(runs[1].q - runs[0].q).max() < 0.01
+    first, other = (run.events[0] for run in runs)
+    assert first["group"] == other["group"]
+    assert other["time"] == pytest.approx(first["time"], abs=1e-3)
+
+
+# ---- stops, pauses, samples ----------------------------------------------------------------------
+
+
+def test_a_run_stops_at_take_off_and_its_friction_springs_are_told():
+    """An implicit step from there is the run's own: with the bristles of the start it is not."""
+    how = {"rtol": 1e-6, "output_step": 1e-3}
+    whole, part = kick(**how), kick(stop_at=[("take_off", "feet")], **how)
+    assert part.t[-1] == part.events[-1]["time"] == pytest.approx(whole.events[0]["time"], abs=1e-9)
+    assert len(part.events) == 1 and (np.diff(part.t) > 0).all()
+    np.testing.assert_allclose(part.q[:-1], whole.q[: len(part.q) - 1], atol=1e-12)
+    assert np.abs(part.contact.forces[-1]).max() < 1e-3
+    bristles = part.contact.bristles
+    change = np.abs(np.diff(bristles, axis=0)).max(axis=(1, 2))
+    assert np.abs(bristles[-1] - bristles[0]).max() > 10 * change[-1]
+    assert change[-1] <= 2 * change[-10:-1].max()
+
+
+def test_samples_change_no_events_and_a_run_that_stops_has_all_before():
+    often, seldom = kick(output_step=1e-3), kick(output_step=0.3)
+    assert often.events == seldom.events
+    for output_step in (0.1, 1e-2, 1e-3):
+        stopped = kick(stop_at=[("touch_down", "feet")], output_step=output_step)
+        times = np.linspace(0, 1.2, round(1.2 / output_step) + 1)
+        before = times[times < stopped.t[-1]]
+        np.testing.assert_allclose(stopped.t[:-1], before, rtol=0, atol=1e-12)
+
+
+def test_a_run_that_is_paused_after_each_few_steps_gives_the_same_bits(monkeypatch):
+    rows = [{"method": "ros34pw2"}, {"method": "tsit5"}]
+    for settings in (*rows, {"method": "implicit_euler", "step": 1e-3}):
+        how = settings | {"t_span": 0.5, "output_step": 0.01}
+        whole = kick(**how)
+        monkeypatch.setattr(compiled_run, "PAUSE", 3)
+        paused = kick(**how)
+        monkeypatch.undo()
+        with row(settings):
+            for name in ("q", "v", "tau", "kinetic"):
+                np.testing.assert_array_equal(getattr(paused, name), getattr(whole, name))
+            np.testing.assert_array_equal(paused.contact.bristles, whole.contact.bristles)
+            assert paused.events == whole.events and paused.info["steps"] == whole.info["steps"]
+
+
+def test_a_step_may_be_so_short_that_its_square_is_zero():
+    """A phase that begins after next to no time: the first step ends there."""
+    q, v = np.eye(1, 9, 3)[0], np.full(8, 0.1)
+    q[2], law = 0.3, st.Damping(1e-3)
+    for method in ("tsit5", "ros34pw2", "rk4"):
+        how = {"t_span": 2e-3, "legs": st.Legs.fixed(3.6, -0.3), "method": method}
+        plain = st.simulate(rat(), q, v, **how)
+        for begin in (1e-160, 1e-180, 1e-300, 5e-324):
+            with row(method, begin):
+                phases = st.Phases([(0.0, law), (begin, None)])
+                found = st.simulate(rat(), q, v, controller=phases, **how)
+                assert found.events == [] and found.info["steps"] < 300
+                np.testing.assert_allclose(found.q, plain.q, rtol=0, atol=1e-12)
+
+
+def test_contact_is_what_the_model_says_also_from_a_file(tmp_path):
     bristles = crouched().contact.bristles[-1].copy()
-    first, second = kick(bristles0=bristles), kick(bristles0=bristles)
+    flight = kick(t_span=0.45, bristles0=bristles)
     np.testing.assert_array_equal(bristles, crouched().contact.bristles[-1])
-    np.testing.assert_array_equal(first.q, second.q)
-
-
-def test_contact_is_what_the_model_says():
-    flight = kick(t_span=0.42)
     k = int(np.argmax(flight.contact.forces[..., 2].max(axis=1)))
     legs = np.concatenate(KICK.curve.at(flight.t[k])[:2])
-    points, _ = rat("feet").contact_points(flight.q[k], flight.v[k], legs)
+    points, _ = rat().contact_points(flight.q[k], flight.v[k], legs)
     np.testing.assert_allclose(flight.contact.points[k], points, atol=1e-15)
     assert flight.contact.of("feet").forces.shape == flight.contact.forces.shape
-    with pytest.raises(KeyError, match="no group 'tail': this motion has feet"):
+    with pytest.raises(KeyError, match=r"'tail'.*feet"):
         flight.contact.of("tail")
-
-
-def test_contact_comes_back_from_its_file(tmp_path):
-    flight = kick(t_span=0.45)
     again = st.Trajectory.load(flight.save(tmp_path / "kick"))
     for name in ("points", "forces", "bristles"):
         np.testing.assert_array_equal(getattr(again.contact, name), getattr(flight.contact, name))
     assert again.contact.groups == {"feet": 6} and again.events == flight.events
     assert again.resample([0.1, 0.2]).contact.points.shape == (2, 6, 3)
+    assert flight.info["seconds"] > 0 and flight.info["cpu_seconds"] >= 0
 
 
-def test_a_dropped_tail_and_torso_touch_down():
-    model = rat("tail", "torso")
-    q = np.zeros(model.nq)
-    q[2:4] = 0.2, 1
-    flight = st.simulate(model, q, np.zeros(model.nv), controller=PASSIVE, t_span=1.0)
-    first = {
-        event["group"]: event["time"]
-        for event in reversed(flight.events)
-        if event["kind"] == "touch_down"
-    }
-    height = 0.2 - 0.027
-    assert first["torso"] == pytest.approx(np.sqrt(2 * height / 9.8), rel=0.05)
-    assert set(first) == {"tail", "torso"}
-    assert flight.energy[-1] < flight.energy[0]
-    assert flight.contact.depth[-1].max() < 0.01 and np.abs(flight.v[-1, :3]).max() < 0.05
+# ---- refusals ------------------------------------------------------------------------------------
+
+WRONG = [
+    ({"legs": None}, "feet: give Legs"),
+    ({"legs": 3.0}, "feet: give Legs"),
+    ({"bristles0": np.zeros((5, 2))}, r"bristles0 .*\(5, 2\).*\(6, 2\)"),
+    ({"bristles0": np.full((6, 2), np.nan)}, "finite"),
+    ({"stop_at": [("take_off", "tail")]}, r"pairs out of \('touch_down', 'feet'\)"),
+    ({"stop_at": 3}, "pairs"),
+]
+LEGS = [
+    (lambda: st.Legs([0, 0], [1, 2], 0), "increasing times"),
+    (lambda: st.Legs([0, 1], [1, 2, 3], 0), r"gamma .*\(3,\)"),
+    (lambda: st.Legs([0, 1], 1, [[1, 2, 3]] * 2), r"delta .*\(2, 3\)"),
+    (lambda: st.Legs([0, np.nan], 1, 2), "value nan"),
+    (lambda: st.Legs(["0"], 1, 2), "times: type"),
+    (lambda: st.Legs.ramp(1, (1, 1), 0, 1), "two angles that differ"),
+    (lambda: st.Legs.ramp(1, (1, 2), 0, 0), "rate: value 0"),
+]
+# no time, no angle, no speed, two speeds
+MOVES = [{"gamma": 3.0, "rate": 5.0}, {"at": 0.1, "rate": 5.0}, {"at": 0.1, "gamma": 3.0}]
+MOVES += [{"at": 0.1, "gamma": 3.0, "rate": 5.0, "duration": 1.0}]
 
 
-@pytest.mark.parametrize(
-    ("settings", "words"),
-    [
-        ({"legs": None}, "this model has feet: give Legs"),
-        ({"legs": 3.0}, "this model has feet: give Legs"),
-        ({"bristles0": np.zeros((5, 2))}, r"bristles0 has shape \(5, 2\): give \(6, 2\)"),
-        ({"bristles0": np.full((6, 2), np.nan)}, "finite"),
-        (
-            {"stop_at": [("take_off", "tail")]},
-            r"needs a list of pairs out of \('touch_down', 'feet'\)",
-        ),
-        ({"stop_at": 3}, "needs a list of pairs"),
-    ],
-)
-def test_wrong_setting_is_named(settings, words):
-    with pytest.raises(st.SimulationError, match=words):
-        kick(**settings)
+def test_wrong_settings_and_legs_are_named():
+    for settings, words in WRONG:
+        with row(settings), pytest.raises(st.SimulationError, match=words):
+            kick(**settings)
+    for make, words in LEGS:
+        with row(words), pytest.raises(st.SimulationError, match=words):
+            make()
+    for move in MOVES:
+        with row(move), pytest.raises(st.SimulationError, match=r"needs at, gamma or delta"):
+            st.Legs.moves(3.6, -0.3, [move])
 
 
-def test_start_in_the_ground_is_refused_with_its_depth():
-    model = rat("feet")
+def test_a_start_in_the_ground_is_refused_with_its_depth():
     q = crouched().q[-1].copy()
     q[2] -= 0.05
-    with pytest.raises(
-        st.SimulationError,
-        match=r"^q0: point \d \(feet\) is 5\d(\.\d)? mm deep .*: raise q0\[2\] by 0\.05",
-    ):
-        st.simulate(model, q, np.zeros(model.nv), legs=KICK)
-
-
-@pytest.mark.parametrize(
-    ("make", "words"),
-    [
-        (lambda: st.Legs([0, 0], [1, 2], 0), "needs increasing times"),
-        (
-            lambda: st.Legs([0, 1], [1, 2, 3], 0),
-            r"gamma has shape \(3,\), not a number, \(2,\) or \(2, 2\)",
-        ),
-        (lambda: st.Legs([0, 1], 1, [[1, 2, 3]] * 2), r"delta has shape \(2, 3\)"),
-        (lambda: st.Legs([0, np.nan], 1, 2), r"\]: value nan: needs a finite number"),
-        (lambda: st.Legs(["0"], 1, 2), "times: type .*: needs real numbers"),
-        (lambda: st.Legs.ramp(1, (1, 1), 0, 1), "two angles that differ"),
-        (lambda: st.Legs.ramp(1, (1, 2), 0, 0), "rate: value 0: needs a number that is not 0"),
-    ],
-)
-def test_wrong_legs_are_named(make, words):
+    words = r"^q0: point \d \(feet\) is 5\d(\.\d)? mm deep .*q0\[2\] by 0\.05"
     with pytest.raises(st.SimulationError, match=words):
-        make()
+        st.simulate(rat(), q, np.zeros(8), legs=KICK)
 
 
 def test_each_leg_has_its_own_angles():
@@ -213,12 +226,3 @@ def test_each_leg_has_its_own_angles():
     np.testing.assert_allclose(values, [3.5, -0.3, 3.5, -0.4])
     np.testing.assert_allclose(rates, [0, -0.4, 0, 0])
     assert KICK.curve.kinks(2) == pytest.approx([0.4, 0.4 + (CROUCH - STRETCH) / 70])
-
-
-def test_baked_and_single_precision_rats_kick_too():
-    reference = kick(t_span=0.5)
-    for options in ({"baked": True}, {"real": "float"}):
-        model = rat("feet", **options)
-        flight = kick(model, t_span=0.5)
-        assert np.abs(flight.q - reference.q).max() < 0.05
-        assert flight.events[0]["time"] == pytest.approx(reference.events[0]["time"], abs=1e-3)

@@ -1,160 +1,154 @@
-"""Flight: what mechanics conserves stays, what damping takes is accounted for, and torque laws act
-as written.
-"""
+"""What a single run refuses: starts, settings, controllers; and what it warns of."""
 
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import serpentail as st
+from tests.support import zoo
+from tests.support.rows import row
 
-from ...support.models import model_folder
-from .thrown import NQ, NT, NV, Q0, V0
+from ..runs import NQ, NT, NV, Q0, V0, fly, tail
 
-# What is refused
-
-
-LAST = [*Q0[:-1], np.nan]
-
-
-@pytest.mark.parametrize(
-    ("start", "words"),
-    [
-        ((Q0[:-1], V0), rf"q0 has shape \({NQ - 1},\), not \({NQ},\)"),
-        ((Q0, [*V0, 0]), rf"v0 has shape \({NV + 1},\), not \({NV},\)"),
-        (([[Q0]], V0), r"q0 has shape \(1, 1, \d+\).*one start state"),
-        ((0.0, V0), r"q0 has shape \(\)"),
-        ((None, V0), "q0: type .*: needs real numbers"),
-        (([[1], [1, 2]], V0), "q0: type .*: needs real numbers"),
-        (([str(x) for x in Q0], V0), "q0: type .*: needs real numbers"),
-        ((Q0, V0.astype(complex)), "v0: type .*: needs real numbers"),
-        ((Q0, V0 > 0), "v0: type .*: needs real numbers"),
-        ((LAST, V0), rf"q0\[{NQ - 1}\]: value .*: needs a finite number"),
-        ((Q0, [np.inf, *V0[1:]]), r"v0\[0\]: value .*: needs a finite number"),
-        ((np.zeros(NQ), V0), r"q0\[3:7\] is the zero quaternion: upright is \(1, 0, 0, 0\)"),
-    ],
-)
-def test_wrong_start_is_named(model, start, words):
-    with pytest.raises(st.StateError, match=words):
-        st.simulate(model, *start)
+STARTS = [
+    ((Q0[:-1], V0), rf"q0 .*\({NQ - 1},\).*\({NQ},\)"),
+    ((Q0, [*V0, 0]), rf"v0 .*\({NV + 1},\).*\({NV},\)"),
+    (([[Q0]], V0), r"q0 .*\(1, 1, \d+\)"),
+    ((0.0, V0), r"q0 .*\(\)"),
+    ((None, V0), "q0: type"),
+    (([[1], [1, 2]], V0), "q0: type"),
+    (([str(x) for x in Q0], V0), "q0: type"),
+    ((Q0, V0.astype(complex)), "v0: type"),
+    ((Q0, V0 > 0), "v0: type"),
+    (([*Q0[:-1], np.nan], V0), rf"q0\[{NQ - 1}\]: value nan"),
+    ((Q0, [np.inf, *V0[1:]]), r"v0\[0\]: value inf"),
+    ((np.zeros(NQ), V0), r"q0\[3:7\].*zero quaternion"),
+]
 
 
-@pytest.mark.parametrize(
-    ("settings", "words"),
-    [
-        *[
-            ({"t_span": span}, "t_span")
-            for span in (0, -1, (1, 1), (2, 1), (0, np.nan), (0, np.inf), (0, 1, 2), "1")
-        ],
-        *[
-            ({"t_span": span}, "t_span")
-            for span in (None, (), [[0], [1]], ("0", "1"), (0, None), True, (0, 1j))
-        ],
-        *[
-            ({name: x}, name)
-            for name in ("step", "output_step")
-            for x in (0, -1e-3, np.nan, np.inf, "1", True, [1], 1j)
-        ],
-        *[({"method": "dop853", name: 0}, name) for name in ("rtol", "atol")],
-        (
-            {"method": "euler"},
-            "method: value 'euler': needs 'auto' or 'rk4' or 'tsit5' or 'dop853' or 'lsoda'",
-        ),
-        ({"gravity": 1.6}, r"gravity: .*simulate model\.with_parameters\(gravity=1\.6\)"),
-        ({"duration": 1}, "duration: is no setting: the duration is t_span=1"),
-        ({"method": "rk4", "rtol": 1e-6}, "rk4 has no setting 'rtol'; it has step, output_step"),
-        ({"step": 1e-6, "rtol": 1e-6}, "rk4 has no setting 'rtol'; it has step, output_step"),
-        (
-            {"method": "dop853", "step": 1},
-            "dop853 has no setting 'step'; it has rtol, atol, output_step",
-        ),
-        ({"stp": 1}, "no setting 'stp'"),
-        (
-            {"controller": 3.0},
-            "controller: value 3.0: needs None, Damping, TorqueTable, .* or a function",
-        ),
-        *[
-            ({"controller": st.Damping(d)}, "damping")
-            for d in (-1.0, np.nan, (1, 2), "1", None, [[0.0] * NT])
-        ],
-        (
-            {"controller": st.TorqueTable([0, 1], [[0] * NT])},
-            r"times \(2,\) and torques \(1, 4\), not \(K,\) and \(K, 4",
-        ),
-        ({"controller": st.TorqueTable([], [])}, "TorqueTable"),
-        ({"controller": st.TorqueTable(0, [0] * NT)}, "TorqueTable"),
-        ({"controller": st.TorqueTable([1, 1], [[0] * NT] * 2)}, "needs increasing times"),
-        (
-            {"controller": st.TorqueTable([0], [[np.nan] * NT])},
-            r"\]: value nan: needs a finite number",
-        ),
-        (
-            {"controller": st.TorqueTable(["0"], [[0] * NT])},
-            "TorqueTable: times: type .*: needs real numbers",
-        ),
-        (
-            {"controller": st.TorqueTable([0, 1], [[0] * NT, [0]])},
-            "TorqueTable: torques: type .*: needs real numbers",
-        ),
-        (
-            {"controller": st.TorqueTable([0], [[0] * NT], damping=-1)},
-            "damping: value -1: needs one or .* numbers from 0",
-        ),
-    ],
-)
-def test_wrong_setting_is_named(fly, settings, words):
-    with pytest.raises(st.SimulationError, match=words):
-        fly(**settings)
+def test_a_wrong_start_is_named():
+    for start, words in STARTS:
+        with row(words), pytest.raises(st.StateError, match=words):
+            st.simulate(tail(), *start)
 
 
-@pytest.mark.parametrize("left_out", ["rollout", "energy", "momentum"])
-def test_function_left_out_is_named_before_the_flight(left_out):
-    wanted = [
-        each for each in ("forward_dynamics", "energy", "momentum", "rollout") if each != left_out
-    ]
-    model = st.load(model_folder(1, 1, name="tail", functions=wanted))
-    with pytest.raises(
-        st.ModelError, match=f"tail was generated without '{left_out}' .*add it to `functions`"
-    ):
+SPANS = [0, -1, (1, 1), (2, 1), (0, np.nan), (0, np.inf), (0, 1, 2), "1"]
+SPANS += [None, (), [[0], [1]], ("0", "1"), (0, None), True, (0, 1j)]
+LENGTHS = (0, -1e-3, np.nan, np.inf, "1", True, [1], 1j)
+SETTINGS = [
+    *(({"t_span": span}, "t_span") for span in SPANS),
+    *(({name: x}, name) for name in ("step", "output_step") for x in LENGTHS),
+    *(({"method": "dop853", name: 0}, name) for name in ("rtol", "atol")),
+    ({"method": "euler"}, "method: value 'euler'.*'lsoda'"),
+    ({"gravity": 1.6}, r"gravity: .*with_parameters\(gravity=1\.6\)"),
+    ({"duration": 1}, "duration: .*t_span=1"),
+    ({"method": "rk4", "rtol": 1e-6}, "rk4 .*'rtol'.*step, output_step"),
+    ({"step": 1e-6, "rtol": 1e-6}, "rk4 .*'rtol'"),
+    ({"method": "dop853", "step": 1}, "dop853 .*'step'.*rtol, atol, output_step"),
+    ({"stp": 1}, "'stp'"),
+    ({"output_step": 1e-8, "t_span": 1}, "more than 10000000 samples: give 1e-07 s"),
+    ({"output_step": 1e-11, "t_span": (1e6, 1e6 + 1e-9)}, "too short to move the time"),
+    *(({name: [1]}, f"^{name} .*no contacts") for name in ("legs", "bristles0", "stop_at")),
+]
+
+
+def test_a_wrong_setting_is_named():
+    for settings, words in SETTINGS:
+        with row(settings), pytest.raises(st.SimulationError, match=words):
+            fly(**settings)
+
+
+TABLE, TIMES = st.TorqueTable, [0, 1]
+CONTROLLERS = [
+    (lambda: 3.0, r"controller: value 3\.0"),
+    *(
+        (lambda d=d: st.Damping(d), "damping")
+        for d in (-1.0, np.nan, (1, 2), "1", None, [[0.0] * NT])
+    ),
+    (lambda: TABLE(TIMES, [[0] * NT]), r"times \(2,\) and torques \(1, 4\)"),
+    (lambda: TABLE([], []), "TorqueTable"),
+    (lambda: TABLE(0, [0] * NT), "TorqueTable"),
+    (lambda: TABLE([1, 1], [[0] * NT] * 2), "increasing times"),
+    (lambda: TABLE([0], [[np.nan] * NT]), "value nan"),
+    (lambda: TABLE(["0"], [[0] * NT]), "TorqueTable: times: type"),
+    (lambda: TABLE(TIMES, [[0] * NT, [0]]), "TorqueTable: torques: type"),
+    (lambda: TABLE([0], [[0] * NT], damping=-1), "damping: value -1"),
+    (lambda: st.Phases([]), "one or more"),
+    (lambda: st.Phases([(0, None), (0, None)]), "increasing times"),
+    (lambda: st.Phases([(1, None), (0, None)]), "increasing times"),
+    (lambda: st.Phases([(0, st.Phases([(0, None)]))]), "one list"),
+    (lambda: st.Phases(3), "needs pairs"),
+    (lambda: st.Phases([(0, 3)]), "controller: value 3"),
+    (lambda: Path("nowhere"), "controller: value PosixPath"),  # has parts
+    (lambda: st.TorqueCurve(3), "Piecewise of 4 channels"),
+    (lambda: st.NativeTorque("f"), "ctypes function or an address"),
+    (lambda: st.Reference(TIMES, [[0] * 4] * 2, "cubic"), "blend: value 'cubic'.*'quintic'"),
+    (lambda: st.Reference([1, 0], [[0] * 4] * 2), "increasing times"),
+    (lambda: st.Reference([0], [[0] * 4]), "one node only"),
+    (lambda: st.Pfl(tail(), st.Reference(TIMES, [[0] * 2] * 2)), "2 angles, the tail 4"),
+]
+
+
+def test_a_wrong_controller_is_named():
+    for make, words in CONTROLLERS:
+        with row(words), pytest.raises(st.SimulationError, match=words):
+            fly(controller=make())
+
+
+def test_functions_left_out_are_named_before_the_flight():
+    with pytest.raises(st.ModelError, match=r"bare .*'rollout'.*'energy'.*'momentum'"):
         st.simulate(
-            model,
+            zoo.model("bare"),
             [0, 0, 0, 1, 0, 0, 0, 0, 0],
             [0] * 8,
             controller=lambda *_: pytest.fail("was called"),
         )
 
 
-# Runs that diverge
-
-
 PUSH = st.TorqueTable([0], [[1e6] * NT])
+COARSE = {"step": 0.05, "output_step": 0.05}
+DIVERGING = {
+    "table": (V0, {"controller": PUSH} | COARSE),
+    "function": (V0, {"controller": lambda t, q, v: [1e6] * NT} | COARSE),
+    "feedback": (V0, {"controller": lambda t, q, v: 1e3 * v[6:]} | COARSE),
+    "dop853": (V0, {"controller": st.TorqueTable([0], [[1e300] * NT]), "method": "dop853"}),
+    "dop853 at once": (V0 * 1e160, {"method": "dop853"}),
+    "auto at once": (V0 * 1e160, {}),
+}
 
 
-@pytest.mark.parametrize(
-    ("start", "settings"),
-    [
-        (V0, {"controller": PUSH, "step": 0.05, "output_step": 0.05}),
-        (V0, {"controller": lambda t, q, v: [1e6] * NT, "step": 0.05, "output_step": 0.05}),
-        (V0, {"controller": lambda t, q, v: 1e3 * v[6:], "step": 0.05, "output_step": 0.05}),
-        (V0, {"controller": st.TorqueTable([0], [[1e300] * NT]), "method": "dop853"}),
-        (V0 * 1e160, {"method": "dop853"}),
-        (V0 * 1e160, {}),
-    ],
-    ids=["table", "function", "feedback", "dop853", "dop853 at once", "rk4 at once"],
-)
-def test_diverging_run_names_the_time(model, start, settings):
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        with pytest.raises(st.SimulationError, match=r"^at t = 5(\.\d+)? s .*: is the ") as caught:
-            st.simulate(model, Q0, start, **{"t_span": (5, 6)} | settings)
-    assert caught.value.__cause__ is None
+def test_a_diverging_run_names_the_time():
+    for name, (start, settings) in DIVERGING.items():
+        with row(name), warnings.catch_warnings():
+            warnings.simplefilter("error")
+            with pytest.raises(st.SimulationError, match=r"^at t = 5(\.\d+)? s ") as caught:
+                st.simulate(tail(), Q0, start, **{"t_span": (5, 6)} | settings)
+            assert caught.value.__cause__ is None
 
 
-def test_energy_beyond_numbers_names_the_sample(model):
+def test_an_energy_beyond_numbers_names_the_sample():
     fast = [1e200] + [0] * (NV - 1)
-    with pytest.raises(
-        st.SimulationError,
-        match=r"^from t = 5 s to 5\.5 s, by sample: energy: the result of state 0 is not",
-    ):
-        st.simulate(model, Q0, fast, t_span=(5, 5.5), step=0.1, output_step=0.1)
+    words = r"^from t = 5 s to 5\.5 s, by sample: energy: .*state 0"
+    with pytest.raises(st.SimulationError, match=words):
+        st.simulate(tail(), Q0, fast, t_span=(5, 5.5), step=0.1, output_step=0.1)
+
+
+def test_degrees_are_told_where_they_are_given():
+    """At the start, in one row or in one of several, and in bends."""
+    upright, v = np.eye(1, NQ, 3)[0], np.zeros(NV)
+    q = upright + 30 * np.eye(1, NQ, 8)[0]
+    words = r"q0\[{}8\]: value 30 rad: .*np\.radians\(30\)"
+    with pytest.warns(st.UnusualSize, match=words.format("")) as caught:
+        st.simulate(tail(), q, v, t_span=1e-3)
+    with pytest.warns(st.UnusualSize, match=words.format(r"1\]\[")) as again:
+        st.simulate(tail(), [upright, q], v, t_span=1e-3)
+    assert {each.filename for each in (*caught, *again)} == {__file__}
+    for shape, place in (((2,), r"\[1\]\[0\]"), ((2, 2), r"\[1\]\[0\]\[0\]")):
+        bends = np.zeros((2, *shape))
+        bends[1].flat[0] = 90
+        words = rf"bends{place}: value 90 rad: .*radians\(90\)"
+        with pytest.warns(st.UnusualSize, match=words) as caught:
+            st.Reference.of_bends(tail(), [0, 0.3], bends)
+        assert [each.filename for each in caught] == [__file__]

@@ -1,6 +1,4 @@
-"""Rollouts: many runs at once give what each gives alone, bit for bit, its error too, in any order,
-on any core.
-"""
+"""A run that fails is its own error, and loses no other; what is wrong is named with its run."""
 
 import ctypes
 import signal
@@ -12,82 +10,79 @@ import pytest
 
 import serpentail as st
 from serpentail.simulation import batched_runs, parallel_runs
+from tests.support import zoo
+from tests.support.rows import row
 
-from .many import NT, NV, PER_RUN, starts, tail
-
-# Failures.
-
-PUSHED = {
-    "t_span": (5, 6),
-    "controller": st.TorqueTable([5.0], [[1e-4] * NT]),
-    "output_step": 0.05,
-    "method": "tsit5",
-}
+from ..runs import LEGS, NQ, NT, NV, PER_RUN, alone, rat, same, starts, tail
 
 
-@pytest.mark.parametrize("threads", [1, 3])
-def test_a_run_that_fails_loses_no_other(threads):
+def test_a_run_that_fails_loses_no_other():
     q, v = starts(tail(), 5)
     v[2] *= 1e160  # overflows at once
     v[4] *= 100  # takes too many steps
-    settings = PUSHED | {"most_steps": 600}
-    found = st.simulate(tail(), q, v, threads=threads, **settings)
-    for k in range(5):
-        try:
-            flight = st.simulate(tail(), q[k], v[k], **settings)
-        except st.SimulationError as error:
-            own = found.errors[k]
-            assert str(own) == str(error) and isinstance(own, st.SimulationError)
-            with pytest.raises(st.SimulationError) as caught:
-                found[k]
-            assert caught.value is own
-            flight, rows = (
-                error.trajectory,
-                0 if error.trajectory is None else len(error.trajectory.t),
-            )
-            assert (own.trajectory is None) == (flight is None)
-            assert rows or np.isnan(found.kinetic[k]).all()
-        else:
-            assert found.errors[k] is None
-            rows = len(flight.t)
-        for name in PER_RUN:
-            array = getattr(found, name)[k]
-            assert np.isnan(array[max(rows, 1) :]).all()
-            if rows:
-                np.testing.assert_array_equal(array[:rows], getattr(flight, name))
-    assert [error is None for error in found.errors] == [True, True, False, True, False]
-    assert "most_steps" in str(found.errors[4]) and len(found.errors[4].trajectory.t) > 1
-    assert 5 < found.ends[4] < 6 and found.ends[0] == 6
+    law = st.TorqueTable([5.0], [[1e-4] * NT])
+    settings = {"t_span": (5, 6), "controller": law, "output_step": 0.05, "method": "tsit5"}
+    settings["most_steps"] = 600
+    for threads in (1, 3):
+        found = st.simulate(tail(), q, v, threads=threads, **settings)
+        for k in range(5):
+            with row(threads, k):
+                check_alone(found, k, (q[k], v[k]), settings)
+        assert [error is None for error in found.errors] == [True, True, False, True, False]
+        assert "most_steps" in str(found.errors[4]) and len(found.errors[4].trajectory.t) > 1
+        assert 5 < found.ends[4] < 6 and found.ends[0] == 6
+
+
+def check_alone(found, k, state, settings):
+    """Run k of rollouts is, or fails as, the one that starts alone."""
+    try:
+        flight = st.simulate(tail(), *state, **settings)
+    except st.SimulationError as error:
+        own, flight = found.errors[k], error.trajectory
+        assert str(own) == str(error) and isinstance(own, st.SimulationError)
+        with pytest.raises(st.SimulationError) as caught:
+            found[k]
+        assert caught.value is own and (own.trajectory is None) == (flight is None)
+    else:
+        assert found.errors[k] is None
+    rows = 0 if flight is None else len(flight.t)
+    assert rows or np.isnan(found.kinetic[k]).all()
+    for name in PER_RUN:
+        array = getattr(found, name)[k]
+        assert np.isnan(array[max(rows, 1) :]).all()
+        if rows:
+            np.testing.assert_array_equal(array[:rows], getattr(flight, name))
 
 
 def test_an_energy_beyond_numbers_is_its_runs_error():
     q, v = starts(tail(), 3)
     v[1] = [1e200] + [0] * (NV - 1)
     found = st.simulate(tail(), q, v, t_span=0.5, output_step=0.1, step=0.1)
-    assert "energy: the result of state 0 is not finite" in str(found.errors[1])
+    assert "energy: the result of state 0" in str(found.errors[1])
     assert np.isnan(found.kinetic[1]).all() and np.isfinite(found.kinetic[[0, 2]]).all()
 
 
 def test_a_function_of_python_runs_in_the_calling_thread():
-    q, v = starts(tail(), 4)
     threads = set()
 
     def law(t, q, v):
         threads.add(threading.current_thread())
         return [0.0] * NT
 
-    assert st.simulate(tail(), q, v, t_span=0.01, controller=law).info["threads"] == 1
-    assert threads == {threading.current_thread()}
+    found = st.simulate(tail(), *starts(tail(), 4), t_span=0.01, controller=law)
+    assert found.info["threads"] == 1 and threads == {threading.current_thread()}
 
 
-@pytest.mark.parametrize("method", ["tsit5", "dop853"])
+@pytest.mark.parametrize("method", ["tsit5", "rk4", "dop853", "lsoda"])
 def test_what_a_function_raises_ends_all_but_a_simulation_error_its_run(method):
     q, v = starts(tail(), 3)
     q[1, 0] = 50.0
+    calls = []
 
-    def law(error):
+    def law(error, begin=0.005):
         def torque(t, q, v):
-            if q[0] > 40 and t > 0.005:
+            calls.append(t)
+            if q[0] > 40 and t > begin:
                 raise error
             return [0.0] * NT
 
@@ -99,10 +94,13 @@ def test_what_a_function_raises_ends_all_but_a_simulation_error_its_run(method):
     found = st.simulate(tail(), q, v, controller=law(st.SimulationError("mine")), **settings)
     assert [str(error) for error in found.errors] == ["None", "mine", "None"]
     assert len(found.errors[1].trajectory.t) > 2
+    calls.clear()
+    with pytest.raises(KeyError):
+        st.simulate(tail(), q[1:], v[1:], controller=law(KeyError("mine"), -1), **settings)
+    assert len(calls) == 1
 
 
-@pytest.mark.parametrize("threads", [1, 2])
-def test_a_compiled_torque_that_refuses_ends_its_run(threads):
+def test_a_compiled_torque_that_refuses_ends_its_run():
     real = ctypes.POINTER(ctypes.c_double)
 
     @ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_double, real, real, real)
@@ -111,10 +109,11 @@ def test_a_compiled_torque_that_refuses_ends_its_run(threads):
 
     q, v = starts(tail(), 3)
     q[1, 0] = 50.0
-    law = st.NativeTorque(torque)
-    found = st.simulate(tail(), q, v, t_span=0.01, controller=law, method="tsit5", threads=threads)
-    assert [error is None for error in found.errors] == [True, False, True]
-    assert "the compiled torque function returned an error status" in str(found.errors[1])
+    how = {"t_span": 0.01, "controller": st.NativeTorque(torque), "method": "tsit5"}
+    for threads in (1, 2):
+        found = st.simulate(tail(), q, v, threads=threads, **how)
+        assert [error is None for error in found.errors] == [True, False, True]
+        assert "error status" in str(found.errors[1])
 
 
 @pytest.mark.parametrize("abreast", [True, False], ids=["abreast", "alone"])
@@ -122,19 +121,95 @@ def test_ctrl_c_ends_all_threads_within_a_second(monkeypatch, abreast):
     monkeypatch.setattr(parallel_runs, "worth_batching", lambda *_: abreast)
     monkeypatch.setattr(batched_runs, "MAX_SHARED_STEPS", 10**12)
     q, v = starts(tail(), 50)
-    tail().batch_library.rollouts.function(
-        "tail_side_by_side_flights"
-    )  # compiled before the clock runs
+    tail().batch_library.rollouts.function("m2_n2_side_by_side_flights")  # compiled before
     before, asked = threading.active_count(), []
 
     def ask():
         asked.append(time.monotonic())
         signal.raise_signal(signal.SIGINT)
 
-    timer = threading.Timer(1.5, ask)
+    timer = threading.Timer(0.5, ask)
     timer.start()
+    how = {"t_span": 20, "step": 1e-5, "method": "rk4", "output_step": 20, "threads": 2}
     with pytest.raises(KeyboardInterrupt):
-        st.simulate(tail(), q, v, t_span=20, step=1e-5, method="rk4", output_step=20, threads=2)
+        st.simulate(tail(), q, v, **how)
     assert time.monotonic() - asked[0] < 1
     timer.join()
     assert threading.active_count() == before
+
+
+# ---- refusals ------------------------------------------------------------------------------------
+
+
+def row_with(array, where, value):
+    changed = array.copy()
+    changed[where] = value
+    return changed
+
+
+def test_wrong_states_are_named_with_their_run():
+    Q, V = starts(tail(), 4)
+    rows = [
+        ((row_with(Q, (2, 1), np.nan), V), r"q0\[1\] of run 2: value nan"),
+        ((Q, row_with(V, (3, 0), np.inf)), r"v0\[0\] of run 3: value inf"),
+        ((row_with(Q, (1, slice(3, 7)), 0), V), r"q0\[3:7\] of run 1 .*zero quaternion"),
+        ((Q, V[:3]), "q0 has 4 runs, v0 3"),
+        ((Q[:, 1:], V), rf"q0 has shape \(4, {NQ - 1}\)"),
+        ((Q[:0], V[:0]), rf"q0 has shape \(0, {NQ}\)"),
+    ]
+    for states, words in rows:
+        with row(words), pytest.raises(st.StateError, match=words):
+            st.simulate(tail(), *states)
+    with pytest.raises(st.SimulationError, match=r"4 runs: give 4e-07 s"):
+        st.simulate(tail(), Q, V, t_span=1.0, output_step=1e-7)
+
+
+WRONG_PARAMETERS = [
+    ({"tail_mas": [1.0] * 4}, "tail_mas: .*'tail_mass'"),
+    ({"tail_mass": [0.1] * 3}, r"tail_mass: value \[0.1, 0.1, 0.1\].*4 runs"),
+    ({"tail_mass": 0.1}, r"tail_mass: value 0.1.*4 runs"),
+    ({"tail_mount": [0.1] * 4}, r"tail_mount: value .*4 runs"),
+    ({"tail_mass": [0.1, 0.1, -0.1, 0.1]}, r"tail_mass of run 2: value -0.1"),
+    ({"gravity": [0.1, np.nan, 0.1, 0.1]}, r"gravity of run 1: value nan"),
+    (
+        {"torso_inertia": [[1, 1, 1], [1, 1, 3], [1, 1, 1], [1, 1, 1]]},
+        r"torso_inertia of run 1: value \[1.0",
+    ),
+    ({"link_radius": [0.1] * 4, "link_inertia": [[1, 1, 1]] * 4}, "not both"),
+    ([("tail_mass", 1.0)], "needs a mapping"),
+]
+
+
+def test_wrong_parameters_are_named_with_their_run():
+    Q, V = starts(tail(), 4)
+    for own, words in WRONG_PARAMETERS:
+        with row(own), pytest.raises(st.ModelError, match=words):
+            st.simulate(tail(), Q, V, parameters=own)
+    with pytest.raises(st.ModelError, match="one start only"):
+        st.simulate(tail(), Q[0], V[0], parameters={"tail_mass": 0.1})
+    baked = zoo.model("baked")
+    q, v = starts(baked, 4)
+    with pytest.raises(st.ModelError, match="baked"):
+        st.simulate(baked, q, v, parameters={"tail_mass": [0.1] * 4})
+    same(st.simulate(baked, q, v, t_span=0.01, parameters={}), alone(baked, q, v, t_span=0.01))
+
+
+@pytest.mark.filterwarnings("ignore::serpentail.errors.UnusualSize")
+def test_bodies_of_unlike_size_in_one_run_are_warned_of_where_it_is_called():
+    own, how = {"tail_length": [0.2, 200.0, 0.2, 0.2]}, {"t_span": 1e-3, "step": 1e-3}
+    with pytest.warns(st.UnlikeBodies, match=r"factor of 3\.9e\+06") as caught:
+        st.simulate(tail(), *starts(tail(), 4), parameters=own, **how)
+    assert {warning.filename for warning in caught} == {__file__}
+
+
+def test_wrong_starts_on_the_ground_are_named():
+    q, v = starts(rat(), 3)
+    with pytest.raises(st.SimulationError, match=r"q0 of run 1: point \d+ \(\w+\) is \d+ mm deep"):
+        st.simulate(rat(), row_with(q, (1, 2), -0.3), v, legs=LEGS)
+    heavy = {"tail_mass": [1e308] * 3}
+    with pytest.raises(st.ModelError, match="tail_mass and gravity"):
+        st.simulate(rat(), q, v, legs=LEGS, t_span=0.002, method="rk4", parameters=heavy)
+    with pytest.raises(st.SimulationError, match=r"bristles0 .*\(2, 9, 2\).*\(9, 2\)"):
+        st.simulate(rat(), q, v, legs=LEGS, bristles0=np.zeros((2, 9, 2)))
+    with pytest.raises(st.StateError, match="one start state after another"):
+        st.settle(rat(), q, legs=LEGS)

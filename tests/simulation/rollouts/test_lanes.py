@@ -1,176 +1,195 @@
-"""Rollouts: many runs at once give what each gives alone, bit for bit, its error too, in any order,
-on any core.
-"""
+"""Flights side by side in vectors: each lane is what its run is alone, to rounding."""
 
 import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.model.snapshot import model_library
-from serpentail.simulation import batched_runs, parallel_runs
+from tests.references.metrics import block_error
+from tests.support import zoo
+from tests.support.rows import row
 
-from ...support.models import model_folder
-from .many import DAMPING, NT, PER_RUN, WANTED, alone, same, starts, tail
+from ..runs import DAMPING, JUMPS, NT, TABLE, alone, near, same, starts, tail
 
-LAWS = {
-    "none": None,
-    "damping": st.Damping((1e-6, 2e-6, 3e-6, 4e-6)),
-    "table": st.TorqueTable(
-        [0.0, 0.0123, 0.031], np.outer([1, -1, 2], [1e-5, 2e-5, -1e-5, 1e-5]), 1e-6
-    ),
-    "jumps": st.TorqueCurve(
-        st.Piecewise(
-            np.array([0.01, 0.0207, 0.04]), 1e-5 * np.array([[[1.0, 0]] * NT, [[-2.0, 9]] * NT])
-        )
-    ),
-}
-FLIGHT = {"t_span": (0.005, 0.05), "method": "rk4", "step": 3e-4, "output_step": 5e-3}
+EACH = st.Damping((1e-6, 2e-6, 3e-6, 4e-6))
+PHASES = st.Phases([(0.0, DAMPING), (0.1, TABLE), (0.2, None)])
+LAWS = {"none": None, "damping": EACH, "table": TABLE, "jumps": JUMPS, "phases": PHASES}
+RK4 = {"t_span": (0.005, 0.05), "method": "rk4", "step": 3e-4, "output_step": 5e-3}
+TSIT5 = {"t_span": (0.005, 0.3), "method": "tsit5", "output_step": 0.0123}
+METHODS = {"rk4": RK4, "tsit5": TSIT5}
+pytestmark = pytest.mark.usefixtures("any_number_is_many")
 
 
-def near(rollouts, flights, digits=1e-11):
-    """Assert that all arrays of rollouts are those of single flights but for rounding."""
-    for name in PER_RUN:
-        expected = np.array([getattr(flight, name) for flight in flights])
-        error = np.abs(getattr(rollouts, name) - expected).max()
-        assert error <= digits * max(np.abs(expected).max(), 1e-9), (name, error)
+def unlike(count, seed=0):
+    """Starts of which some need several times as many steps as others."""
+    q, v = starts(tail(), count, seed)
+    return q, v * np.linspace(0.2, 12, count)[:, None]
 
 
-@pytest.mark.usefixtures("any_number_is_many")
-@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
-def test_flights_abreast_are_what_they_are_alone(law):
-    q, v = starts(tail(), 19)
-    settings = FLIGHT | {"controller": law}
-    flights = alone(tail(), q, v, **settings)
-    for count in (2, 8, 9, 19):
-        found = st.simulate(tail(), q[:count], v[:count], **settings)
-        assert found.info["abreast"] == 8 and found.errors == [None] * count
-        near(found, flights[:count])
-        assert found[1].info["steps"] == flights[1].info["steps"]
-        assert found.info["evaluations"] == sum(
-            flight.info["evaluations"] for flight in flights[:count]
-        )
+@pytest.mark.parametrize("method", METHODS)
+def test_each_lane_steps_as_its_run_does_alone(method):
+    """By rk4 phases are no work for lanes."""
+    q, v = unlike(19)
+    for name in LAWS if method == "tsit5" else [*LAWS][:4]:
+        settings = METHODS[method] | {"controller": LAWS[name]}
+        flights = alone(tail(), q, v, **settings)
+        taken = [flight.info["steps"] for flight in flights]
+        assert method == "rk4" or max(taken) > 2 * min(taken)
+        for count in (2, 8, 9, 19):
+            with row(name, count):
+                found = st.simulate(tail(), q[:count], v[:count], **settings)
+                assert found.info["abreast"] == 8 and found.errors == [None] * count
+                near(found, flights[:count])
+                assert (found.ends == settings["t_span"][1]).all()
+                for key in ("steps", "rejected", "evaluations"):
+                    wanted = [flight.info.get(key) for flight in flights[:count]]
+                    assert [found[k].info.get(key) for k in range(count)] == wanted, key
+                work = [flight.info["work_J"]["torques"] for flight in flights[:count]]
+                found = found.audit.work["torques"]
+                np.testing.assert_allclose(found, work, rtol=1e-8, atol=1e-16)
 
 
-@pytest.mark.usefixtures("any_number_is_many")
-@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
-def test_sound_flights_are_made_abreast_and_no_second_time(law, monkeypatch):
-    """A group that fails is made singly, run by run: none of these may."""
-    monkeypatch.setattr(parallel_runs, "RunsInTurn", lambda *_: pytest.fail("in turn"))
-    st.simulate(tail(), *starts(tail(), 19), controller=law, **FLIGHT)
+def test_the_tolerance_holds_against_scipy():
+    q, v = starts(tail(), 9)
+    settings = {"t_span": 0.3, "output_step": 0.05, "controller": DAMPING}
+    exact = alone(tail(), q, v, method="dop853", rtol=1e-12, **settings)
+    for rtol in (1e-4, 1e-7, 1e-10):
+        found = st.simulate(tail(), q, v, method="tsit5", rtol=rtol, atol=rtol, **settings)
+        assert found.info["abreast"] == 8
+        errors = [block_error(found.v[k], exact[k].v) for k in range(9)]
+        assert max(errors) <= 300 * rtol
 
 
-FORMS = {
-    "loops": ((2, 2), {"emission": "loops"}, 1e-11),
-    "baked": ((2, 2), {"baked": True}, 1e-11),
-    "float": ((2, 2), {"real": "float"}, 1e-3),
-    "continuum": ((2, None), {}, 1e-11),
-}
+@pytest.mark.parametrize("method", METHODS)
+def test_the_reproducible_profile_gives_the_same_bits(method):
+    model, (q, v) = st.load(tail().folder, profile="reproducible"), unlike(11)
+    for name in ("none", "table", "phases") if method == "tsit5" else ("none", "damping"):
+        how = METHODS[method] | {"controller": LAWS[name]}
+        found = st.simulate(model, q, v, **how)
+        assert found.info["abreast"] == 8
+        with row(name):
+            same(found, alone(model, q, v, **how))
 
 
-@pytest.mark.usefixtures("any_number_is_many")
-@pytest.mark.parametrize(("sizes", "options", "digits"), FORMS.values(), ids=FORMS)
-def test_every_form_of_a_model_flies_abreast(sizes, options, digits):
-    model = st.load(model_folder(*sizes, name="form", functions=WANTED, **options))
-    q, v = starts(model, 9)
-    settings = FLIGHT | {"controller": LAWS["table"]}
-    found = st.simulate(model, q, v, **settings)
-    assert found.info["abreast"] == (16 if options.get("real") == "float" else 8)
-    near(found, alone(model, q, v, **settings), digits)
+FORMS = {"loops": 1e-11, "baked": 1e-11, "single": 3e-3, "arcs2": 1e-11}
 
 
-@pytest.mark.usefixtures("any_number_is_many")
-@pytest.mark.parametrize("law", [None, LAWS["damping"]], ids=["none", "damping"])
-def test_the_reproducible_profile_gives_the_same_bits(law):
-    model = st.load(tail().folder, profile="reproducible")
-    q, v = starts(model, 11)
-    settings = {"t_span": 0.05, "method": "rk4", "step": 1e-3, "controller": law}
-    found = st.simulate(model, q, v, **settings)
+@pytest.mark.parametrize("name", FORMS)
+def test_every_form_of_a_model_has_lanes(name):
+    model = zoo.model(name)
+    (q, v), nt = starts(model, 19), model.layout.nt
+    law = st.TorqueTable(TABLE.times, np.array(TABLE.torques)[:, :nt], 1e-6)
+    for method, own in METHODS.items():
+        settings = own | {"t_span": 0.05, "controller": law}
+        found = st.simulate(model, q, v, **settings)
+        assert found.info["abreast"] == (16 if name == "single" else 8)
+        with row(method):
+            near(found, alone(model, q, v, **settings), FORMS[name])
+
+
+@pytest.mark.parametrize("name", ["elastic", "elastic_arcs"])
+def test_each_lane_has_springs_and_damping_of_its_own(name):
+    model, rng = zoo.model(name), np.random.default_rng(5)
+    q = np.tile(np.eye(1, model.nq, 3), (9, 1))
+    q[:, 7:], v = rng.uniform(-0.3, 0.3, (9, 4)), np.zeros(model.nv)
+    own = {"tail_stiffness": rng.uniform(1e-3, 1e-2, (9, 4))}
+    own["tail_damping"] = rng.uniform(1e-5, 1e-3, (9, 1)) * np.ones(4)
+    for how in ({"method": "tsit5", "rtol": 1e-9}, {"method": "rk4", "step": 1e-4}):
+        many = st.simulate(model, q, v, parameters=own, t_span=0.1, **how)
+        assert many.info["abreast"] == 8 and many.errors == [None] * 9
+        for k in range(9):
+            changed = model.with_parameters(**{n: x[k] for n, x in own.items()})
+            run = st.simulate(changed, q[k], v, t_span=0.1, **how)
+            with row(how["method"], k):
+                np.testing.assert_allclose(many[k].q, run.q, atol=1e-8)
+                found, expected = (motion.info["work_J"]["damping"] for motion in (many[k], run))
+                assert found == pytest.approx(expected, rel=1e-7) and expected < -1e-6
+                assert many[k].info["imbalance"]["relative"] < 1e-5
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_controllers_and_parameters_are_those_of_the_run_in_the_lane(method):
+    q, v = unlike(13)
+    given = [None, DAMPING, EACH] * 4 + [None]
+    if method == "tsit5":
+        given = [None, DAMPING, PHASES, TABLE, JUMPS] * 2 + [None, DAMPING, PHASES]
+    own = {"tail_mass": np.linspace(0.002, 0.02, 13)}
+    own["tail_mount"] = 0.02 * np.random.default_rng(1).normal(size=(13, 3))
+    how = METHODS[method]
+    found = st.simulate(tail(), q, v, controller=given, parameters=own, **how)
     assert found.info["abreast"] == 8
-    same(found, alone(model, q, v, **settings))
+    flights = []
+    for k, law in enumerate(given):
+        model = tail().with_parameters(**{name: values[k] for name, values in own.items()})
+        flights.append(st.simulate(model, q[k], v[k], controller=law, **how))
+    near(found, flights)
 
 
-@pytest.mark.usefixtures("any_number_is_many")
-def test_each_lane_has_its_own_parameters():
-    q, v = starts(tail(), 11)
-    rng = np.random.default_rng(1)
-    own = {"tail_mass": rng.uniform(0.002, 0.02, 11), "tail_mount": 0.02 * rng.normal(size=(11, 3))}
-    found = st.simulate(tail(), q, v, parameters=own, **FLIGHT)
-    models = [
-        tail().with_parameters(**{name: values[k] for name, values in own.items()})
-        for k in range(11)
+def test_settings_of_steps_hold_in_lanes():
+    q, v = unlike(9)
+    for own in ({"first_step": 1e-3}, {"most_step": 2e-3}, {"least_step": 1e-5}):
+        with row(own):
+            flights = alone(tail(), q, v, **TSIT5 | own)
+            found = st.simulate(tail(), q, v, **TSIT5 | own)
+            near(found, flights)
+            assert found.info["steps"] == sum(flight.info["steps"] for flight in flights)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_run_that_fails_loses_no_other(method):
+    q, v = unlike(20)
+    v[[0, 2]] *= 1e160  # overflow at once
+    v[5] = [1e200] + [0.0] * (v.shape[1] - 1)  # has no energy
+    settings = METHODS[method]
+    if method == "tsit5":
+        v[11] *= 40  # takes too many steps
+        settings = settings | {"most_steps": 200}
+    for threads in (1, 3):
+        found = st.simulate(tail(), q, v, threads=threads, **settings)
+        for k in range(20):
+            try:
+                flight = st.simulate(tail(), q[k], v[k], **settings)
+            except st.SimulationError as error:
+                assert str(found.errors[k]) == str(error)
+            else:
+                assert found.errors[k] is None
+                np.testing.assert_allclose(found.q[k], flight.q, rtol=0, atol=1e-11)
+                assert np.isfinite(found.q[k]).all() and np.isfinite(found.v[k]).all()
+        failed = {k for k in range(20) if found.errors[k]}
+        assert failed >= {0, 2, 5} and (11 in failed) == (method == "tsit5") and len(failed) < 10
+        assert np.isnan(found.q[2, 1:]).all()
+
+
+def test_runs_do_not_depend_on_their_order_or_on_threads():
+    q, v = unlike(40)
+    order = np.random.default_rng(3).permutation(40)
+    first = st.simulate(tail(), q, v, threads=1, **TSIT5)
+    other = st.simulate(tail(), q[order], v[order], threads=5, **TSIT5)
+    np.testing.assert_array_equal(other.q, first.q[order])
+    np.testing.assert_array_equal(other.v, first.v[order])
+
+
+@pytest.mark.parametrize("law", ["constants", "tables", "mixed"])
+def test_torques_of_their_own_fly_abreast(law):
+    q, v = starts(tail(), 19)
+    rng = np.random.default_rng(4)
+    constants = [st.TorqueTable([0.0], 1e-5 * rng.normal(size=(1, NT)), 1e-6) for _ in range(19)]
+    tables = [st.TorqueTable(TABLE.times, 1e-5 * rng.normal(size=(3, NT))) for _ in range(19)]
+    mixed = [None, DAMPING, *constants[2:]]
+    given = {"constants": constants, "tables": tables, "mixed": mixed}[law]
+    found = st.simulate(tail(), q, v, controller=given, **RK4)
+    assert found.info["abreast"] == 8 and found.errors == [None] * 19
+    expected = alone(tail(), q, v, given, **RK4)
+    near(found, expected)
+    work = [each.info["work_J"]["torques"] for each in expected]
+    np.testing.assert_allclose(found.audit.work["torques"], work, rtol=1e-9, atol=1e-20)
+
+
+def test_kinks_at_other_times_fly_one_by_one():
+    q, v = starts(tail(), 9)
+    given = [
+        st.TorqueTable([0.0, 0.01 + 1e-3 * k], 1e-5 * (k + 1) * np.eye(2, NT), 1e-6)
+        for k in range(9)
     ]
-    near(found, [st.simulate(model, q[k], v[k], **FLIGHT) for k, model in enumerate(models)])
-
-
-@pytest.mark.usefixtures("any_number_is_many")
-def test_a_flight_that_fails_abreast_loses_no_other():
-    q, v = starts(tail(), 12)
-    v[2] *= 1e160
-    found = st.simulate(tail(), q, v, **FLIGHT)
-    with pytest.raises(st.SimulationError) as caught:
-        st.simulate(tail(), q[2], v[2], **FLIGHT)
-    assert [k for k in range(12) if found.errors[k]] == [2] and str(found.errors[2]) == str(
-        caught.value
-    )
-    others = [k for k in range(12) if k != 2]
-    for k in others:
-        flight = st.simulate(tail(), q[k], v[k], **FLIGHT)
-        np.testing.assert_allclose(found.q[k], flight.q, rtol=0, atol=1e-12)
-    assert np.isnan(found.q[2, 1:]).all()
-
-
-@pytest.fixture
-def built(monkeypatch):
-    """What is compiled beside models, where the cache has nothing of it."""
-    found = []
-    monkeypatch.setattr(
-        "serpentail.model.batch.model_library", lambda *a: found.append(a) or model_library(*a)
-    )
-    monkeypatch.setattr("serpentail.model.batch.library_in_cache", lambda *_: None)
-    return found
-
-
-def test_short_work_compiles_nothing_until_all_of_it_would_have_paid(built, monkeypatch):
-    model = st.load(tail().folder)
-    q, v = starts(model, 9)
-    assert st.simulate(model, q, v, **FLIGHT).info["abreast"] == 1 and not built
-    source = model.batch_library.rollouts
-    price = batched_runs.COMPILE_S_PER_BYTE * source.bytes
-    assert 0 < source.missed < price
-    source.missed = price - source.missed / 2  # what many such calls would have come to
-    assert st.simulate(model, q[:7], v[:7], **FLIGHT).info["abreast"] == 1  # no full vector
-    assert st.simulate(model, q, v, **FLIGHT).info["abreast"] == 8 and len(built) == 1
-    assert st.simulate(model, q, v, **FLIGHT).info["abreast"] == 8 and len(built) == 1
-
-
-def test_long_work_compiles_at_once(built, monkeypatch):
-    monkeypatch.setattr(batched_runs, "COMPILE_S_PER_BYTE", 1e-10)
-    model = st.load(tail().folder)
-    assert st.simulate(model, *starts(model, 9), **FLIGHT).info["abreast"] == 8 and len(built) == 1
-
-
-def test_what_the_cache_has_is_used_for_short_work():
-    tail().batch_library.rollouts.function("tail_side_by_side_flights")
-    model = st.load(tail().folder)
-    assert st.simulate(model, *starts(model, 8), **FLIGHT).info["abreast"] == 8
-
-
-@pytest.mark.usefixtures("any_number_is_many")
-def test_other_laws_fly_alone(built):
-    model = st.load(tail().folder)
-    q, v = starts(model, 9)
-    laws = [st.Phases([(0.0, None), (0.02, DAMPING)]), lambda t, q, v: [0.0] * NT]
-    laws.append(st.Pfl(model, st.Reference([0.0, 0.05], [[0.0] * NT, [0.3] * NT])))
-    for law in laws:
-        assert st.simulate(model, q, v, **FLIGHT | {"controller": law}).info["abreast"] == 1
-    assert not built
-    assert st.simulate(model, q, v, **FLIGHT).info["abreast"] == 8 and len(built) == 1
-    st.simulate(model.with_parameters(torso_mass=1.0), q, v, **FLIGHT)
-    assert len(built) == 1
-
-
-def test_the_models_library_has_no_lanes():
-    """Batches and flights are compiled when they are needed."""
-    for name in ("side_by_side_forward_dynamics", "side_by_side_flights"):
-        with pytest.raises(AttributeError):
-            getattr(tail().library, f"tail_{name}")
+    found = st.simulate(tail(), q, v, controller=given, **RK4)
+    assert found.info["abreast"] == 1
+    same(found, alone(tail(), q, v, given, **RK4))

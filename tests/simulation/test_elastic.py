@@ -1,0 +1,210 @@
+"""Elastic tails in simulations: books of long runs, stops, methods, tracking, the ground."""
+
+import numpy as np
+import pytest
+
+import serpentail as st
+from serpentail.motion.numbers import com_rise
+from tests.references.metrics import block_error
+from tests.references.passive import PassiveTail
+from tests.support import zoo
+from tests.support.rows import row
+from tests.support.zoo import ELASTIC
+
+TAILS = ("elastic", "elastic_arcs")
+METHODS = {"tsit5": (1e-5, 1e-7, 1e-9), "ros34pw2": (1e-3, 1e-5, 1e-7), "dop853": (1e-6, 1e-9)}
+FREE = {"tail_damping": 0, "tail_stop_lower": -3, "tail_stop_upper": 3}
+BARE = FREE | {"tail_stiffness": 0}
+FINE = {"rtol": 1e-9, "method": "tsit5", "output_step": 1e-4}
+
+
+def elastic(name="elastic", **changes):
+    """A model, with some numbers of its own."""
+    return zoo.model(name).with_parameters(**changes) if changes else zoo.model(name)
+
+
+def bent(angles):
+    """A start at rest with an upright torso."""
+    return np.concatenate([[0, 0, 0, 1, 0, 0, 0], np.broadcast_to(angles, 4)]), np.zeros(10)
+
+
+# ---- books ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", TAILS)
+def test_energy_balances_over_long_runs_and_better_with_tolerance(name):
+    """Kinetic, potential and stored energy and what damping lost, over 3 s of tumbling flight."""
+    q, v = bent([0.5, -0.4, 0.3, 0.5])
+    v[3:] = 1, 2, 3, 5, -5, 5, 5
+    for part, changes in (("all", {}), ("spring", FREE)):
+        model = elastic(name, **changes)
+        for method, tolerances in METHODS.items():
+            errors = []
+            for rtol in tolerances:
+                run = st.simulate(model, q, v, t_span=3.0, method=method, rtol=rtol)
+                share, work = run.info["imbalance"]["relative"], run.info["work_J"]
+                with row(part, method, rtol):
+                    most = 500 if method == "ros34pw2" else 100  # of low order, and the run is long
+                    assert share < most * rtol
+                    assert bool(run.info["warnings"]) == (share > 100 * rtol)
+                    left = run.energy[-1] - run.energy[0] - work["damping"] - work["torques"]
+                    told = run.info["imbalance"]["energy_J"]
+                    assert left == pytest.approx(told, abs=1e-12) and work["torques"] == 0
+                    assert (work["damping"] < -1e-4) == (part == "all")
+                    errors.append(abs(left) / (model.energy(q, v)[0] + abs(work["damping"])))
+            # over the kinetic energy of the start: springs move more than that
+            assert errors[-1] < 2e-4 and errors[-1] < max(0.1 * errors[0], 1e-9)
+
+
+def test_damping_of_the_tail_and_of_a_controller_add_up():
+    q, v = bent([0.3, -0.2, 0.2, 0.1])
+    v[6:] = 10
+    how = {"t_span": 0.5, "rtol": 1e-10, "method": "tsit5"}
+    own = elastic(tail_damping=np.add(ELASTIC["tail_damping"], 1e-4))
+    alone = st.simulate(own, q, v, **how)
+    both = st.simulate(elastic(), q, v, controller=st.Damping(1e-4), **how)
+    np.testing.assert_allclose(alone.tail, both.tail, atol=1e-8)
+    found, expected = (run.info["work_J"]["damping"] for run in (both, alone))
+    assert found == pytest.approx(expected, rel=1e-7)
+    assert not alone.tau.any() and both.tau.any()
+
+
+def test_work_of_the_tails_damping_is_the_integral_of_its_power():
+    for name in TAILS:
+        run = st.simulate(elastic(name), *bent([0.3, -0.2, 0.2, 0.1]), t_span=0.2, **FINE)
+        power = -(run.v[:, 6:] ** 2) @ ELASTIC["tail_damping"]
+        assert run.info["work_J"]["damping"] == pytest.approx(np.trapezoid(power, run.t), rel=1e-4)
+
+
+def test_a_rise_is_that_of_the_centre_of_mass_whatever_a_tail_stores():
+    q, v = bent(0.5)
+    v[2] = 1.0
+    run = st.simulate(elastic(), q, v, t_span=0.3, **FINE)
+    expected = run.linear_momentum[0, 2] ** 2 / (2 * 9.8 * (0.10572 + 3.51e-3) ** 2)
+    assert com_rise(elastic(), run) == pytest.approx(expected, rel=1e-4)
+
+
+# ---- stops ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", TAILS)
+def test_a_tail_thrown_at_its_stops_comes_back_with_its_energy(name):
+    """20 rad/s at stops at 0.5 rad of 10 N m/rad: an overshoot of less than 0.1 rad stores it."""
+    given = {"tail_stop_lower": -0.5, "tail_stop_upper": 0.5, "tail_stop_stiffness": 10.0}
+    given |= {"tail_stop_width": 0.05}
+    model = elastic(name, gravity=0, **BARE | given)
+    q, v = bent(0.0)
+    v[6] = 20.0
+    run = st.simulate(model, q, v, t_span=0.5, **FINE)
+    most, kinetic = np.abs(run.tail).max(axis=0), run.kinetic[0]
+    assert most[0] > 0.5 and (most < 0.6).all()
+    # what a stop stores at the largest way into it is at most all there was
+    assert PassiveTail(given, 4).energy(most * np.eye(4)[0]) <= kinetic * (1 + 1e-9)
+    np.testing.assert_allclose(run.energy, kinetic, rtol=5e-6)
+    assert run.kinetic.min() < 0.9 * kinetic < run.kinetic[-2000:].max()
+    # between the stops nothing acts
+    free = elastic(name, gravity=0, **BARE)
+    other = st.simulate(free, q, v, t_span=0.5, **FINE)
+    before = np.flatnonzero(np.abs(run.tail).max(axis=1) > 0.5)[0]
+    np.testing.assert_allclose(run.tail[:before], other.tail[:before], atol=1e-6)
+
+
+def test_a_start_behind_its_stops_is_refused():
+    """In one row, in one of several, and in a run that waits."""
+    still = bent(0.0)
+    for angle, end, sound in ((-0.71, "lower", -0.69), (0.51, "upper", 0.49)):
+        q, v = bent([0, 0, angle, 0])
+        with row(angle):
+            with pytest.raises(st.StateError, match=f"2 is {angle} rad, behind tail_stop_{end}"):
+                st.simulate(elastic(), q, v, t_span=0.01)
+            with pytest.raises(st.StateError, match="behind tail_stop"):
+                st.simulate(elastic(), np.stack([still[0], q]), v, t_span=0.01)
+            st.simulate(elastic(), *still, t_span=0.01)  # a run that waits
+            with pytest.raises(st.StateError, match="behind tail_stop"):
+                st.simulate(elastic(), q, v, t_span=0.01)
+            st.simulate(elastic(), *bent([0, 0, sound, 0]), t_span=0.01)  # on the way into a stop
+
+
+# ---- methods and tracking ------------------------------------------------------------------------
+
+
+def test_stiff_springs_get_a_method_for_them():
+    q, v = bent(0.1)
+    slow = st.simulate(elastic("elastic_arcs"), q, v, t_span=0.01)
+    assert slow.info["method"] == "tsit5" and "springs" in slow.info["reason"]
+    stiff = elastic("elastic_arcs", **BARE | {"tail_stiffness": 50.0})
+    run = st.simulate(stiff, q, v, t_span=0.01)
+    mobility = np.linalg.inv(stiff.mass_matrix(q))[6:, 6:]
+    fastest = np.sqrt(50.0 * np.linalg.eigvalsh(mobility).max())
+    told = float(run.info["reason"].split(" at ")[1].split()[0])
+    assert run.info["method"] == "ros34pw2" and told == pytest.approx(fastest, rel=0.05)
+    # tracking makes up for springs
+    held = st.Pfl(stiff, ([0.0, 0.01], np.tile(q[7:], (2, 1))))
+    tracked = st.simulate(stiff, q, v, t_span=0.01, controller=held)
+    assert tracked.info["method"] == "tsit5" and tracked.info["steps"] < 50
+
+
+def test_implicit_steps_are_stable_far_beyond_a_stiff_tail():
+    """Explicit steps would have to be below 1e-5 s; a damped tail comes to rest by 1 ms."""
+    model = elastic(tail_stiffness=300.0, tail_damping=1.0)
+    run = st.simulate(model, *bent(0.16), t_span=0.5, method="implicit_euler", step=1e-3)
+    np.testing.assert_allclose(run.tail[-1], ELASTIC["tail_rest"], atol=1e-3)
+
+
+def test_a_passive_tail_is_tracked_as_one_without():
+    model, bare, own = elastic(), zoo.model("m2_n2"), PassiveTail(ELASTIC, 4)
+    (q, v), times = bent(0.0), np.linspace(0, 0.5, 11)
+    wanted = 0.4 * np.sin(8 * times)[:, None] * [1, -1, 0.5, 1]
+    v[6:] = 0.4 * 8 * np.array([1, -1, 0.5, 1])
+    law = st.Pfl(model, (times, wanted))
+    for method in ("tsit5", "ros34pw2"):
+        run = st.simulate(model, q, v, t_span=0.5, controller=law, method=method, rtol=1e-6)
+        np.testing.assert_allclose(run.tail[::40], wanted[::2], atol=0.02)
+        # the torques move the tail, and make up for what it asks for itself
+        given = model.forward_dynamics(run.q, run.v, run.tau)[:, 6:]
+        asked = [own.force(a, b) for a, b in zip(run.tail, run.v[:, 6:], strict=True)]
+        torques = bare.pfl(run.q, run.v, given) + asked
+        np.testing.assert_allclose(run.tau, torques, atol=1e-6, err_msg=method)
+
+
+# ---- the ground ----------------------------------------------------------------------------------
+
+
+def landing():
+    """A start above the ground, tilted, its tail bent."""
+    q, v = np.zeros(11), np.zeros(10)
+    q[2:7] = 0.12, np.cos(0.2), np.sin(0.2), 0.1, 0
+    q[7:] = 0.3, 0.1, -0.2, 0.1
+    v[1:6] = 0.3, -0.5, 2.0, 1.0, 0.0
+    return q, v
+
+
+def test_the_ground_acts_beside_what_the_tail_asks_for():
+    """Against the same tail without passive parts, whose torques are less by the reference's."""
+    model, bare = zoo.model("elastic_ground"), zoo.model("ground_m2_n2")
+    own, rng = PassiveTail(ELASTIC, 4), np.random.default_rng(3)
+    legs, (q, v) = np.array([3.6, -0.4, 3.7, -0.6, 5, -20, -8, 10.0]), landing()
+    q[2] = 0.03
+    for _ in range(5):
+        q[7:], v[6:] = rng.uniform(-1, 1, 4), rng.uniform(-5, 5, 4)
+        tau = rng.uniform(-1e-3, 1e-3, 4)
+        bristles = 1e-4 * rng.normal(size=2 * sum(model.contacts.values()))
+        found = model.contact_dynamics(q, v, tau, bristles, legs)
+        left = tau - own.force(q[7:], v[6:])
+        expected = bare.contact_dynamics(q, v, left, bristles, legs)
+        assert np.abs(expected[2]).max() > 0
+        assert block_error(found[0], expected[0]) < 1e-10
+        np.testing.assert_array_equal(found[2], expected[2])
+
+
+@pytest.mark.parametrize("stiffness", [0.004, 1.0])
+def test_an_elastic_tail_lands_with_books_that_balance(stiffness):
+    """By implicit steps, which take about as many for a stiff tail; better with the tolerance."""
+    model, left = elastic("elastic_ground", tail_stiffness=stiffness, tail_damping=1e-3), []
+    legs = st.Legs.fixed(np.radians(210), np.radians(-40))
+    for rtol in (1e-4, 1e-6):
+        run = st.simulate(model, *landing(), t_span=0.4, legs=legs, rtol=rtol)
+        assert run.info["method"] == "ros34pw2" and run.info["warnings"] == []
+        assert run.info["work_J"]["damping"] < 0 and run.info["events"]
+        left.append(run.info["imbalance"]["relative"])
+    assert left[1] < 1e-4 and left[1] < 0.4 * left[0]
