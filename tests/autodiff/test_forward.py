@@ -12,6 +12,7 @@ from serpentail_codegen.ir.builder import Builder
 from serpentail_codegen.ir.interpret import Run
 from serpentail_codegen.ir.program import Factor, Fill, Index, statements
 from tests.support.programs import EXACT, NEXT, PROGRAMS, SQUARE, Narrow, built, jacobian, numbers
+from tests.support.rows import row
 
 every_program = pytest.mark.parametrize("name", PROGRAMS)
 
@@ -28,14 +29,8 @@ def subsets(names):
 
 def unit_rows(arguments, active):
     """``d_<input>`` of the active inputs, a lane for each of their scalars."""
-    rows = iter(
-        np.array(
-            [
-                [EXACT.const(int(x)) for x in row]
-                for row in np.eye(sum(len(arguments[n]) for n in active))
-            ]
-        )
-    )
+    units = np.eye(sum(len(arguments[n]) for n in active))
+    rows = iter(np.array([[EXACT.const(int(x)) for x in unit] for unit in units]))
     return {f"d_{name}": [next(rows) for _ in arguments[name]] for name in active}
 
 
@@ -45,13 +40,14 @@ def run(program, arguments, kind=Run):
     return {a.name: values[a.name] for a in program.of_role("output")}
 
 
-def lanes_of(row, lanes):
-    """A row as a list; one number stands for all lanes."""
-    return np.broadcast_to(np.asarray(row, dtype=object), lanes).tolist()
+def by_lanes(rows, lanes):
+    """Rows as lists; one number stands for all lanes."""
+    return [np.broadcast_to(np.asarray(x, dtype=object), lanes).tolist() for x in rows]
 
 
 @every_program
-def test_tangents_are_those_of_dual_numbers(name):
+def test_tangents_and_lanes_are_those_of_dual_numbers(name):
+    """Along one direction, and along many side by side."""
     program = PROGRAMS[name]
     arguments = numbers(program)
     for active in subsets(arguments_of(program)):
@@ -59,29 +55,20 @@ def test_tangents_are_those_of_dual_numbers(name):
         changes = {f"d_{n}": xs for n, xs in numbers(program, seed=2).items() if n in active}
         direction = [x for n in active for x in changes[f"d_{n}"]]
         found = run(tangent_program(program, active), arguments | changes)
-        for output, slopes in found.items():
-            rows = expected[output.removeprefix("d_")]
-            assert slopes == [
-                sum(a * b for a, b in zip(row, direction, strict=True)) for row in rows
-            ]
-        still = {output for output, rows in expected.items() if f"d_{output}" not in found}
-        assert not any(x for output in still for row in expected[output] for x in row)
-
-
-@every_program
-def test_lanes_are_directions_side_by_side(name):
-    program = PROGRAMS[name]
-    arguments = numbers(program)
-    for active in subsets(arguments_of(program)):
-        expected, lanes = (
-            jacobian(program, arguments, active),
-            sum(len(arguments[n]) for n in active),
-        )
-        wide = tangent_program(program, active, lanes)
-        assert {a.lanes for a in wide.arrays if a.name.startswith("d_")} == {lanes}
-        found = run(wide, arguments | unit_rows(arguments, active))
-        for output, rows in found.items():
-            assert [lanes_of(row, lanes) for row in rows] == expected[output.removeprefix("d_")]
+        with row(*active):
+            for output, slopes in found.items():
+                along = [
+                    sum(a * b for a, b in zip(entries, direction, strict=True))
+                    for entries in expected[output.removeprefix("d_")]
+                ]
+                assert slopes == along
+            still = {output for output in expected if f"d_{output}" not in found}
+            assert not any(x for output in still for entries in expected[output] for x in entries)
+            wide = tangent_program(program, active, len(direction))
+            lanes = {a.lanes for a in wide.arrays if a.name.startswith("d_")}
+            assert lanes == {len(direction)}
+            for output, rows in run(wide, arguments | unit_rows(arguments, active)).items():
+                assert by_lanes(rows, len(direction)) == expected[output.removeprefix("d_")]
 
 
 @every_program
@@ -90,21 +77,15 @@ def test_values_go_along_unchanged(name):
     and more.
     """
     program = PROGRAMS[name]
-    arguments = numbers(program)
-    wide = tangent_program(program, arguments_of(program), 2)
-    rows = {
-        a.name: [np.array([EXACT.const(1)] * 2)] * a.length
-        for a in wide.of_role("input")
-        if a.lanes
-    }
+    arguments, wide = numbers(program), tangent_program(program, arguments_of(program), 2)
+    ones = np.array([EXACT.const(1)] * 2)
+    rows = {a.name: [ones] * a.length for a in wide.of_role("input") if a.lanes}
     values = Run(wide, EXACT, arguments | rows).values
     expected = Run(program, EXACT, arguments).values
-    for a in wide.arrays:
-        if not a.lanes:
-            assert values[a.name] == expected[a.name]
+    assert not [a.name for a in wide.arrays if not a.lanes and values[a.name] != expected[a.name]]
 
 
-# Lanes that are left out
+# ---- lanes that are left out ---------------------------------------------------------------------
 
 
 def of_x(loops):
@@ -113,24 +94,9 @@ def of_x(loops):
     return Index((("i", 1),), 1) if outward else None
 
 
-@pytest.mark.parametrize("name", ["carry_up", "accumulators", "chain_up", "triangle"])
-def test_lanes_left_out_are_zero(name):
-    """In iteration i nothing depends on what comes later: leaving those lanes out changes nothing.
-
-    The outputs u are written within the loop: their lanes that are left out mean nothing.
-    """
-    program = chain_up() if name == "chain_up" else PROGRAMS[name]
-    arguments = numbers(program)
-    wide, bounded = (
-        tangent_program(program, ("x",), 3, **options) for options in ({}, {"bound": of_x})
-    )
-    arguments |= unit_rows(arguments, ("x",))
-    expected = jacobian(program, {n: arguments[n] for n in arguments_of(program)}, ("x",))
-    for found in (run(wide, arguments), run(bounded, arguments), run(bounded, arguments, Narrow)):
-        assert [lanes_of(row, 3) for row in found["d_w"]] == expected["w"]
-        for k, (row, slopes) in enumerate(zip(found["d_u"], expected["u"], strict=True)):
-            assert lanes_of(row, 3)[: k + 1] == slopes[: k + 1] and not any(slopes[k + 1 :])
-    assert any(getattr(s, "columns", None) for s, _ in statements(bounded.body))
+def too_few(loops):
+    """One lane less."""
+    return Index((("i", 1),)) if loops else None
 
 
 def chain_up():
@@ -143,74 +109,6 @@ def chain_up():
         b.apply(SQUARE, {"x": a[i + 1]}, s=u[i])
     b.apply(NEXT, {"s": a[1], "x": a[2], "y": a[3]}, s=w[0])
     return b.finish()
-
-
-def test_lanes_too_few_are_noticed():
-    """The check above sees what a bound that is too tight does."""
-    program = PROGRAMS["carry_up"]
-    arguments = numbers(program)
-    tight = tangent_program(
-        program, ("x",), 3, bound=lambda loops: Index((("i", 1),)) if loops else None
-    )
-    arguments |= unit_rows(arguments, ("x",))
-    found = run(tight, arguments, Narrow)["d_u"]
-    expected = jacobian(program, {n: arguments[n] for n in arguments_of(program)}, ("x",))["u"]
-    assert [lanes_of(row, 3) for row in found] != expected
-
-
-# Which statements there are
-
-
-def test_what_does_not_move_has_no_tangents():
-    program = PROGRAMS["guarded"]
-    names = {a.name for a in tangent_program(program, ("mass",)).arrays}
-    assert {"d_mass", "d_t", "d_u"} <= names and not {
-        "d_x",
-        "d_y",
-        "d_w",
-        "dead",
-        "d_dead",
-        "w",
-    } & names
-    assert [a.role for a in tangent_program(program, ("mass",)).arrays if a.name == "d_mass"] == [
-        "input"
-    ]
-
-
-def test_what_is_stored_anew_forgets_its_tangents():
-    b, _, x, y, u, _ = built()
-    t = b.array("t", 1)
-    b.copy(t[0], x[0])
-    b.copy(u[0], t[0])
-    for k, store in enumerate((lambda: b.fill(t[0], 3), lambda: b.copy(t[0], y[0])), start=1):
-        b.copy(t[0], x[0], adds=True)
-        store()
-        b.copy(u[k], t[0])
-    found = run(tangent_program(b.finish(), ("x",)), numbers(b.finish()) | {"d_x": [7, 0, 0]})
-    assert found["d_u"] == [7, 0, 0]
-
-
-def test_fills_are_added_where_lanes_differ():
-    """Rows that are written in few lanes and read in all begin as zeros."""
-    bounded = tangent_program(chain_up(), ("x",), 3, bound=of_x)
-    filled = {s.target.array.name for s in bounded.body if isinstance(s, Fill)}
-    assert "d_a" in filled and "a" not in filled
-    whole = tangent_program(chain_up(), ("x",), 3)
-    assert "d_a" not in {
-        s.target.array.name for s in whole.body[:-1] if isinstance(s, Fill) and s.target.size > 1
-    }
-
-
-@pytest.mark.parametrize("statement", ["factor", "solve"])
-def test_solvers_are_refused(statement):
-    b = Builder("solver", "A solver.")
-    a, x = b.array("a", 4, role="input"), b.array("x", 2, role="output")
-    A = b.array("A", 4)
-    b.copy(A[0], a[0])
-    b.fill(x[0], 1)
-    b.emit(Factor(A, 2)) if statement == "factor" else b.solve(A, x[0])
-    with pytest.raises(TypeError, match=f"^no rule differentiates {statement.capitalize()}$"):
-        tangent_program(b.finish(), ("a",))
 
 
 def read_in_later_iterations():
@@ -226,11 +124,83 @@ def read_in_later_iterations():
     return b.finish()
 
 
-@pytest.mark.parametrize("build", [read_in_later_iterations, lambda: PROGRAMS["temporaries"]])
-def test_lanes_left_out_are_zero_wherever_they_are_read(build):
-    program = build()
+BOUNDED = {name: PROGRAMS[name] for name in ("carry_up", "accumulators", "triangle", "temporaries")}
+BOUNDED |= {"chain_up": chain_up(), "later": read_in_later_iterations()}
+
+
+@pytest.mark.parametrize("name", BOUNDED)
+def test_lanes_left_out_are_zero(name):
+    """In iteration i nothing depends on what comes later: leaving those lanes out changes nothing.
+
+    The outputs u are written within the loop: their lanes that are left out mean nothing.
+    """
+    program = BOUNDED[name]
     arguments = numbers(program)
-    expected = jacobian(program, arguments, ("x",))["w"]
-    bounded = tangent_program(program, ("x",), 3, bound=of_x)
-    found = run(bounded, arguments | unit_rows(arguments, ("x",)), Narrow)["d_w"]
-    assert [lanes_of(row, 3) for row in found] == expected
+    wide, bounded = (
+        tangent_program(program, ("x",), 3),
+        tangent_program(program, ("x",), 3, bound=of_x),
+    )
+    expected = jacobian(program, arguments, ("x",))
+    arguments |= unit_rows(arguments, ("x",))
+    for found in (run(wide, arguments), run(bounded, arguments), run(bounded, arguments, Narrow)):
+        assert by_lanes(found["d_w"], 3) == expected["w"]
+        if name not in ("later", "temporaries"):
+            for k, (lanes, slopes) in enumerate(
+                zip(by_lanes(found["d_u"], 3), expected["u"], strict=True)
+            ):
+                assert lanes[: k + 1] == slopes[: k + 1] and not any(slopes[k + 1 :])
+    assert any(getattr(s, "columns", None) for s, _ in statements(bounded.body))
+
+
+def test_lanes_too_few_are_noticed():
+    """The check above sees what a bound that is too tight does."""
+    program = PROGRAMS["carry_up"]
+    arguments = numbers(program)
+    tight = tangent_program(program, ("x",), 3, bound=too_few)
+    found = run(tight, arguments | unit_rows(arguments, ("x",)), Narrow)["d_u"]
+    assert by_lanes(found, 3) != jacobian(program, arguments, ("x",))["u"]
+
+
+def test_fills_are_added_where_lanes_differ():
+    """Rows that are written in few lanes and read in all begin as zeros."""
+    bounded = tangent_program(chain_up(), ("x",), 3, bound=of_x)
+    filled = {s.target.array.name for s in bounded.body if isinstance(s, Fill)}
+    assert "d_a" in filled and "a" not in filled
+    whole = [s for s in tangent_program(chain_up(), ("x",), 3).body[:-1] if isinstance(s, Fill)]
+    assert "d_a" not in {s.target.array.name for s in whole if s.target.size > 1}
+
+
+# ---- which statements there are ------------------------------------------------------------------
+
+
+def test_what_does_not_move_has_no_tangents():
+    arrays = tangent_program(PROGRAMS["guarded"], ("mass",)).arrays
+    names = {a.name for a in arrays}
+    assert {"d_mass", "d_t", "d_u"} <= names
+    assert not {"d_x", "d_y", "d_w", "dead", "d_dead", "w"} & names
+    assert [a.role for a in arrays if a.name == "d_mass"] == ["input"]
+
+
+def test_what_is_stored_anew_forgets_its_tangents():
+    b, _, x, y, u, _ = built()
+    t = b.array("t", 1)
+    b.copy(t[0], x[0])
+    b.copy(u[0], t[0])
+    for k, store in enumerate((lambda: b.fill(t[0], 3), lambda: b.copy(t[0], y[0])), start=1):
+        b.copy(t[0], x[0], adds=True)
+        store()
+        b.copy(u[k], t[0])
+    found = run(tangent_program(b.finish(), ("x",)), numbers(b.finish()) | {"d_x": [7, 0, 0]})
+    assert found["d_u"] == [7, 0, 0]
+
+
+@pytest.mark.parametrize("statement", ["Factor", "Solve"])
+def test_solvers_are_refused(statement):
+    b = Builder("solver", "A solver.")
+    a, x = b.array("a", 4, role="input"), b.array("x", 2, role="output")
+    A = b.array("A", 4)
+    b.copy(A[0], a[0])
+    b.fill(x[0], 1)
+    b.emit(Factor(A, 2)) if statement == "Factor" else b.solve(A, x[0])
+    with pytest.raises(TypeError, match=statement):
+        tangent_program(b.finish(), ("a",))

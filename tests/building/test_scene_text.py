@@ -2,7 +2,6 @@
 
 import math
 import tomllib
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,13 +9,17 @@ from hypothesis import given
 from hypothesis import strategies as some
 
 import serpentail as st
-from serpentail.building.fewer_contacts import FUNCTIONS, NEEDED
+from serpentail.building.fewer_contacts import FUNCTIONS, NEEDED, with_contacts
 from serpentail.building.options import Parameters, SceneKeys
 from serpentail.building.scene_text import scene_text
 from serpentail_codegen.scene.parameters import PARAMETERS
+from serpentail_codegen.scene.parse import parse_scene
 from serpentail_codegen.scene.passive import PASSIVE
 from serpentail_codegen.scene.scene import KEYS
 from serpentail_codegen.scene.signatures.table import NEEDS
+from tests.support.scenes import SCENES
+
+from ..support.rows import row
 
 TEXTS = some.text(some.characters(codec="utf-8"))
 VALUES = some.recursive(
@@ -38,29 +41,14 @@ def test_numbers_of_numpy_are_numbers():
     assert math.isnan(tomllib.loads(scene_text({"a": math.nan}))["a"])
 
 
-@pytest.mark.parametrize("value", [None, 1j, object(), {1}, b"x", 2**63])
-def test_what_toml_cannot_say_is_named(value):
-    with pytest.raises(st.ModelError, match=r"^a\.b: value "):
-        scene_text({"a": {"b": value}})
-
-
-def test_half_a_character_is_refused():
-    with pytest.raises(st.ModelError, match="has no UTF-8"):
-        scene_text({"name": "\ud800"})
-
-
-def test_what_is_nested_without_end_is_refused():
+def test_what_toml_cannot_say_is_named():
     deep = []
     for _ in range(5000):
         deep = [deep]
-    with pytest.raises(st.ModelError, match="nested too deeply"):
-        scene_text({"a": deep})
-
-
-@pytest.mark.parametrize(("letter", "word"), [("m", "segments"), ("n", "links")])
-def test_the_letters_of_sizes_are_told_their_words(letter, word):
-    with pytest.raises(st.ModelError, match=f"did you mean '{word}'\\?"):
-        st.build(**{letter: 2})
+    rows = [({"b": x}, r"^a\.b: value ") for x in (None, 1j, object(), {1}, b"x", 2**63, -(2**63))]
+    for value, words in [*rows, ("\ud800", "has no UTF-8"), (deep, "nested too deeply")]:
+        with row(type(value)), pytest.raises(st.ModelError, match=words):
+            scene_text({"a": value})
 
 
 def test_options_are_what_the_generator_knows():
@@ -79,12 +67,22 @@ def test_what_belongs_to_contacts_is_what_the_generator_says():
     assert of_functions == NEEDS
 
 
-@pytest.mark.parametrize("contacts", [[], ["feet"], ["tail"], ["torso"]])
-def test_a_robot_file_serves_with_fewer_contacts(contacts):
-    scene = Path(__file__).parents[2] / "scenes" / "contact_m1_n3.toml"
-    model = st.build(scene, contacts=contacts)
-    assert list(model.contacts) == contacts
-    assert ("mu" in model.parameters) == bool(contacts)
-    assert ("hip" in model.parameters) == ("feet" in contacts)
+def test_a_robot_file_serves_with_fewer_contacts():
+    path = SCENES / "contact_m1_n3.toml"
+    tables = tomllib.loads(path.read_text())
+    tables["functions"] = [*NEEDS, "energy"]
+    tables["functions"].remove("contact_rates")
+    for contacts in ([], ["feet"], ["tail"], ["torso"], ["feet", "tail", "torso"]):
+        with row(contacts):
+            scene = parse_scene(with_contacts(tables, contacts), "robot")
+            assert list(scene.contacts) == contacts
+            assert ("mu" in dict(scene.parameters)) == bool(contacts)
+            assert ("hip" in dict(scene.parameters)) == ("feet" in contacts)
+            assert ("torso_semi_axes" in dict(scene.parameters)) == ("torso" in contacts)
+            assert ("contact_points" in scene.functions) == bool(contacts)
+            assert ("leg_points" in scene.functions) == ("feet" in contacts)
+    assert with_contacts(tables, 3)["contacts"] == 3  # which the generator refuses
+    options = {"contacts": [], "functions": ["energy"], "compiled": False}
+    assert not st.build(path, **options).contacts
     with pytest.raises(st.ModelError, match="mu: no such parameter"):
-        st.build(scene, contacts=[], mu=0.5)
+        st.build(path, **options, mu=0.5)

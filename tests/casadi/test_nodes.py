@@ -1,24 +1,17 @@
 """Dynamics at many nodes as one CasADi function: those of CasADi's own SX operations."""
 
-from functools import cache
-
 import casadi
 import numpy as np
 import pytest
 
 import serpentail as st
 from serpentail.model.nodes.function import _record
-from tests.casadi.derivatives.external_models import LAST, PARTS, every_function
-from tests.support.models import model_folder
+from tests.casadi.externals import LAST
+from tests.support import zoo
+from tests.support.models import folder_of
+from tests.support.rows import row
 
 COUNTS = (1, 8, 11)  # one, a full group of lanes, and a part of a second one
-TAILS = [(1, 3), pytest.param((1, None), marks=pytest.mark.slow)]
-every_tail = pytest.mark.parametrize("tail", TAILS)
-
-
-@cache
-def model(segments: int = 1, links: int | None = 3, parts: tuple = tuple(PARTS)) -> st.Model:
-    return st.load(model_folder(segments, links, functions=list(parts)))
 
 
 def arguments(rat: st.Model, name: str, count: int) -> list[np.ndarray]:
@@ -58,48 +51,51 @@ def at_nodes(f: casadi.Function, count: int) -> list[casadi.Function]:
     return [casadi.Function("f", [*inputs, mu], [result]) for result in (y, J, H)]
 
 
-@every_tail
-@every_function
-@pytest.mark.parametrize("count", COUNTS)
-def test_values_and_derivatives_are_those_of_the_symbolic_function(tail, name, count):
-    rat = model(*tail)
-    given = arguments(rat, name, count)
-    compiled = at_nodes(rat.casadi.nodes(name, count, folded=True), count)
-    for order, (f, g) in enumerate(zip(compiled, symbolic(rat, name), strict=True)):
-        found = f(*given)
-        blocks = [g(*(part[:, node] for part in given)) for node in range(count)]
-        wanted = casadi.diagcat(*blocks) if order else casadi.horzcat(*blocks)
-        largest = np.abs(wanted.full()).max()
-        np.testing.assert_allclose(found.full(), wanted.full(), atol=1e-10 * largest)
-        assert found.nnz() <= wanted.nnz()
+@pytest.mark.parametrize("tail", ["m1_n1", pytest.param("arcs1", marks=pytest.mark.slow)])
+def test_values_and_derivatives_are_those_of_the_symbolic_function(tail):
+    rat = zoo.model(tail)
+    for name in LAST:
+        own = symbolic(rat, name)
+        for count in COUNTS:
+            given = arguments(rat, name, count)
+            compiled = at_nodes(rat.casadi.nodes(name, count, folded=True), count)
+            for order, (f, g) in enumerate(zip(compiled, own, strict=True)):
+                found = f(*given)
+                blocks = [g(*(part[:, node] for part in given)) for node in range(count)]
+                wanted = casadi.diagcat(*blocks) if order else casadi.horzcat(*blocks)
+                largest = np.abs(wanted.full()).max()
+                with row(name, count, order):
+                    np.testing.assert_allclose(found.full(), wanted.full(), atol=1e-10 * largest)
+                    assert found.nnz() <= wanted.nnz()
 
 
-@every_function
-def test_blocks_are_those_of_the_compiled_function(name):
+def test_blocks_are_those_of_the_compiled_function():
     """Exact sparsity: the Jacobian's and the Hessian's are those of ``external``, node by node."""
-    rat = model()
-    single = at_nodes(rat.casadi.external(name, derivatives=2, folded=True), 1)
-    several = at_nodes(rat.casadi.nodes(name, 3, folded=True), 3)
-    for one, three in zip(single[1:], several[1:], strict=True):
-        pattern = one.sparsity_out(0)
-        assert three.sparsity_out(0) == casadi.diagcat(pattern, pattern, pattern)
+    rat = zoo.model("m1_n1")
+    for name in LAST:
+        single = at_nodes(rat.casadi.external(name, derivatives=2, folded=True), 1)
+        several = at_nodes(rat.casadi.nodes(name, 3, folded=True), 3)
+        for one, three in zip(single[1:], several[1:], strict=True):
+            pattern = one.sparsity_out(0)
+            with row(name):
+                assert three.sparsity_out(0) == casadi.diagcat(pattern, pattern, pattern)
 
 
-@every_function
-def test_parameters_are_one_vector_for_all_nodes(name):
-    rat, count = model(), 3
-    q, v, last, _ = arguments(rat, name, count)
-    f, single = rat.casadi.nodes(name, count), rat.casadi.symbolic(name)
-    assert f.name_in() == single.name_in()
-    assert f.name_out() == single.name_out()
-    other = 1.1 * rat.casadi.parameter_vector
-    wanted = single.map(count)(q, v, last, casadi.repmat(other, 1, count))
-    np.testing.assert_allclose(f(q, v, last, other), wanted, rtol=1e-10, atol=1e-12)
+def test_parameters_are_one_vector_for_all_nodes():
+    rat, count = zoo.model("m1_n1"), 3
+    for name in LAST:
+        q, v, last, _ = arguments(rat, name, count)
+        f, single = rat.casadi.nodes(name, count), rat.casadi.symbolic(name)
+        assert (f.name_in(), f.name_out()) == (single.name_in(), single.name_out())
+        other = 1.1 * rat.casadi.parameter_vector
+        wanted = single.map(count)(q, v, last, casadi.repmat(other, 1, count))
+        with row(name):
+            np.testing.assert_allclose(f(q, v, last, other), wanted, rtol=1e-10, atol=1e-12)
 
 
 def test_ipopt_takes_the_derivatives():
     """The optimum, in as many iterations, of the mapped SX function."""
-    rat, count = model(), 5
+    rat, count = zoo.model("m1_n1"), 5
     wanted = np.linspace(-40, 60, count)
     found = []
     for f in (
@@ -125,7 +121,7 @@ def test_ipopt_takes_the_derivatives():
 
 
 def test_results_do_not_depend_on_the_number_of_threads(monkeypatch):
-    rat, count, name = model(), 303, "forward_dynamics"
+    rat, count, name = zoo.model("m1_n1"), 303, "forward_dynamics"
     given, found = arguments(rat, name, count), []
     for most in (1, 3):
         monkeypatch.setattr(rat.batch_library, "threads", most)
@@ -137,18 +133,18 @@ def test_results_do_not_depend_on_the_number_of_threads(monkeypatch):
 
 def test_derivatives_of_a_higher_order_than_asked_are_not_there():
     for order in (0, 1):
-        f = model().casadi.nodes("forward_dynamics", 2, derivatives=order, folded=True)
+        f = zoo.model("m1_n1").casadi.nodes("forward_dynamics", 2, derivatives=order, folded=True)
         inputs = [casadi.MX.sym("x", *f.size_in(k)) for k in range(3)]
         y = casadi.sum2(casadi.sum1(f(*inputs)))
         with pytest.raises(RuntimeError):
             casadi.Function("f", inputs, [casadi.hessian(y, inputs[0])[0]])
         if order:  # all but the position of B moves an acceleration
             slope = casadi.Function("f", inputs, [casadi.jacobian(y, inputs[0])])
-            assert slope.nnz_out() == 2 * (model().nq - 3)
+            assert slope.nnz_out() == 2 * (zoo.model("m1_n1").nq - 3)
 
 
 def test_a_node_that_gives_no_number_is_an_error_of_the_evaluation():
-    rat = model()
+    rat = zoo.model("m1_n1")
     f = rat.casadi.nodes("forward_dynamics", 9, folded=True)
     q, v, tau, _ = arguments(rat, "forward_dynamics", 9)
     q[3:7, 8] = 0.0
@@ -156,22 +152,20 @@ def test_a_node_that_gives_no_number_is_an_error_of_the_evaluation():
         f(q, v, tau)
 
 
-@pytest.mark.parametrize(
-    ("given", "words"),
-    [
-        (("mass_matrix", 3), "name: value 'mass_matrix'"),
-        (("forward_dynamics", 0), "count: value 0"),
-        (("forward_dynamics", 2.5), "count: value 2.5"),
-        (("forward_dynamics", 3, 3), "derivatives: value 3"),
-    ],
-)
-def test_what_cannot_be_is_refused(given, words):
-    with pytest.raises(st.ModelError, match=words):
-        model().casadi.nodes(*given)
+REFUSED = [
+    (("mass_matrix", 3), "name: .*'mass_matrix'"),
+    (("forward_dynamics", 0), "count: .*0"),
+    (("forward_dynamics", 2.5), r"count: .*2\.5"),
+    (("forward_dynamics", 3, 3), "derivatives: .*3"),
+]
 
 
-def test_functions_that_the_scene_lacks_are_named():
-    rat = model(parts=("forward_dynamics", "forward_dynamics_derivatives"))
+def test_what_cannot_be_is_refused_and_what_the_scene_lacks_is_named():
+    for given, words in REFUSED:
+        with row(given), pytest.raises(st.ModelError, match=words):
+            zoo.model("m1_n1").casadi.nodes(*given)
+    few = ["forward_dynamics", "forward_dynamics_derivatives"]
+    rat = st.load(folder_of(zoo.scene("bare", functions=few)))
     with pytest.raises(st.ModelError, match="forward_dynamics_vjp"):
         rat.casadi.nodes("forward_dynamics", 3)
     assert rat.casadi.nodes("forward_dynamics", 3, derivatives=1).n_in() == 4

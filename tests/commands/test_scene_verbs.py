@@ -6,22 +6,27 @@ import subprocess
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import serpentail as st
 from serpentail import cli
+from serpentail.scenes.simulate import scenario_of
 from serpentail_codegen.scene.parse import load_scene
+from tests.support import zoo
 from tests.support.scenes import SCENES
+
+from ..support.rows import row
 
 
 @pytest.fixture
-def run(tmp_path, monkeypatch, capsys):
+def run(tmp_path, monkeypatch, capfd):
     """Return a function from arguments to status, stdout and stderr, in an empty folder."""
     monkeypatch.chdir(tmp_path)
 
     def invoke(*arguments):
         status = cli.main(list(arguments))
-        return status, *capsys.readouterr()
+        return status, *capfd.readouterr()
 
     return invoke
 
@@ -37,10 +42,10 @@ def test_examples_are_the_scenes_of_the_checkout(run):
         assert ("simulate" in ends[path.stem]) == ("simulate" in tomllib.loads(path.read_text()))
 
 
-@pytest.mark.parametrize("verb", ["verify", "info"])
-def test_a_name_that_is_no_model_is_told_what_is_like_it(run, verb):
-    status, _, err = run(verb, "kick_an_land")
-    assert status and "did you mean 'kick_and_land'?" in err
+def test_a_name_that_is_no_model_is_told_what_is_like_it(run):
+    for verb in ("verify", "info"):
+        status, _, err = run(verb, "kick_an_land")
+        assert status and "did you mean 'kick_and_land'?" in err
 
 
 def test_an_option_that_cannot_write_names_its_file_once(run):
@@ -49,87 +54,79 @@ def test_an_option_that_cannot_write_names_its_file_once(run):
     assert told.count("x.html") == 1 and "could not be written: " in told
 
 
-@pytest.mark.parametrize(
-    ("options", "contacts"),
-    [
-        (["--segments", "2", "--links", "4"], ()),
-        (["--tail", "continuum", "--segments", "2"], ()),
-        (["--contacts", "torso", "feet"], ("feet", "torso")),
-        (["--tail", "continuum", "--contacts", "tail"], ("tail",)),
-    ],
-)
-def test_a_new_scene_is_commented_and_simulates(run, options, contacts):
-    assert run("new", "rat.toml", *options)[0] == 0
-    text, scene = Path("rat.toml").read_text(), load_scene("rat.toml")
-    assert text.count("#") > 10 and scene.contacts == contacts
-    assert scene.kind == ("continuum" if "continuum" in options else "articulated")
-    status, out, _ = run("simulate", "rat.toml", "--set", "duration=0.02", "--json", "-")
-    assert status == 0 and json.loads(out)["model"] == "rat"
+NEW = {  # options by a model of the zoo that the scene suits
+    "m2_n2": ("--segments 2 --links 2", ("articulated", 2, 2, ())),
+    "arcs2": ("--tail continuum --segments 2", ("continuum", 2, 1, ())),
+    "ground": ("--contacts torso feet", ("articulated", 1, 3, ("feet", "torso"))),
+    "": ("--tail continuum --contacts tail", ("continuum", 1, 1, ("tail",))),  # none there
+}
 
 
-def test_the_values_that_a_new_scene_shows_are_the_defaults(run):
-    run("new", "rat.toml", "--contacts", "feet")
-    text = Path("rat.toml").read_text()
-    shown, count = re.subn(r"(?m)^# (\w+ = )", r"\1", text)
-    assert count == 7
-    Path("all.toml").write_text(shown)
-    assert load_scene("all.toml").parameters == load_scene("rat.toml").parameters
+def test_a_new_scene_is_commented_and_simulates(run):
+    for name, (options, expected) in NEW.items():
+        with row(name):
+            path = f"of_{name}.toml"
+            assert run("new", path, *options.split())[0] == 0
+            text, scene = Path(path).read_text(), load_scene(path)
+            assert (scene.kind, scene.segments, scene.links, scene.contacts) == expected
+            simulated = tomllib.loads(text)["simulate"]
+            assert ("legs" in simulated) == ("feet" in scene.contacts)
+            if name:
+                described = scenario_of(zoo.model(name), simulated, Path())
+                motion = described.simulate(t_span=0.01)
+                assert motion.t[-1] == 0.01 and np.isfinite(motion.q).all()
+            # the values that it shows are the defaults
+            shown, count = re.subn(r"(?m)^# (\w+ = )", r"\1", text)
+            Path("all.toml").write_text(shown)
+            assert count == 6 + bool(scene.contacts)
+            assert load_scene("all.toml").parameters == scene.parameters
 
 
 def test_the_drop_of_a_new_scene_stands(run):
     run("new", "rat.toml", "--contacts", "feet", "tail", "torso")
     told = json.loads(run("simulate", "rat.toml", "--json", "-")[1])
-    assert told["standing_end"] is True and told["warnings"] == []
+    assert told["model"] == "rat" and told["standing_end"] is True and told["warnings"] == []
     assert told["peak_ground_force_weights"] < 15
 
 
 def test_a_copy_of_an_example(run):
     assert run("new", "mine.toml", "--example", "kick")[0] == 0
-    assert tomllib.loads(Path("mine.toml").read_text()) == tomllib.loads(
-        (SCENES / "kick.toml").read_text()
-    )
+    found, expected = (path.read_text() for path in (Path("mine.toml"), SCENES / "kick.toml"))
+    assert tomllib.loads(found) == tomllib.loads(expected)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["a.txt"], "needs a name ending in .toml"),
-        (["there.toml"], "is there; name another one"),
-        (["a.toml", "--segments", "0"], "segments: value 0: needs a whole number"),
-        (["a.toml", "--links", "-1"], "links: value -1"),
-        (["a.toml", "--tail", "continuum", "--links", "2"], "a continuum tail has none"),
-        (["a.toml", "--example", "kik"], "did you mean 'kick'"),
-    ],
-)
-def test_what_cannot_be_a_new_scene(run, arguments, words):
+def test_what_cannot_be_a_new_scene(run):
     Path("there.toml").write_text("")
-    status, out, err = run("new", *arguments)
-    assert (status, out) == (2, "") and words in err
+    for arguments, words in (
+        (["a.txt"], "'a.txt'"),
+        (["there.toml"], "'there.toml': is there"),
+        (["a.toml", "--segments", "0"], "segments: value 0"),
+        (["a.toml", "--links", "-1"], "links: value -1"),
+        (["a.toml", "--tail", "continuum", "--links", "2"], "links: value 2"),
+        (["a.toml", "--example", "kik"], "did you mean 'kick'"),
+    ):
+        with row(arguments):
+            status, out, err = run("new", *arguments)
+            assert (status, out) == (2, "") and words in err
     assert [path.name for path in Path().iterdir()] == ["there.toml"]
 
 
-def test_generate_is_the_generator(run):
+def test_generate_is_the_generator(run, capfd):
     assert run("generate", "kick", "--functions", "energy", "--name", "small")[0] == 0
-    assert st.load("generated/small").generated == ("energy",)
-    assert run("generate", "none.toml")[0] == 2
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["--help"], "usage: serpentail generate"),
-        ([], "scene: no value: give a scene file, or --tail and --segments"),
-        (["--tail", "continuum"], "give a scene file, or --tail and --segments"),
-        (["--tail", "continuum", "--segments", "1", "--links", "3"], "links: value 3"),
-        (["kick", "--functions", "energi"], "did you mean 'energy'"),
-    ],
-)
-def test_generate_says_what_it_needs(capfd, monkeypatch, tmp_path, arguments, words):
-    monkeypatch.chdir(tmp_path)
-    status = cli.main(["generate", *arguments])
-    assert status == (0 if "--help" in arguments else 2)
-    told = capfd.readouterr()
-    assert words in (told.err or told.out) and "Traceback" not in told.err
+    assert st.load("generated/small", compiled=False).generated == ("energy",)
+    capfd.readouterr()
+    for arguments, status, words in (
+        (["none.toml"], 2, "none.toml"),
+        (["--help"], 0, "usage: serpentail generate"),
+        ([], 2, "scene: no value"),
+        (["--tail", "continuum"], 2, "--segments"),
+        (["--tail", "continuum", "--segments", "1", "--links", "3"], 2, "links: value 3"),
+        (["kick", "--functions", "energi"], 2, "did you mean 'energy'"),
+    ):
+        with row(arguments):
+            assert cli.main(["generate", *arguments]) == status
+            told = capfd.readouterr()
+            assert words in (told.err or told.out) and "Traceback" not in told.err
 
 
 def test_the_version(capsys):

@@ -1,22 +1,13 @@
 """Motions to convert: a flight of known functions, drops on the ground, runs that end early."""
 
-from functools import cache
-
 import numpy as np
 import pytest
 
 import serpentail as st
-from tests.motion.trajectory.analytic import motion
-from tests.support.models import model_folder
+from tests.motion.analytic import motion
+from tests.support import zoo
 
-WANTED = ["energy", "momentum", "rollout", "implicit"]
-LEGS = st.Legs.fixed(3.6, -0.3)
-
-
-@cache
-def rat():
-    """A model whose feet and tail touch the ground."""
-    return st.load(model_folder(1, 3, contacts=["feet", "tail"], functions=WANTED))
+SETTINGS = {"legs": st.Legs.fixed(3.6, -0.3), "output_step": 0.002, "rtol": 1e-6}
 
 
 def tired(t, q, v):
@@ -36,7 +27,7 @@ def flight():
 def drop():
     """A rat that falls on its feet."""
     q = [0, 0, 0.06, 1, 0, 0, 0, 0.1, 0]
-    return st.simulate(rat(), q, np.zeros(8), legs=LEGS, t_span=0.1, output_step=0.002, rtol=1e-6)
+    return st.simulate(zoo.model("feet_tail"), q, np.zeros(8), t_span=0.1, **SETTINGS)
 
 
 @pytest.fixture(scope="module")
@@ -45,5 +36,5 @@ def runs():
     q = np.tile([0, 0, 0.06, 1, 0, 0, 0, 0.1, 0], (3, 1))
     q[1, 2] = 2
     own = {"mu": [0.1, 0.2, 0.3], "tail_mount": np.tile([0, -0.04, 0.004], (3, 1))}
-    settings = {"legs": LEGS, "t_span": 0.04, "output_step": 0.002, "rtol": 1e-6}
-    return st.simulate(rat(), q, np.zeros(8), parameters=own, controller=tired, **settings)
+    settings = {"parameters": own, "controller": tired, "t_span": 0.04, **SETTINGS}
+    return st.simulate(zoo.model("feet_tail"), q, np.zeros(8), **settings)

@@ -1,6 +1,8 @@
 """Tables: a row a sample, units in the header, and every digit in CSV."""
 
 import csv
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -31,12 +33,8 @@ def test_a_frame_has_a_row_a_sample(drop):
     assert np.array_equal(table["legs_gamma_right"], drop.contact.legs[:, 0])
     units = table.attrs["units"]
     assert set(units) == {"time", *table.columns}
-    assert (units["z"], units["qw"], units["alpha_1"], units["tau_alpha_1"]) == (
-        "m",
-        "1",
-        "rad",
-        "N m",
-    )
+    expected = {"z": "m", "qw": "1", "alpha_1": "rad", "tau_alpha_1": "N m"}
+    assert {name: units[name] for name in expected} == expected
 
 
 def test_a_frame_of_runs_has_two_indices(runs):
@@ -71,18 +69,47 @@ def test_csv_of_runs(runs, tmp_path):
     assert np.array_equal(forces[0], runs[0].contact.forces[:, 2, 2])
 
 
-@pytest.mark.parametrize("method", ["to_csv", "to_netcdf"])
-def test_files_are_whole_or_not_there(method, flight, tmp_path, monkeypatch):
-    (tmp_path / "file").write_text("no folder")
-    with pytest.raises(st.NotWritten, match="is not written"):
-        getattr(flight, method)(tmp_path / "file" / "a")
-    (tmp_path / "a").write_text("before")
-    monkeypatch.setattr("pathlib.Path.replace", refuse)
-    with pytest.raises(st.NotWritten, match="no room"):
-        getattr(flight, method)(tmp_path / "a")
-    assert (tmp_path / "a").read_text() == "before"
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "file"]
-
-
 def refuse(*_):
     raise OSError(28, "no room")
+
+
+def test_files_are_whole_or_not_there(flight, tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("no folder")
+    for method in (flight.to_csv, flight.to_netcdf):
+        with pytest.raises(st.NotWritten, match="not written"):
+            method(tmp_path / "file" / "a")
+        (tmp_path / "a").write_text("before")
+        with monkeypatch.context() as change:
+            change.setattr("pathlib.Path.replace", refuse)
+            with pytest.raises(st.NotWritten, match="no room"):
+                method(tmp_path / "a")
+        assert (tmp_path / "a").read_text() == "before"
+        assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "file"]
+
+
+# Libraries of extras: imported by those who ask for them, and missed by name.
+
+
+def test_an_extra_that_is_missing_is_named_and_csv_needs_none(flight, monkeypatch, tmp_path):
+    for extra in ("xarray", "pandas"):
+        monkeypatch.setitem(sys.modules, extra, None)
+    path = tmp_path / "a.nc"
+    for call, extra in (
+        (flight.to_xarray, "xarray"),
+        (lambda: flight.to_netcdf(path), "xarray"),
+        (flight.to_dataframe, "pandas"),
+    ):
+        with pytest.raises(st.ExtraMissing, match=rf"serpentail\[{extra}\]") as caught:
+            call()
+        assert isinstance(caught.value, ImportError) and list(tmp_path.iterdir()) == []
+    assert flight.to_csv(tmp_path / "a.csv").stat().st_size > 1000
+
+
+def test_who_does_not_ask_loads_nothing():
+    program = (
+        "import sys, serpentail as st; st.Trajectory, st.Rollouts, st.Plan\n"
+        "print([n for n in sys.modules if n in ('pandas', 'xarray') or 'containers' in n])"
+    )
+    command = [sys.executable, "-W", "error", "-c", program]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    assert done.stdout == "[]\n"

@@ -4,12 +4,13 @@ import dataclasses
 import json
 
 import numpy as np
-import pytest
 import xarray
 from scipy.io import netcdf_file
 
 import serpentail as st
-from tests.support.models import model_folder
+from tests.support import zoo
+
+from .conftest import SETTINGS
 
 FEET = [f"feet_{side}_{point}" for side in ("right", "left") for point in "AMT"]
 
@@ -30,46 +31,30 @@ def test_a_flight_has_named_coordinates(flight):
     assert np.array_equal(data.time, flight.t)
 
 
-@pytest.mark.parametrize(
-    "links, options, pair",
-    [
-        (3, {}, ["alpha_1", "beta_1"]),
-        (None, {}, ["a_1", "b_1"]),
-        (None, {"coordinates": "polar"}, ["phi_1", "theta_1"]),
-    ],
-)
-def test_tail_coordinates_are_called_as_their_model_calls_them(links, options, pair):
-    model = st.load(model_folder(1, links, functions=["energy", "momentum", "rollout"], **options))
-    q = [0, 0, 0, 1, 0, 0, 0, 0.1, 0.1]
-    data = st.simulate(model, q, np.zeros(8), t_span=0.01).to_xarray()
-    assert data.joint.values.tolist() == pair
-    assert data.coordinate.values.tolist()[7:] == pair
-    assert data["rate"].values.tolist()[6:] == [f"{name}_dot" for name in pair]
+def test_tail_coordinates_are_called_as_their_model_calls_them():
+    for name, pair in (
+        ("m1_n1", ["alpha_1", "beta_1"]),
+        ("arcs1", ["a_1", "b_1"]),
+        ("polar", ["phi_1", "theta_1"]),
+    ):
+        q = [0, 0, 0, 1, 0, 0, 0, 0.1, 0.1]
+        data = st.simulate(zoo.model(name), q, np.zeros(8), t_span=0.01).to_xarray()
+        assert data.joint.values.tolist() == data.coordinate.values.tolist()[7:] == pair
+        assert data["rate"].values.tolist()[6:] == [f"{each}_dot" for each in pair]
 
 
 def test_units_are_attributes(drop):
     data = drop.to_xarray()
     units = {name: variable.attrs["units"] for name, variable in data.data_vars.items()}
     assert units == {
-        "q": "m, 1, rad",
-        "v": "m/s, rad/s",
-        "tau": "N m",
-        "kinetic": "J",
-        "potential": "J",
-        "linear_momentum": "kg m/s",
-        "angular_momentum": "kg m^2/s",
-        "points": "m",
-        "forces": "N",
-        "bristles": "m",
-        "legs": "rad",
+        **{"q": "m, 1, rad", "v": "m/s, rad/s", "tau": "N m", "kinetic": "J", "potential": "J"},
+        **{"linear_momentum": "kg m/s", "angular_momentum": "kg m^2/s"},
+        **{"points": "m", "forces": "N", "bristles": "m", "legs": "rad"},
     }
     assert all(variable.attrs["long_name"] for variable in data.data_vars.values())
     assert data.time.attrs["units"] == "s"
-    assert data.coordinate_units.sel(coordinate=["z", "qx", "alpha_1"]).values.tolist() == [
-        "m",
-        "1",
-        "rad",
-    ]
+    found = data.coordinate_units.sel(coordinate=["z", "qx", "alpha_1"])
+    assert found.values.tolist() == ["m", "1", "rad"]
     assert data.rate_units.sel(rate=["vx", "omega_z"]).values.tolist() == ["m/s", "rad/s"]
 
 
@@ -126,9 +111,8 @@ def test_a_run_that_stops_at_an_event_keeps_the_common_times(drop):
     model = drop.model
     q = np.tile(drop.q[0], (2, 1))
     q[1, 2] = 0.5
-    legs = st.Legs.fixed(3.6, -0.3)
-    settings = {"legs": legs, "t_span": 0.1, "output_step": 0.002, "rtol": 1e-6}
-    runs = st.simulate(model, q, np.zeros(8), stop_at=[("touch_down", "feet")], **settings)
+    settings = {"t_span": 0.1, "stop_at": [("touch_down", "feet")], **SETTINGS}
+    runs = st.simulate(model, q, np.zeros(8), **settings)
     data = runs.to_xarray()
     stopped = runs[0]
     done = int(np.isfinite(runs.q[0, :, 0]).sum())
@@ -137,13 +121,12 @@ def test_a_run_that_stops_at_an_event_keeps_the_common_times(drop):
     assert np.isnan(data.points[0, done:]).all() and np.isfinite(data.points[1]).all()
 
 
-@pytest.mark.parametrize("kind", ["flight", "drop", "runs"])
-def test_netcdf_gives_the_numbers_back(kind, request, tmp_path):
-    motion = request.getfixturevalue(kind)
-    path = tmp_path / "new" / "motion.nc"
-    assert motion.to_netcdf(str(path)) == path
-    with xarray.open_dataset(path, decode_timedelta=True) as back:
-        xarray.testing.assert_identical(back.load(), motion.to_xarray())
+def test_netcdf_gives_the_numbers_back(flight, drop, runs, tmp_path):
+    for motion in (flight, drop, runs):
+        path = tmp_path / "new" / "motion.nc"
+        assert motion.to_netcdf(str(path)) == path
+        with xarray.open_dataset(path, decode_timedelta=True) as back:
+            xarray.testing.assert_identical(back.load(), motion.to_xarray())
 
 
 def test_a_program_without_xarray_reads_it(drop, tmp_path):
@@ -158,31 +141,11 @@ def test_a_program_without_xarray_reads_it(drop, tmp_path):
 
 
 def test_odd_facts_do_not_stop_a_file(flight, tmp_path):
-    info = {
-        "a/b c": 1,
-        "big": 2**40,
-        "yes": True,
-        "none": None,
-        "empty": "",
-        "é": 1,
-        "word": "ü",
-        "info": 3,
-    }
-    odd = st.Trajectory(*(getattr(flight, name) for name in FIELDS), info=info)
+    info = {"a/b c": 1, "big": 2**40, "yes": True, "none": None, "empty": "", "é": 1}
+    info |= {"word": "ü", "info": 3}
+    odd = dataclasses.replace(flight, info=info)
     with xarray.open_dataset(odd.to_netcdf(tmp_path / "odd.nc")) as back:
         facts = back.attrs
     assert facts["big"] == 2.0**40 and facts["yes"] == 1 and "none" not in facts
     assert "a/b c" not in facts and "é" not in facts and facts["word"] == "ü"
     assert json.loads(facts["info"]) == info
-
-
-FIELDS = (
-    "t",
-    "q",
-    "v",
-    "tau",
-    "kinetic",
-    "potential",
-    "linear_momentum",
-    "angular_momentum",
-)

@@ -1,54 +1,58 @@
 """Every block of every document runs as pasted, or says why it does not."""
 
 import ast
+import doctest
+import inspect
 import re
 import tomllib
 
 import numpy as np
 import pytest
+from scipy.integrate import simpson
 
+import serpentail as st
 from serpentail_codegen.scene.problems import SceneError
 from tests.docs.blocks import PAGES, RUN, SHOWN, blocks
 from tests.docs.running import run_page
+from tests.support.rows import row
 
-SLOW = {"autodiff", "c", "getting_started", "identification", "learning", "models", "scenes"}
-SLOW |= {"sequences", "simulation", "viewing"}
-ELSEWHERE = {"README": "test_readme.py", "recipes": "tests/exporting/test_recipes.py"}
-RUNNING = [
-    pytest.param(name, marks=[pytest.mark.slow] if name in SLOW else [])
+QUICK = {"autodiff", "contact", "continuum_forms", "learning", "python"}
+NEEDS = {"autodiff": ["jax"], "export": ["pinocchio"], "viewing": ["imageio_ffmpeg", "viser"]}
+ELSEWHERE = {"recipes"}  # tests/exporting/test_recipes.py
+RUNNING = {
+    name
     for name, path in PAGES.items()
-    if name not in ELSEWHERE and any(b.language in RUN and not b.reason for b in blocks(path))
-]
+    if any(block.language in RUN and not block.reason for block in blocks(path))
+} - ELSEWHERE
 
 
-@pytest.mark.parametrize("name", PAGES)
-def test_every_block_says_what_it_is(name):
-    for block in blocks(PAGES[name]):
-        assert block.language in (*RUN, *SHOWN) or block.reason, f"{block}: {block.language!r}"
-        assert block.language not in ("c", "cpp") or block.name or block.reason, f"{block}: a file?"
+def test_every_block_says_what_it_is_or_why_it_is_not_run():
+    for block in (block for path in PAGES.values() for block in blocks(path)):
+        with row(block):
+            assert block.language in (*RUN, *SHOWN) or block.reason
+            assert block.language not in ("c", "cpp") or block.name or block.reason
+            assert not block.reason or len(block.reason.split()) > 2
+            if block.reason and block.language == "python":
+                ast.parse(block.text)
+            elif block.reason and block.language == "toml":
+                tomllib.loads(block.text)
 
 
-@pytest.mark.parametrize("name", PAGES)
-def test_a_block_that_is_not_run_is_sound_and_has_a_reason(name):
-    for block in (each for each in blocks(PAGES[name]) if each.reason):
-        assert len(block.reason.split()) > 2, block
-        if block.language == "python":
-            ast.parse(block.text)
-        elif block.language == "toml":
-            tomllib.loads(block.text)
+def page(name):
+    return pytest.param(name, marks=[] if name in QUICK else [pytest.mark.slow])
 
 
-@pytest.mark.parametrize("name", RUNNING)
+@pytest.mark.parametrize("name", [page(name) for name in sorted(RUNNING)])
 def test_the_blocks_of_a_page_run(name, tmp_path):
+    for library in NEEDS.get(name, []):
+        pytest.importorskip(library)
     ran = run_page(PAGES[name], tmp_path)
-    if name in TOLD:
-        TOLD[name](ran)
+    for check in TOLD.get(name, []):
+        check(ran)
 
 
 def of_c(ran):
     """The line of the C program is the model's own acceleration."""
-    import serpentail as st
-
     model = st.load(ran.folder / "generated" / "articulated_m3_n4")
     q = np.array([0, 0, 0, 1, 0, 0, 0, 0.5, 0, 0, 0, 0, 0])
     v_dot = model.forward_dynamics(q, np.zeros(model.nv), np.array([1e-3, 0, 0, 0, 0, 0]))
@@ -88,44 +92,94 @@ def of_python(ran):
     assert np.abs(np.array(numbers, float)).max() < 1e-12
 
 
+def of_flight(ran):
+    """A free fall, shown on a page."""
+    (height,) = re.findall(r"after 0.5 s: height (\S+) m", ran.printed)
+    fallen = 0.3 + 2 * 0.5 - 9.8 / 2 * 0.5**2
+    assert float(height) == pytest.approx(fallen, abs=0.1)  # of B, not of the centre of mass
+    assert {"flight.html", "leap.html"} <= {path.name for path in ran.folder.iterdir()}
+
+
+def of_demo(ran):
+    """The demo writes its files, and its flights lose what is damped."""
+    demo = ran.folder / "output" / "demo"
+    for scene in ("kangaroo_rat_m1_n3", "kangaroo_rat_m3_n4"):
+        flight = st.Trajectory.load(demo / f"{scene}.npz")
+        assert flight.t[-1] == pytest.approx(0.58)
+        damped = simpson(-np.sum(flight.tau * flight.v[:, 6:], axis=1), x=flight.t)
+        assert flight.energy[0] - flight.energy[-1] == pytest.approx(damped, rel=1e-3)
+    pictures = {*demo.glob("*.png")}
+    assert len(pictures) >= 6 and {p.read_bytes()[:4] for p in pictures} == {b"\x89PNG"}
+    assert (demo / "righting.gif").read_bytes()[:6] == b"GIF89a"
+    assert "0.00 deg with the planned tail" in ran.printed
+    drifts = re.findall(r"constant to (\S+),", ran.printed)
+    differences = re.findall(r"differ by (\S+) at most", ran.printed)
+    assert len(drifts) == 4
+    assert max(map(float, drifts)) < 1e-9 and max(map(float, differences)) < 1e-8
+
+
 TOLD = {
-    "c": of_c,
-    "casadi": of_casadi,
-    "getting_started": of_getting_started,
-    "planning": of_planning,
-    "python": of_python,
-    "sweeps": of_sweeps,
+    "README": [of_c, of_python, of_flight, of_demo],
+    "c": [of_c],
+    "casadi": [of_casadi],
+    "getting_started": [of_getting_started],
+    "planning": [of_planning],
+    "python": [of_python],
+    "sweeps": [of_sweeps],
 }
+
+
+def test_examples_of_docstrings_run():
+    found, finder = [], doctest.DocTestFinder(recurse=False)
+    for name in st.__all__:
+        thing = getattr(st, name)
+        members = [n for n in dir(thing) if n[0] != "_"] if inspect.isclass(thing) else []
+        for each in [thing, *(inspect.getattr_static(thing, n) for n in members)]:
+            if ">>>" in (inspect.getdoc(each) or ""):
+                found += finder.find(getattr(each, "__func__", each), name, globs={})
+    assert len(found) > 5
+    for each in found:
+        with row(each.name):
+            assert doctest.DocTestRunner().run(each).failed == 0
+
+
+def test_figures_of_the_readme_are_those_of_the_benchmarks():
+    readme = PAGES["README"].read_text(encoding="utf-8")
+    table = readme.split("## How fast, how accurate")[1].split("## ")[0]
+    rows = re.findall(r"^\| (?!what|---)(.*) \|$", table, re.MULTILINE)
+    measured = PAGES["benchmarks"].read_text(encoding="utf-8")
+    assert rows
+    for text in rows:
+        for number in re.findall(r"(?<![\w.-])\d[\d.e-]*(?:x| us| ms)?(?![\w.])", text):
+            assert number.removesuffix(" us") in measured, (text, number)
 
 
 # The runner.
 
 
-@pytest.mark.parametrize(
-    ("text", "fault"),
-    [
-        ("```python\na = 1\n```\n```python\nassert a == 2\n```", AssertionError),
-        ("```python\nimport warnings\nwarnings.warn('slow')\n```", UserWarning),
-        ("```sh\nfalse\ntrue\n```", AssertionError),
-        ("```sh\n.venv/bin/python -m pip install nothing\n```", AssertionError),
-        ("```toml\nkind = 'articulated'\nsegments = 0\nlinks = 3\n```", SceneError),
-        (
-            "```toml\nkind = 'continuum'\nsegments = 1\n[simulate]\ndurations = 1\n```",
-            AssertionError,
-        ),
-        ("```c x.c\nint main(void) { int unused; return 0; }\n```", AssertionError),
-        ("```c x.c\nint main(void) { return 1; }\n```", AssertionError),
-    ],
-)
-def test_what_is_wrong_in_a_block_is_found(text, fault, tmp_path):
-    page = tmp_path / "page.md"
-    page.write_text(text + "\n")
-    with pytest.raises(fault):
-        run_page(page, tmp_path)
+def test_what_is_wrong_in_a_block_is_found(tmp_path):
+    simulated = "kind = 'continuum'\nsegments = 1\n[simulate]\ndurations = 1"
+    for k, (text, fault) in enumerate(
+        [
+            ("```python\na = 1\n```\n```python\nassert a == 2", AssertionError),
+            ("```python\nimport warnings\nwarnings.warn('slow')", UserWarning),
+            ("```sh\nfalse\ntrue", AssertionError),
+            ("```sh\n.venv/bin/python -m pip install nothing", AssertionError),
+            ("```toml\nkind = 'articulated'\nsegments = 0\nlinks = 3", SceneError),
+            (f"```toml\n{simulated}", AssertionError),
+            ("```c x.c\nint main(void) { int unused; return 0; }", AssertionError),
+            ("```c x.c\nint main(void) { return 1; }", AssertionError),
+        ]
+    ):
+        (tmp_path / str(k)).mkdir()
+        wrong = tmp_path / f"{k}.md"
+        wrong.write_text(f"{text}\n```\n")
+        with row(text), pytest.raises(fault):
+            run_page(wrong, tmp_path / str(k))
 
 
 def test_blocks_of_a_page_share_names_files_and_folder(tmp_path):
-    page = tmp_path / "page.md"
+    whole = tmp_path / "page.md"
     parts = [
         "```text\nnot code\n```",
         "```python\nnumber = 2\n```",
@@ -134,6 +188,6 @@ def test_blocks_of_a_page_share_names_files_and_folder(tmp_path):
         "```python\nfrom pathlib import Path\nprint(number, Path('said').read_text().strip())\n```",
         "```sh not-run: it would fail\nfalse\n```",
     ]
-    page.write_text("\n".join(parts) + "\n")
-    ran = run_page(page, tmp_path)
+    whole.write_text("\n".join(parts) + "\n")
+    ran = run_page(whole, tmp_path)
     assert (ran.printed, ran.names["number"]) == ("2 three\nthree\n", 2)

@@ -2,24 +2,19 @@
 
 from xml.etree import ElementTree as Xml
 
-import mujoco
 import numpy as np
-import pinocchio as pin
 import pytest
 
 import serpentail as st
-from serpentail_codegen.scene.parse import parse_scene
-from tests.support.models import folder_of, model_folder
+from tests.support import zoo
+from tests.support.rows import row
 
-TAILS = {f"{m} x {n}": {"segments": m, "links": n} for m, n in [(1, 1), (1, 3), (3, 4)]}
-TAILS["own links on a tilted mount"] = {
-    "segments": [
-        {"links": 2, "length": 0.05, "mass": 2e-3, "link_radius": 3e-3},
-        {"links": 3, "link_lengths": [0.03, 0.02, 0.02], "mass": 1e-3, "radii": [3e-3, 1e-3]},
-    ],
-    "parameters": {"mount_angles": [0.3, -0.2, 0.5]},
-}
-TAILS["no weight"] = {"segments": 1, "links": 2, "weightless": True}
+pytest.importorskip("mujoco")
+pytest.importorskip("pinocchio")
+import mujoco
+import pinocchio as pin
+
+TAILS = ("m1_n1", "m1_n3", "m3_n4", "own_links", "weightless")
 CHANGED = {
     "torso_mass": 0.1234567890123,
     "torso_inertia": (7.1e-5, 4.3e-5, 6.9e-5),
@@ -30,17 +25,17 @@ CHANGED = {
 }
 
 
-@pytest.fixture(scope="module", params=TAILS.values(), ids=TAILS)
-def model(request):
-    return st.load(folder_of(parse_scene({"kind": "articulated"} | request.param, "tail")))
-
-
-@pytest.fixture(params=["scene's", "changed"])
-def parameters(request, model):
-    """The model with its scene's parameters, and with others."""
-    names = [parameter["name"] for parameter in model.manifest["parameters"]]
-    known = {name: value for name, value in CHANGED.items() if name in names}
-    return model if request.param == "scene's" else model.with_parameters(**known)
+def tails():
+    """Return names and tails, each with its scene's parameters and with others."""
+    found = []
+    for name in TAILS:
+        model = zoo.model(name)
+        if name == "own_links":  # inertias of the zoo's are not all those of a body
+            model = model.with_parameters(link_inertias=np.linspace([3, 2, 4], [2, 1, 2], 7) * 1e-8)
+        independent = {parameter["name"] for parameter in model.manifest["parameters"]}
+        changes = {key: value for key, value in CHANGED.items() if key in independent}
+        found += [(name, model), (f"{name}, changed", model.with_parameters(**changes))]
+    return found
 
 
 def links(model):
@@ -75,26 +70,26 @@ def pinocchio_state(model, read, q):
     return state, turn
 
 
-def test_pinocchio_finds_the_inertia_of_the_model(parameters, tmp_path):
-    read = pinocchio_model(parameters, tmp_path)
-    assert (read.nq, read.nv) == (parameters.nq, parameters.nv)
-    for q in configurations(parameters):
-        state, turn = pinocchio_state(parameters, read, q)
+def check_pinocchio(model, folder):
+    read = pinocchio_model(model, folder)
+    data, names = read.createData(), [f"link_{i}_{j}" for i, j in links(model)]
+    assert (read.nq, read.nv) == (model.nq, model.nv)
+    for q in configurations(model):
+        state, turn = pinocchio_state(model, read, q)
         upper = np.triu(pin.crba(read, read.createData(), state, pin.Convention.LOCAL))
         H = turn.T @ (upper + np.triu(upper, 1).T) @ turn
-        expected = parameters.mass_matrix(q)
+        expected = model.mass_matrix(q)
         scale = np.sqrt(np.diag(expected))  # of each coordinate: the tail's moments are small
         assert (np.abs(H - expected) <= 1e-14 * np.outer(scale, scale)).all()
-
-
-def test_pinocchio_finds_the_points_of_the_tail(parameters, tmp_path):
-    read = pinocchio_model(parameters, tmp_path)
-    data = read.createData()
-    names = [f"link_{i}_{j}" for i, j in links(parameters)]
-    for q in configurations(parameters):
-        pin.framesForwardKinematics(read, data, pinocchio_state(parameters, read, q)[0])
+        pin.framesForwardKinematics(read, data, state)
         places = [data.oMf[read.getFrameId(name)].translation for name in [*names, "tip"]]
-        assert np.abs(places - parameters.tail_points(q)).max() < 1e-12
+        assert np.abs(places - model.tail_points(q)).max() < 1e-12
+
+
+def test_pinocchio_finds_inertia_and_points_of_the_model(tmp_path):
+    for name, model in tails():
+        with row(name):
+            check_pinocchio(model, tmp_path)
 
 
 # MuJoCo
@@ -110,51 +105,41 @@ def mujoco_positions(model, q):
     return np.concatenate([q[:3], q[3:7] / np.linalg.norm(q[3:7]), angles.ravel()])
 
 
-def test_mujoco_finds_the_points_of_the_tail(parameters, tmp_path):
-    read = mujoco_model(parameters, tmp_path)
-    data = mujoco.MjData(read)
-    for q in configurations(parameters):
-        data.qpos[:] = mujoco_positions(parameters, q)
-        mujoco.mj_forward(read, data)
-        assert np.abs(data.site_xpos - parameters.tail_points(q)).max() < 1e-12
-        assert np.abs(data.efc_pos).max(initial=0) < 1e-12  # the equalities hold
-
-
-def test_mujoco_finds_the_inertia_of_the_model(parameters, tmp_path):
-    read = mujoco_model(parameters, tmp_path)
-    data = mujoco.MjData(read)
-    of_segments = np.repeat(np.eye(parameters.segments), parameters.joints_each, axis=0)
+def check_mujoco(model, folder):
+    """Inertia, points, and the free chain's work at the motors, which is that of the torques."""
+    read = mujoco_model(model, folder)
+    data, tau = mujoco.MjData(read), np.random.default_rng(3).normal(size=model.nv - 6)
+    of_segments = np.repeat(np.eye(model.segments), model.joints_each, axis=0)
     tie = np.kron(of_segments, np.eye(2))
     tie = np.block([[np.eye(6), np.zeros((6, tie.shape[1]))], [np.zeros((len(tie), 6)), tie]])
-    for q in configurations(parameters):
-        data.qpos[:] = mujoco_positions(parameters, q)
+    first = np.cumsum([0, *model.joints_each[:-1]])
+    data.ctrl[:] = tau
+    for q in configurations(model):
+        data.qpos[:] = mujoco_positions(model, q)
         mujoco.mj_forward(read, data)
+        assert np.abs(data.site_xpos - model.tail_points(q)).max() < 1e-12
+        assert np.abs(data.efc_pos).max(initial=0) < 1e-12  # the equalities hold
         full = np.zeros((read.nv, read.nv))
         mujoco.mj_fullM(read, data, full)
-        expected = parameters.mass_matrix(q)
+        expected = model.mass_matrix(q)
         assert np.abs(tie.T @ full @ tie - expected).max() <= 1e-12 * np.abs(expected).max()
+        ties = np.add.reduceat(np.reshape(data.qfrc_actuator[6:], (-1, 2)), first)
+        np.testing.assert_array_equal(ties.ravel(), tau)
+    p = model.parameters
+    assert read.opt.gravity.tolist() == [0, 0, -p.get("gravity", 0.0)]
+    tail = p["tail_mass"] if "tail_mass" in p else sum(np.ravel(p["link_masses"]))
+    assert read.body_subtreemass[1] == pytest.approx(p["torso_mass"] + tail, rel=1e-14)
 
 
-def test_mujocos_motors_and_gravity_are_the_models(parameters, tmp_path):
-    """The free chain's work at the motors is that of the model's torques."""
-    read = mujoco_model(parameters, tmp_path)
-    data = mujoco.MjData(read)
-    tau = np.random.default_rng(3).normal(size=parameters.nv - 6)
-    data.qpos[:] = mujoco_positions(parameters, configurations(parameters)[0])
-    data.ctrl[:] = tau
-    mujoco.mj_forward(read, data)
-    first = np.cumsum([0, *parameters.joints_each[:-1]])
-    ties = np.add.reduceat(np.reshape(data.qfrc_actuator[6:], (-1, 2)), first)
-    np.testing.assert_array_equal(ties.ravel(), tau)
-    assert read.opt.gravity.tolist() == [0, 0, -parameters.parameters.get("gravity", 0.0)]
-    assert read.body_subtreemass[1] == pytest.approx(
-        parameters.parameters["torso_mass"] + parameters.parameters["tail_mass"], rel=1e-14
-    )
+def test_mujoco_finds_inertia_points_motors_and_gravity_of_the_model(tmp_path):
+    for name, model in tails():
+        with row(name):
+            check_mujoco(model, tmp_path)
 
 
-def test_mujoco_flies_as_the_model_does(model, tmp_path):
+def check_flight(model, folder):
     """MuJoCo's equalities are soft, and its integrator is of first order: 0.2 mm in 50 ms."""
-    read = mujoco_model(model, tmp_path)
+    read = mujoco_model(model, folder)
     data, span = mujoco.MjData(read), 0.05
     q, v = np.zeros(model.nq), np.zeros(model.nv)
     q[2], q[3], q[7:] = 0.3, 1, 0.1
@@ -170,11 +155,17 @@ def test_mujoco_flies_as_the_model_does(model, tmp_path):
     assert np.abs(data.site_xpos - model.tail_points(flight.q[-1])).max() < 2e-4
 
 
+def test_mujoco_flies_as_the_model_does(tmp_path):
+    for name, model in tails()[::2]:
+        with row(name):
+            check_flight(model, tmp_path)
+
+
 # Shapes and texts
 
 
 def test_torso_and_tail_are_capsules_of_the_models_size(tmp_path):
-    model = st.load(model_folder(1, 3))
+    model = zoo.model("m1_n3")
     read = mujoco_model(model, tmp_path)
     torso, *links = range(read.ngeom)
     capsule = mujoco.mjtGeom.mjGEOM_CAPSULE
@@ -191,23 +182,19 @@ def test_torso_and_tail_are_capsules_of_the_models_size(tmp_path):
 
 
 def test_a_torso_as_wide_as_long_is_a_ball(tmp_path):
-    model = st.load(model_folder(1, 1), {"torso_inertia": (5e-5, 5e-5, 5e-5)})
+    model = zoo.model("m1_n1").with_parameters(torso_inertia=(5e-5, 5e-5, 5e-5))
     read = mujoco_model(model, tmp_path)
     assert read.geom_type[0] == int(mujoco.mjtGeom.mjGEOM_SPHERE)
     pinocchio_model(model, tmp_path)
 
 
-@pytest.mark.parametrize("kind", ["urdf", "mjcf"])
-def test_files_are_the_same_twice_and_say_what_they_lack(kind, tmp_path):
-    model = st.load(model_folder(1, 3))
-    suffix = {"urdf": "urdf", "mjcf": "xml"}[kind]
-    texts = [st.export(model, kind, tmp_path / f"{k}.{suffix}").read_bytes() for k in range(2)]
-    assert texts[0] == texts[1]
-    assert b"Legs and feet have no mass and are left out" in texts[0]
-    masses = {
-        "urdf": ".//link[@name='link_1_1']//mass",
-        "mjcf": ".//body[@name='link_1_1']/inertial",
-    }
-    mass = Xml.fromstring(texts[0]).find(masses[kind]).attrib
-    name = {"urdf": "value", "mjcf": "mass"}[kind]
-    assert mass[name] == repr(model.parameters["tail_mass"] / 3)
+def test_files_are_the_same_twice_and_say_what_they_lack(tmp_path):
+    model = zoo.model("m1_n3")
+    for kind, suffix, place, name in (
+        ("urdf", "urdf", ".//link[@name='link_1_1']//mass", "value"),
+        ("mjcf", "xml", ".//body[@name='link_1_1']/inertial", "mass"),
+    ):
+        texts = [st.export(model, kind, tmp_path / f"{k}.{suffix}").read_bytes() for k in (0, 1)]
+        assert texts[0] == texts[1] and b"contacts" in texts[0].split(b"-->")[0]
+        mass = Xml.fromstring(texts[0]).find(place).attrib
+        assert mass[name] == repr(model.parameters["tail_mass"] / 3)

@@ -1,144 +1,118 @@
-"""FMUs: FMPy finds nothing wrong, and they fly as the model does, by either kind of interface."""
+"""FMUs: FMPy finds nothing wrong, and they fly and land as the model does, by either interface."""
 
-import shutil
 import zipfile
 
-import fmpy
 import numpy as np
 import pytest
+
+import serpentail as st
+from tests.support import zoo
+from tests.support.models import model_folder
+
+pytest.importorskip("fmpy")
+import fmpy
 from fmpy.fmi2 import FMU2Model, FMU2Slave
 from fmpy.validation import validate_fmu
 
-import serpentail as st
-from tests.support.models import model_folder
-
-TAILS = {"articulated": (2, 3), "continuum": (2, None)}
-SPAN = 0.2  # s
-
-
-@pytest.fixture(scope="module", params=TAILS)
-def model(request):
-    loaded = st.load(model_folder(*TAILS[request.param]))
-    return loaded.with_parameters(torso_mass=0.11, torso_inertia=(7e-5, 4e-5, 6e-5))
-
-
-@pytest.fixture(scope="module")
-def path(model, tmp_path_factory):
-    return st.export(model, "fmu", tmp_path_factory.mktemp("fmu") / "rat.fmu")
-
-
-@pytest.fixture(scope="module")
-def described(path):
-    return fmpy.read_model_description(str(path))
+FLIGHTS = ("m2_n2", "arcs2")
+LEGS = np.array([3.7, -0.7, 3.7, -0.7, 0, -0.5, 0, -0.5])  # rad, rad/s: crouched, stretching
+SPAN, STEP = 0.05, 5e-4  # s, of a landing
 
 
 @pytest.fixture
-def unit(path, described, tmp_path, request):
-    """Return a unit of a kind by its interface, initialised; gone at the end."""
-    folder = tmp_path / "unit"
-    fmpy.extract(str(path), str(folder))
-    opened = []
+def opened(tmp_path):
+    """Return a function from a path and a kind of interface to an initialised unit and the
+    references of its variables.
+    """
+    units = []
 
-    def made(kind, tolerance=None):
-        name = described.modelExchange.modelIdentifier
+    def made(path, kind):
+        described = fmpy.read_model_description(str(path))
+        folder = tmp_path / path.stem
+        if not folder.exists():
+            fmpy.extract(str(path), str(folder))
         found = kind(
             guid=described.guid,
             unzipDirectory=str(folder),
-            modelIdentifier=name,
+            modelIdentifier=described.modelExchange.modelIdentifier,
             instanceName="rat",
         )
         found.instantiate()
-        found.setupExperiment(startTime=0.0, tolerance=tolerance)
+        found.setupExperiment(startTime=0.0)
         found.enterInitializationMode()
         found.exitInitializationMode()
-        opened.append(found)
-        return found
+        units.append(found)
+        return found, {each.name: each.valueReference for each in described.modelVariables}
 
     yield made
-    for each in opened:
+    for each in units:
         each.terminate()
         each.freeInstance()
-    shutil.rmtree(folder)
 
 
 def names(model):
     """Names of the states."""
-    return [f"{x}[{k + 1}]" for x, n in (("q", model.nq), ("v", model.nv)) for k in range(n)]
+    sizes = {"q": model.nq, "v": model.nv, "bristle": 2 * sum((model.contacts or {}).values())}
+    return [f"{x}[{k + 1}]" for x, n in sizes.items() for k in range(n)]
 
 
-def state(model, seed=1):
-    """A state (q, v) that tumbles, and torques."""
-    rng = np.random.default_rng(seed)
+def state(model, scale=1.0):
+    """A state (q, v) that tumbles, its quaternion of any norm, and torques."""
+    rng = np.random.default_rng(1)
     q = rng.normal(scale=0.3, size=model.nq)
-    q[3:7] = [0.9, 0.1, -0.2, 0.3]
-    q[3:7] /= np.linalg.norm(q[3:7])
+    q[3:7] = scale * np.array([0.9, 0.1, -0.2, 0.3]) / np.sqrt(0.95)
     return q, rng.normal(size=model.nv), rng.normal(scale=1e-5, size=model.nv - 6)
 
 
-def test_fmpy_finds_nothing_wrong(path):
-    assert validate_fmu(str(path)) == []
-
-
-@pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
-def test_it_flies_as_the_model_does(kind, model, path):
-    q, v, tau = state(model)
-    run = st.simulate(
-        model, q, v, controller=lambda *_: tau, t_span=SPAN, output_step=0.01, rtol=1e-11
-    )
-    start = dict(zip(names(model), [*q, *v], strict=True))
-    start |= {f"tau[{k + 1}]": value for k, value in enumerate(tau)}
-    solver = {"solver": "CVode"} if kind == "ModelExchange" else {}
-    rows = fmpy.simulate_fmu(
-        str(path),
-        fmi_type=kind,
-        start_values=start,
-        stop_time=SPAN,
-        output_interval=0.01,
-        relative_tolerance=1e-9,
-        **solver,
-    )
-    assert rows["time"] == pytest.approx(run.t)
-    flown = np.array([rows[name] for name in names(model)]).T
-    most = {"CoSimulation": 1e-7, "ModelExchange": 1e-5}[kind]  # CVode's own tolerance
-    assert np.abs(flown - np.hstack([run.q, run.v])).max() < most
-
-
-def references(described):
-    """Value references by name."""
-    return {each.name: each.valueReference for each in described.modelVariables}
+def values_of(model, q, v, tau):
+    """A state and torques by the names of their variables."""
+    torques = {f"tau[{k + 1}]": value for k, value in enumerate(tau)}
+    return dict(zip(names(model), [*q, *v], strict=True)) | torques
 
 
 def put(unit, references, values):
     unit.setReal([references[name] for name in values], list(values.values()))
 
 
-def test_accelerations_are_the_models(model, unit, described):
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_it_flies_as_the_model_does(name, fmu):
+    path, model = fmu(name), zoo.model(name)
+    assert validate_fmu(str(path)) == []
     q, v, tau = state(model)
-    q[3:7] *= 1.7  # a quaternion of any norm
-    one, known = unit(FMU2Model), references(described)
-    put(one, known, dict(zip(names(model), [*q, *v], strict=True)))
-    put(one, known, {f"tau[{k + 1}]": value for k, value in enumerate(tau)})
-    found = one.getReal([known[f"der(v[{k + 1}])"] for k in range(model.nv)])
-    expected = model.forward_dynamics(q, v, tau)
-    assert found == pytest.approx(expected, rel=1e-11, abs=1e-9)
-
-
-def test_directional_derivatives_are_exact(model, unit, described):
-    """By differences of the rates themselves, at a quaternion that is no unit one."""
-    q, v, tau = state(model)
-    q[3:7] *= 1.3
-    one, known = unit(FMU2Model), references(described)
-    knowns = [known[name] for name in names(model)] + [
-        known[f"tau[{k + 1}]"] for k in range(len(tau))
-    ]
-    unknowns = [known[f"der({name})"] for name in names(model)]
-    at, rng = np.concatenate([q, v, tau]), np.random.default_rng(5)
-    for scale in (np.repeat([1, 1, 0.0], [model.nq, model.nv, len(tau)]), np.ones(len(at))):
-        along = (
-            scale
-            * rng.normal(size=len(at))
-            * np.where(np.arange(len(at)) < len(at) - len(tau), 1, 1e-4)
+    settings = {"t_span": 0.2, "output_step": 0.01}
+    run = st.simulate(model, q, v, controller=lambda *_: tau, rtol=1e-11, **settings)
+    exchange = ("ModelExchange", 1e-5, {"solver": "CVode"})  # the limit is its own tolerance's
+    for kind, most, more in (("CoSimulation", 1e-7, {}), exchange):
+        rows = fmpy.simulate_fmu(
+            str(path),
+            fmi_type=kind,
+            start_values=values_of(model, q, v, tau),
+            stop_time=0.2,
+            output_interval=0.01,
+            relative_tolerance=1e-9,
+            **more,
         )
+        assert rows["time"] == pytest.approx(run.t)
+        flown = np.array([rows[each] for each in names(model)]).T
+        assert np.abs(flown - np.hstack([run.q, run.v])).max() < most, kind
+
+
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_accelerations_and_directional_derivatives_are_exact(name, fmu, opened):
+    """At a quaternion that is no unit one; derivatives by differences of the rates themselves."""
+    model = zoo.model(name)
+    q, v, tau = state(model, scale=1.3)
+    one, known = opened(fmu(name), FMU2Model)
+    put(one, known, values_of(model, q, v, tau))
+    found = one.getReal([known[f"der(v[{k + 1}])"] for k in range(model.nv)])
+    assert found == pytest.approx(model.forward_dynamics(q, v, tau), rel=1e-11, abs=1e-9)
+
+    knowns = [known[each] for each in values_of(model, q, v, tau)]
+    unknowns = [known[f"der({each})"] for each in names(model)]
+    at, rng, n = np.concatenate([q, v, tau]), np.random.default_rng(5), len(tau)
+    for torques in (0.0, 1e-4):
+        along = rng.normal(size=len(at))
+        along[-n:] *= torques
         one.setReal(knowns, list(at))
         exact = np.array(one.getDirectionalDerivative(unknowns, knowns, list(along)))
         rates = []
@@ -147,17 +121,14 @@ def test_directional_derivatives_are_exact(model, unit, described):
             rates.append(np.array(one.getReal(unknowns)))
         differences = (rates[0] - 8 * rates[1] + 8 * rates[2] - rates[3]) / 12e-4
         np.testing.assert_allclose(exact, differences, atol=1e-8 * np.abs(exact).max())
-
-
-def test_states_are_outputs_of_which_the_derivative_is_the_identity(unit, described):
-    one = unit(FMU2Model)
+    # states are outputs, of which the derivative is the identity
     assert one.getDirectionalDerivative([0, 3, 5], [3, 5], [2.0, 7.0]) == [0.0, 2.0, 7.0]
 
 
-def test_a_state_is_kept_stored_and_restored(model, unit, described):
-    q, v, _ = state(model)
-    one, known = unit(FMU2Slave), references(described)
-    put(one, known, dict(zip(names(model), [*q, *v], strict=True)))
+def test_a_state_is_kept_stored_and_restored(fmu, opened):
+    model = zoo.model("m2_n2")
+    one, known = opened(fmu("m2_n2"), FMU2Slave)
+    put(one, known, values_of(model, *state(model)))
     one.doStep(0.0, 0.01)
     kept = one.getFMUstate()
     stored = one.serializeFMUstate(kept)
@@ -169,7 +140,7 @@ def test_a_state_is_kept_stored_and_restored(model, unit, described):
     first = flown(one)
     one.setFMUstate(kept)
     assert flown(one) == first
-    another = unit(FMU2Slave)
+    another, _ = opened(fmu("m2_n2"), FMU2Slave)
     restored = another.deSerializeFMUstate(stored)
     another.setFMUstate(restored)
     assert flown(another) == first
@@ -177,16 +148,18 @@ def test_a_state_is_kept_stored_and_restored(model, unit, described):
     one.freeFMUstate(kept)
 
 
-def test_parameters_are_those_of_the_model_and_can_be_tuned(model, unit, described):
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_parameters_are_those_of_the_model_and_can_be_tuned(name, opened, tmp_path):
+    model = zoo.model(name).with_parameters(torso_mass=0.11, torso_inertia=(7e-5, 4e-5, 6e-5))
+    path = st.export(model, "fmu", tmp_path / "rat.fmu")
+    described = fmpy.read_model_description(str(path))
     start = {each.name: float(each.start) for each in described.modelVariables if each.start}
     assert start["torso_mass"] == 0.11
     assert [start[f"torso_inertia[{k}]"] for k in (1, 2, 3)] == [7e-5, 4e-5, 6e-5]
     q, v, tau = state(model)
-    one, known = unit(FMU2Model), references(described)
-    put(one, known, dict(zip(names(model), [*q, *v], strict=True)))
-    put(one, known, {f"tau[{k + 1}]": value for k, value in enumerate(tau)})
+    one, known = opened(path, FMU2Model)
     changed = {"gravity": 1.6, "tail_mass": 0.005}
-    put(one, known, changed)
+    put(one, known, values_of(model, q, v, tau) | changed)
     if model.links:  # the FMU has no link_radius, from which this would follow
         changed["link_inertia"] = model.parameters["link_inertia"]
     expected = model.with_parameters(**changed).forward_dynamics(q, v, tau)
@@ -196,27 +169,129 @@ def test_parameters_are_those_of_the_model_and_can_be_tuned(model, unit, describ
     assert one.getReal([known["gravity"], known["q[4]"], known["q[1]"]]) == [9.8, 1.0, 0.0]
 
 
-def test_variables_have_units_and_parts(described):
+def test_the_description_has_units_and_parts(fmu, tmp_path):
+    described = fmpy.read_model_description(str(fmu("m2_n2")))
     units = {each.name: each.unit for each in described.modelVariables}
     expected = {"q[1]": "m", "q[4]": "1", "q[8]": "rad", "v[1]": "m/s", "v[4]": "rad/s"}
-    expected |= {
-        "der(v[1])": "m/s2",
-        "der(v[4])": "rad/s2",
-        "tau[1]": "N.m",
-        "torso_inertia[2]": "kg.m2",
-    }
+    expected |= {"der(v[1])": "m/s2", "der(v[4])": "rad/s2", "tau[1]": "N.m"}
+    expected["torso_inertia[2]"] = "kg.m2"
     assert {name: units[name] for name in expected} == expected
-    defined = {each.name: each.baseUnit for each in described.unitDefinitions}
-    torque = defined["N.m"]
+    torque = {each.name: each.baseUnit for each in described.unitDefinitions}["N.m"]
     assert (torque.kg, torque.m, torque.s) == (1, 2, -2)
     parts = {each.name: (each.causality, each.variability) for each in described.modelVariables}
     assert parts["gravity"] == ("parameter", "tunable")
     assert parts["q[1]"] == ("output", "continuous") and parts["tau[1]"] == ("input", "continuous")
+    # the same twice
+    again = st.export(zoo.model("m2_n2"), "fmu", tmp_path / "again.fmu")
+    assert again.read_bytes() == fmu("m2_n2").read_bytes()
+    with zipfile.ZipFile(again) as archive:
+        assert {"binaries/linux64/m2_n2.so", "modelDescription.xml"} <= set(archive.namelist())
+    # baked parameters are no variables
+    described = fmpy.read_model_description(str(fmu("baked")))
+    assert not [each for each in described.modelVariables if each.causality == "parameter"]
+    rows = fmpy.simulate_fmu(str(fmu("baked")), stop_time=0.1, output_interval=0.1, output=["v[3]"])
+    assert rows["v[3]"][-1] == pytest.approx(-0.98, rel=1e-9)
 
 
-def test_its_files_are_the_same_twice(model, path, tmp_path):
-    again = st.export(model, "fmu", tmp_path / "again.fmu")
-    assert again.read_bytes() == path.read_bytes()
-    with zipfile.ZipFile(path) as archive:
-        files = archive.namelist()
-    assert f"binaries/linux64/{model.name}.so" in files and "modelDescription.xml" in files
+# On the ground.
+
+
+def legs_of(model):
+    """The argument of functions that know of legs."""
+    return (LEGS,) if "feet" in model.contacts else ()
+
+
+def landing(model):
+    """A motion that begins 4 mm above the ground, while the legs stretch."""
+    q, v = np.zeros(model.nq), np.zeros(model.nv)
+    q[3:7] = np.array([1, 0.05, 0, 0]) / np.hypot(1, 0.05)
+    q[7::2], v[2], v[4] = (-0.2 if legs_of(model) else 0.2), -0.3, 1.0
+    q[2] = 0.004 - model.contact_points(q, v, *legs_of(model))[0][:, 2].min()
+    held = {}
+    if legs_of(model):
+        ends = np.array([LEGS[:4], LEGS[:4] + LEGS[4:]])
+        held["legs"] = st.Legs([0, 1], ends[:, 0::2], ends[:, 1::2])
+    settings = {"t_span": SPAN, "output_step": STEP, "method": "tsit5", "rtol": 1e-10}
+    return st.simulate(model, q, v, **settings, **held)
+
+
+def start_values(model, run):
+    """The start of a motion, and what moves the legs."""
+    values = {"q": run.q[0], "v": run.v[0], "legs": LEGS if legs_of(model) else []}
+    return {f"{name}[{k + 1}]": x for name, row in values.items() for k, x in enumerate(row)}
+
+
+def landed(kind, model, path, run, **more):
+    """Rows that FMPy finds; the legs' angles are straight lines."""
+    moves = None
+    if legs_of(model):
+        columns = [("time", float), *((f"legs[{k + 1}]", float) for k in range(8))]
+        end = LEGS + np.append(SPAN * LEGS[4:], np.zeros(4))
+        moves = np.array([(0.0, *LEGS), (SPAN, *end)], columns)
+    return fmpy.simulate_fmu(
+        str(path),
+        fmi_type=kind,
+        start_values=start_values(model, run),
+        input=moves,
+        stop_time=SPAN,
+        output_interval=STEP,
+        relative_tolerance=1e-8,
+        output=names(model),
+        **more,
+    )
+
+
+def check_landing(model, path):
+    """Compare a unit's landing with its model's, by either interface."""
+    assert validate_fmu(str(path)) == []
+    run = landing(model)
+    first = run.info["events"][0]
+    assert first["group"] == next(iter(model.contacts))
+    assert np.abs(run.contact.forces).max() > 0.1  # N: it has landed
+    bristles = run.contact.bristles.reshape(len(run.t), -1)
+    expected = np.split(np.hstack([run.q, run.v, bristles]), [model.nq, model.nq + model.nv], 1)
+    limits = (5e-6, 1e-4 * np.abs(run.v).max(), 1e-7)  # of q, v (m/s, rad/s), bristles (m)
+    exchange = {"solver": "CVode", "record_events": False}
+    for kind, more in (("CoSimulation", {}), ("ModelExchange", exchange)):
+        rows = landed(kind, model, path, run, **more)
+        assert rows["time"] == pytest.approx(run.t)
+        flown = np.array([rows[name] for name in names(model)]).T
+        parts = np.split(flown, [model.nq, model.nq + model.nv], 1)
+        for part, wanted, most in zip(parts, expected, limits, strict=True):
+            assert np.abs(part - wanted).max() < most, kind
+    # model exchange stops where a point comes to the ground
+    rows = landed("ModelExchange", model, path, run, solver="CVode")
+    assert np.abs(rows["time"] - first["time"]).min() < 1e-6
+    assert np.abs(run.t - first["time"]).min() > 1e-5  # where no sample is
+
+
+def test_it_lands_as_the_model_does(fmu):
+    check_landing(zoo.model("ground"), fmu("ground"))
+
+
+@pytest.mark.slow
+def test_a_tail_without_feet_and_implicit_method_lands_as_the_model_does(tmp_path):
+    # each model of the zoo that touches the ground has feet and an implicit method
+    functions = ["contact_dynamics", "contact_points", "rollout", "energy", "momentum"]
+    model = st.load(model_folder(2, None, contacts=["tail"], functions=functions))
+    check_landing(model, st.export(model, "fmu", tmp_path / "tail.fmu"))
+
+
+def test_event_indicators_are_heights_and_the_start_is_clear(fmu, opened):
+    path, model = fmu("ground"), zoo.model("ground")
+    unit, references = opened(path, FMU2Model)
+    described, count = fmpy.read_model_description(str(path)), sum(model.contacts.values())
+    assert described.numberOfEventIndicators == count
+    heights = np.zeros(count)
+    place = heights.ctypes.data_as(fmpy.fmi2.POINTER(fmpy.fmi2.c_double))
+    unit.getEventIndicators(place, count)
+    assert (heights > 0).all()
+    run = landing(model)
+    put(unit, references, start_values(model, run))
+    unit.getEventIndicators(place, count)
+    points, _ = model.contact_points(run.q[0], run.v[0], LEGS)
+    np.testing.assert_allclose(heights, points[:, 2], atol=1e-12)
+    # it has no directional derivatives
+    assert not described.modelExchange.providesDirectionalDerivative
+    with pytest.raises(fmpy.fmi1.FMICallException):
+        unit.getDirectionalDerivative([0], [0], [1.0])

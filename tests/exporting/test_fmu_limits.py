@@ -4,46 +4,62 @@ import ctypes
 import re
 import subprocess
 import zipfile
-from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree as Xml
 
-import fmpy
 import pytest
-from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import FMU2Model, FMU2Slave
 
 import serpentail as st
-from serpentail_codegen.scene.parse import scene_for
-from tests.exporting.sources import compiled
-from tests.support.models import folder_of, model_folder
+from serpentail.exporting.fmu import NATIVE
+from tests.support import zoo
+from tests.support.models import model_folder
+from tests.support.rows import row
 
-FUNCTIONS = ["forward_dynamics", "forward_dynamics_derivatives", "rollout"]
 DISCARD, ERROR = 2, 3
+FLYING = ["forward_dynamics", "forward_dynamics_derivatives", "rollout"]
 
 
-@pytest.fixture(scope="module")
-def path(tmp_path_factory):
-    model = st.load(model_folder(1, 2, functions=FUNCTIONS))
-    return st.export(model, "fmu", tmp_path_factory.mktemp("fmu") / "rat.fmu")
+def test_what_no_fmu_can_be_of(tmp_path):
+    # no model of the zoo lacks C
+    casadi = st.load(model_folder(1, 1, functions=FLYING, targets=["casadi"]), compiled=False)
+    for model, error, words in (
+        (zoo.model("fixed"), st.ExportError, "base: value 'fixed' of fixed"),
+        (zoo.model("polar"), st.ExportError, "coordinates: value 'polar' of polar.*bend"),
+        (zoo.model("single"), st.ExportError, "real: value 'float' of single.*double"),
+        (zoo.model("bare"), st.ModelError, "'forward_dynamics_derivatives'.*'rollout'.*functions"),
+        (casadi, st.ModelError, '"c".*targets'),
+    ):
+        with row(model.name), pytest.raises(error, match=words):
+            st.export(model, "fmu", tmp_path / "x.fmu")
+    assert list(tmp_path.iterdir()) == []
 
 
-@pytest.fixture(scope="module")
-def unzipped(path, tmp_path_factory):
-    return fmpy.extract(str(path), str(tmp_path_factory.mktemp("unzipped")))
+def test_sources_have_names_that_no_model_has_and_all_are_described(fmu):
+    assert all("-" in path.name for path in NATIVE.iterdir())
+    with zipfile.ZipFile(fmu("m1_n1")) as archive:
+        there = {Path(name).name for name in archive.namelist() if name.endswith(".c")}
+        described = Xml.fromstring(archive.read("modelDescription.xml"))
+    for kind in ("ModelExchange", "CoSimulation"):
+        files = described.findall(f"{kind}/SourceFiles/File")
+        assert {each.get("name") for each in files} == there
 
 
 @pytest.fixture
-def unit(path, unzipped):
+def unit(fmu, tmp_path):
     """Return a unit of a kind by its interface, as made, and what it tells."""
-    guid = fmpy.read_model_description(str(path)).guid
+    fmpy = pytest.importorskip("fmpy")
+    path = str(fmu("m1_n1"))
+    guid, folder = (
+        fmpy.read_model_description(path).guid,
+        fmpy.extract(path, str(tmp_path / "unit")),
+    )
 
     def made(kind, guid=guid):
         told = []
-        found = kind(
+        found = getattr(fmpy.fmi2, kind)(
             guid=guid,
-            unzipDirectory=unzipped,
-            modelIdentifier="articulated_m1_n2",
+            unzipDirectory=folder,
+            modelIdentifier="m1_n1",
             instanceName="rat",
         )
         callbacks = fmpy.fmi2.fmi2CallbackFunctions()
@@ -60,103 +76,51 @@ def unit(path, unzipped):
     return made
 
 
-@pytest.mark.parametrize(
-    ("size", "options", "words"),
-    [
-        ((1, None), {"coordinates": "polar"}, "coordinates: value 'polar' of .* give \"bend\" to"),
-        ((1, 2), {"real": "float"}, "real: value 'float' of .* give \"double\" to the scene"),
-    ],
-)
-def test_what_no_fmu_can_be_of(size, options, words, tmp_path):
-    model = st.load(model_folder(*size, **options), compiled=False)
-    with pytest.raises(st.ExportError, match=words):
-        st.export(model, "fmu", tmp_path / "x.fmu")
-    assert list(tmp_path.iterdir()) == []
+def status_of(call, *arguments):
+    """The status that a call is refused with."""
+    from fmpy.fmi1 import FMICallException
 
-
-@pytest.mark.parametrize("absent", FUNCTIONS)
-def test_a_function_that_it_needs(absent, tmp_path):
-    has = ["energy"] if absent == "forward_dynamics" else [f for f in FUNCTIONS if f != absent]
-    model = st.load(model_folder(1, 2, functions=has), compiled=False)
-    with pytest.raises(st.ModelError, match=rf"without .*'{absent}'.*add it to `functions`"):
-        st.export(model, "fmu", tmp_path / "x.fmu")
-
-
-def test_a_model_without_c(tmp_path):
-    model = st.load(model_folder(1, 2, targets=["casadi"]), compiled=False)
-    with pytest.raises(st.ModelError, match=r'add "c" to `targets`'):
-        st.export(model, "fmu", tmp_path / "x.fmu")
-
-
-def test_baked_parameters_are_no_variables(tmp_path):
-    model = st.load(model_folder(1, 2, functions=FUNCTIONS, baked=True))
-    path = st.export(model, "fmu", tmp_path / "x.fmu")
-    described = fmpy.read_model_description(str(path))
-    assert not [each for each in described.modelVariables if each.causality == "parameter"]
-    rows = fmpy.simulate_fmu(str(path), stop_time=0.1, output_interval=0.1, output=["v[3]"])
-    assert rows["v[3]"][-1] == pytest.approx(-0.98, rel=1e-9)
-
-
-@pytest.mark.parametrize("name", ["model", "fmu", "unit"])
-def test_no_name_of_a_model_is_that_of_a_source(name, tmp_path):
-    scene = replace(scene_for("articulated", 1, 2, functions=FUNCTIONS), name=name)
-    model = st.load(folder_of(scene))
-    rows = fmpy.simulate_fmu(
-        str(st.export(model, "fmu", tmp_path / "x.fmu")), stop_time=0.1, output=["v[3]"]
-    )
-    assert rows["v[3]"][-1] == pytest.approx(-0.98, rel=1e-9)
-
-
-def test_another_guid_is_refused(unit):
-    with pytest.raises(Exception, match="Failed to instantiate"):
-        unit(FMU2Model, guid="0")
-
-
-def test_a_state_without_accelerations_is_discarded_and_told(unit):
-    one, told = unit(FMU2Model)
-    one.setReal([3, 4, 5, 6], [0.0, 0.0, 0.0, 0.0])
     with pytest.raises(FMICallException) as refused:
-        one.getReal([30])
-    assert refused.value.status == DISCARD
+        call(*arguments)
+    return refused.value.status
+
+
+def test_calls_that_make_no_sense_are_refused_and_told(unit):
+    with pytest.raises(Exception, match="Failed to instantiate"):
+        unit("FMU2Model", guid="0")
+    one, told = unit("FMU2Model")
+    for call, *arguments in (
+        (one.getReal, [10**6]),
+        (one.setReal, [20], [0.0]),
+        (one.setReal, [10**6], [0.0]),
+        (one.getInteger, [0]),
+        (one.setBoolean, [0], [1]),
+        (one.getDirectionalDerivative, [17], [10**6], [1.0]),
+        (one.getDirectionalDerivative, [10**6], [0], [1.0]),
+        (one.getDirectionalDerivative, [17], [20], [1.0]),
+    ):
+        with row(call.__name__, *arguments):
+            told.clear()
+            assert status_of(call, *arguments) == ERROR
+            assert "needs" in told[0] or "Real" in told[0]
+    # a state without accelerations is discarded
+    told.clear()
+    one.setReal([3, 4, 5, 6], [0.0, 0.0, 0.0, 0.0])
+    assert status_of(one.getReal, [30]) == DISCARD
     assert "no accelerations" in told[0]
-    with pytest.raises(FMICallException):
-        one.getDirectionalDerivative([20], [0], [1.0])
+    status_of(one.getDirectionalDerivative, [20], [0], [1.0])
     one.setReal([3], [1.0])
     assert one.getReal([28]) == pytest.approx([-9.8], rel=1e-12)
     one.freeInstance()
 
 
-@pytest.mark.parametrize(
-    "call",
-    [
-        lambda one: one.getReal([10**6]),
-        lambda one: one.setReal([20], [0.0]),
-        lambda one: one.setReal([10**6], [0.0]),
-        lambda one: one.getInteger([0]),
-        lambda one: one.setBoolean([0], [1]),
-        lambda one: one.getDirectionalDerivative([17], [10**6], [1.0]),
-        lambda one: one.getDirectionalDerivative([10**6], [0], [1.0]),
-        lambda one: one.getDirectionalDerivative([17], [20], [1.0]),
-    ],
-)
-def test_wrong_references_are_refused_and_told(unit, call):
-    one, told = unit(FMU2Model)
-    with pytest.raises(FMICallException) as refused:
-        call(one)
-    assert refused.value.status == ERROR
-    assert "needs" in told[0] or "Real" in told[0]
-    one.freeInstance()
-
-
 def test_a_step_that_cannot_be_made_leaves_the_state(unit):
-    one, told = unit(FMU2Slave)
+    one, told = unit("FMU2Slave")
     references = list(range(17))
     before = one.getReal(references)
     one.setReal([34], [1e300])
     for step in (0.1, 0.0, -1.0, float("nan")):
-        with pytest.raises(FMICallException) as refused:
-            one.doStep(0.0, step)
-        assert refused.value.status == ERROR
+        assert status_of(one.doStep, 0.0, step) == ERROR
     assert "the motion cannot go on" in told[0] and "communicationStepSize" in told[1]
     assert one.getReal(references) == before
     one.setReal([34], [0.0])
@@ -167,31 +131,36 @@ def test_a_step_that_cannot_be_made_leaves_the_state(unit):
     one.freeInstance()
 
 
-def test_sources_compile_without_a_warning_also_with_a_prefix(unzipped, tmp_path):
-    library = ctypes.CDLL(str(compiled(unzipped, tmp_path, "-DFMI2_FUNCTION_PREFIX=rat_")))
-    library.rat_fmi2GetVersion.restype = ctypes.c_char_p
-    assert library.rat_fmi2GetVersion() == b"2.0"
+def shown(library):
+    """The functions that a library shows."""
+    command = ["nm", "-D", "--defined-only", str(library)]
+    listed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    return set(re.findall(r" T (\w+)", listed))
 
 
-def test_the_library_shows_the_interface_alone(unzipped, tmp_path):
-    """Several units in one process share no function; those of the standard are all there."""
-    for library in (
-        compiled(unzipped, tmp_path),
-        f"{unzipped}/binaries/linux64/articulated_m1_n2.so",
-    ):
-        listed = subprocess.run(
-            ["nm", "-D", "--defined-only", str(library)], capture_output=True, text=True, check=True
-        ).stdout
-        shown = set(re.findall(r" T (\w+)", listed))
-        asked = {name for name in dir(FMU2Model) + dir(FMU2Slave) if name.startswith("fmi2")}
-        assert shown and all(name.startswith("fmi2") for name in shown)
-        assert len(shown) == 44 and asked <= shown
+def test_libraries_show_the_interface_alone_and_sources_compile_without_a_warning(fmu, tmp_path):
+    """Several units in one process share no function; with a prefix the names have it."""
+    with zipfile.ZipFile(fmu("ground_m1_n1")) as archive:
+        archive.extractall(tmp_path)
+    own = shown(tmp_path / "binaries" / "linux64" / "ground_m1_n1.so")
+    assert len(own) == 44 and all(name.startswith("fmi2") for name in own)
+    library = tmp_path / "unit.so"
+    strict = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-fPIC", "-shared"]
+    options = ["-fvisibility=hidden", "-DFMI2_FUNCTION_PREFIX=rat_", "-o", library, "-lm"]
+    sources = sorted((tmp_path / "sources").glob("*.c"))
+    command = list(map(str, ["cc", *strict, *sources, *options]))
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert shown(library) == {f"rat_{name}" for name in own}
+    read = ctypes.CDLL(str(library))
+    read.rat_fmi2GetVersion.restype = ctypes.c_char_p
+    assert read.rat_fmi2GetVersion() == b"2.0"
 
 
-def test_the_description_names_all_that_is_compiled(path):
-    with zipfile.ZipFile(path) as archive:
-        there = {Path(name).name for name in archive.namelist() if name.endswith(".c")}
-        described = Xml.fromstring(archive.read("modelDescription.xml"))
-    for kind in ("ModelExchange", "CoSimulation"):
-        files = described.findall(f"{kind}/SourceFiles/File")
-        assert {each.get("name") for each in files} == there
+def test_libraries_show_all_that_fmpy_asks_for(fmu, tmp_path):
+    fmi2 = pytest.importorskip("fmpy.fmi2")
+    with zipfile.ZipFile(fmu("m1_n1")) as archive:
+        archive.extractall(tmp_path)
+    asked = dir(fmi2.FMU2Model) + dir(fmi2.FMU2Slave)
+    own = shown(tmp_path / "binaries" / "linux64" / "m1_n1.so")
+    assert {name for name in asked if name.startswith("fmi2")} <= own

@@ -10,6 +10,9 @@ import pytest
 from tests.docs.blocks import PAGES
 from tests.docs.running import run_page
 
+pytest.importorskip("fmpy")
+pytestmark = pytest.mark.slow  # it compiles and links as a user does
+
 
 @pytest.fixture(scope="module")
 def ran(tmp_path_factory):

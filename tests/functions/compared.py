@@ -1,25 +1,35 @@
 """Models whose derivatives are compared, and what an error of them may be."""
 
 import inspect
+from functools import cache
 
 import pytest
 
 from tests.references.metrics import equilibrated_condition
-from tests.support.derivative_models import tail_name
+from tests.support import zoo
 
-QUICK = [(1, 3, "straight"), (2, 2, "loops"), (2, None, "loops"), (3, 2, "segments")]
-SLOW = [(1, 3, "loops"), (2, 2, "straight"), (3, 4, "straight"), (3, 4, "loops")]
-SLOW += [(6, 6, "loops"), (8, 16, "loops"), (1, 3, "segments"), (8, 16, "segments")]
-SLOW += [(1, None, "straight"), (1, None, "loops"), (2, None, "straight"), (3, None, "loops")]
+QUICK = ["m1_n3", "segments", "arcs2_loops"]
+SLOW = ["straight", "loops", "lanes", "m3_n4", "arcs1", "arcs3", "own_links", "own_arcs", "mixed"]
 ROUNDING = 1e-12  # largest error of a block, relative
 SOLVED = 1e-13  # the same for each unit of the condition number, where H is solved with
 
 
-PARAMS = [
-    pytest.param(size, marks=marks, id=tail_name(size))
-    for sizes, marks in [(QUICK, []), (SLOW, [pytest.mark.slow])]
-    for size in sizes
-]
+def marked(more=(), quick=()):
+    """Names of models as parameters of a test; most of them are slow."""
+    return [
+        pytest.param(name, marks=() if name in (*QUICK, *quick) else pytest.mark.slow)
+        for name in (*QUICK, *SLOW, *more)
+    ]
+
+
+every_free = pytest.mark.parametrize("name", marked())
+
+
+@cache
+def model_of(name):
+    """A model; the stops of a passive tail stiffen on so long a way that states are on it."""
+    model = zoo.model(name)
+    return model.with_parameters(tail_stop_width=1.0) if "elastic" in name else model
 
 
 def called(model, name, state):

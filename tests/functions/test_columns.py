@@ -1,22 +1,28 @@
-"""Sweeps in lanes and eliminations written out: they mean what the plain programs mean."""
+"""Sweeps in lanes, by segments and by doubling, and eliminations written out: they mean what the
+plain programs mean, and are chosen where they are faster.
+"""
 
+from types import SimpleNamespace
+
+import mpmath
 import numpy as np
 import pytest
 
-import serpentail as st
 from serpentail_codegen.functions.catalogue import CATALOGUE
 from serpentail_codegen.functions.function import assemble
-from serpentail_codegen.functions.plain import FUNCTIONS
+from serpentail_codegen.functions.sweeps.doubling import is_doubled
 from serpentail_codegen.functions.tail import Tail
-from serpentail_codegen.ir.builder import Builder
+from serpentail_codegen.ir.dataflow import inlined
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.ir.ldl import ldl_factor, ldl_solve
-from serpentail_codegen.ir.program import Factor, Solve, padded, statements
+from serpentail_codegen.ir.program import Factor, Solve, statements
 from serpentail_codegen.passes.unrolled_ldl import unrolled_ldl
-from tests.references.parameters import random_states
-from tests.support.models import model_folder
+from serpentail_codegen.targets.c.form import RULE, fastest
+from tests.support import zoo
+from tests.support.rows import row
 
-SIZES = [(1, 1), (1, 3), (2, 1), (2, 3), (4, 2), (7, 1)]
+FUNCTION = "forward_dynamics"
+SIZES = [(1, 1), (1, 3), (2, 1), (2, 3), (4, 2), (7, 1), (9, 1)]
 
 
 def arguments(program, seed=0):
@@ -32,92 +38,120 @@ def outputs(program, given):
     return {a.name: np.array(values[a.name], float) for a in program.of_role("output")}
 
 
-def assert_same_acceleration(size, name, dynamics):
-    """Other dynamics are another program, and mean what H column by column means."""
-    plain, other = (
-        assemble(FUNCTIONS[name], Tail(*size), each) for each in ("composite", dynamics)
-    )
+def assert_same(name, tail, form, limit):
+    """A form is another program, and means what H column by column means."""
+    plain, other = (assemble(CATALOGUE[name], tail, each) for each in ("composite", form))
     assert plain != other
     given = arguments(plain)
-    expected, found = outputs(plain, given)["v_dot"], outputs(other, given)["v_dot"]
-    assert np.abs(found - expected).max() <= 1e-12 * np.abs(expected).max()
+    if tail.contacts:
+        given["q"][2] = 0.02
+    found = outputs(other, given)
+    for key, expected in outputs(plain, given).items():
+        with row(name, tail, key):
+            assert np.abs(expected).max() > 0
+            assert np.abs(found[key] - expected).max() <= limit * np.abs(expected).max()
 
 
-@pytest.mark.parametrize("size", SIZES)
-@pytest.mark.parametrize("name", ["forward_dynamics", "forward_dynamics_external"])
-def test_sweeps_in_lanes_give_the_same_acceleration(size, name):
-    assert_same_acceleration(size, name, "lanes")
+@pytest.mark.parametrize("form", ["lanes", "segments"])
+def test_other_forms_give_the_same(form):
+    for size in SIZES:
+        for name in (FUNCTION, "forward_dynamics_external"):
+            assert_same(name, Tail(*size), form, 1e-12)
+    assert_same("forward_dynamics_derivatives", Tail(3, 4), form, 1e-9)
+    assert_same("contact_dynamics", Tail(3, 2, contacts=("tail", "torso")), form, 1e-10)
 
 
-@pytest.mark.parametrize("rows", [1, 2, 5, 9, 12])
-@pytest.mark.parametrize("wide", [0, 3])
-def test_an_elimination_written_out_solves(rows, wide):
-    rng = np.random.default_rng(rows)
-    half = rng.normal(size=(rows, rows))
-    matrix, b = half @ half.T + rows * np.eye(rows), rng.normal(size=(rows, wide or 1))
-    d = Builder("solve", "Solve.")
-    A, given = d.array("A", padded(rows), rows), d.array("given", padded(rows), rows, role="input")
-    x = d.wide("x", rows, wide) if wide else d.array("x", rows)
-    right, out = (
-        d.array("b", rows, role="input"),
-        d.array("out", rows * max(wide, 1), role="output"),
-    )
-    d.copy(A.part(0, A.length), given.part(0, given.length))
-    if wide:
-        rights = [d.array(f"b{k}", rows, role="input") for k in range(wide)]
-        at = d.wide("at", wide, wide)
-        d.unit(at.part(0, wide), 0)
-        spread = _spread(rows, wide)
-        d.apply(
-            spread,
-            {f"b{k}": rights[k][0] for k in range(wide)}
-            | {f"at{k}": at.part(k, 1) for k in range(wide)},
-            x=x[0],
-        )
-    else:
-        d.copy(x[0], right[0])
-    d.factor(A, rows)
-    d.solve(A, x[0])
-    for k in range(rows):
-        for lane in range(max(wide, 1)):
-            d.copy(out.part(k * max(wide, 1) + lane, 1), x.lane(k, lane) if wide else x.part(k, 1))
-    whole = d.finish()
-    flat = np.zeros((rows, padded(rows)))
-    flat[:, :rows] = matrix
-    values = {"given": flat.ravel().tolist(), "b": b[:, 0].tolist()} | {
-        f"b{k}": b[:, k].tolist() for k in range(wide)
+def test_derivatives_by_segments_are_those_of_long_segments_too():
+    assert_same("forward_dynamics_derivatives", Tail(1, 96), "segments", 1e-11)
+
+
+def test_functions_without_a_form_have_another():
+    """What needs the matrix goes in lanes, and a continuum has one form of dynamics."""
+    for name in ("forward_dynamics_jvp", "mass_matrix", "pfl"):
+        segments, lanes = (assemble(CATALOGUE[name], Tail(3, 2), x) for x in ("segments", "lanes"))
+        assert segments == lanes, name
+    arcs = Tail(3, 2, "continuum")
+    for name in (FUNCTION, "mass_matrix"):
+        assert assemble(CATALOGUE[name], arcs, "segments") == assemble(CATALOGUE[name], arcs), name
+
+
+def signs(segments, **changed):
+    """Which pivots are positive: two of each segment from the last one on, then six of the
+    torso.
+    """
+    found = Run(segments, Numbers(np), arguments(segments) | changed).guards
+    assert [status for status, _ in found] == ["NOT_POSITIVE_DEFINITE"] * 12
+    return [value > 0 for _, value in found]
+
+
+def test_every_pivot_is_guarded():
+    segments = assemble(CATALOGUE[FUNCTION], Tail(3, 2), "segments")
+    assert all(signs(segments))
+    heavy = signs(segments, torso_mass=[-1e3])
+    assert heavy[:6] == [True] * 6 and not all(heavy)
+    assert signs(segments, tail_mass=[-1.0], link_inertia=[-1.0] * 3)[:2] == [False] * 2
+
+
+# ---- doubling ------------------------------------------------------------------------------------
+
+
+def in_digits(program, given, digits=40):
+    """v_dot of a run in that many digits, of numbers and of arrays of them."""
+    context = mpmath.mp.clone()
+    context.dps = digits
+    exact = {name: [context.mpf(x) for x in values] for name, values in given.items()}
+    names = ("sin", "cos", "sqrt")
+    functions = {name: np.frompyfunc(getattr(context, name), 1, 1) for name in names}
+    numbers = Numbers(SimpleNamespace(**functions), context.mpf)
+    return Run(program, numbers, exact).values["v_dot"]
+
+
+@pytest.mark.parametrize("size", [(1, 128), (1, 171), (2, 96)], ids=str)
+def test_chains_of_links_mean_what_links_mean_to_40_digits(size):
+    tail = Tail(*size)
+    plain, doubled = (assemble(CATALOGUE[FUNCTION], tail, form) for form in ("lanes", "segments"))
+    assert is_doubled(tail) and plain != doubled
+    given = arguments(plain)
+    for bend in (0.0, 0.05, 1.3):
+        given["q"][7:] = [bend, -bend / 3, bend / 2, bend][: 2 * tail.segments]
+        expected, found = (in_digits(program, given) for program in (plain, doubled))
+        error = max(abs(x - y) for x, y in zip(found, expected, strict=True))
+        assert error <= 1e-30 * max(abs(x) for x in expected), bend
+
+
+# ---- choices -------------------------------------------------------------------------------------
+
+
+def test_forms_are_chosen_where_they_are_faster():
+    doubled = [(1, 96), (1, 127), (2, 96), (8, 256)]
+    for size in (*doubled, (1, 32), (1, 95), (2, 64), (8, 64)):
+        assert is_doubled(Tail(*size)) == (size in doubled), size
+    table = {
+        "straight": [(1, 9), (3, 2), (4, 1)],
+        "lanes": [(1, 10), (1, 64), (2, 15), (3, 4), (4, 3), (7, 1)],
+        "segments": [(1, 96), (2, 16), (4, 4), (8, 1)],  # (1, 96) is doubled
     }
-    straight = unrolled_ldl(whole, 12)
-    assert not any(isinstance(s, Factor | Solve) for s, _ in statements(straight.body))
-    for p in (whole, straight):
-        np.testing.assert_allclose(
-            outputs(p, values)["out"].reshape(rows, -1), np.linalg.solve(matrix, b), rtol=1e-11
-        )
-    assert outputs(whole, values)["out"].tolist() == outputs(straight, values)["out"].tolist()
-    values["given"][0] = -1.0
-    assert min(float(np.min(x)) for _, x in Run(straight, Numbers(np), values).guards) < 0
+    for form, sizes in table.items():
+        for size in sizes:
+            with row(form, size):
+                assert fastest(CATALOGUE[FUNCTION], Tail(*size))[0] == form
+    assert {2 * m * m * n for m, n in table["segments"][1:]} == {RULE["segments_from"]}
+    for size, form in (((1, 64), "lanes"), ((3, 4), "lanes"), ((4, 4), "segments")):
+        assert fastest(CATALOGUE["forward_dynamics_derivatives"], Tail(*size))[0] == form, size
+    assert fastest(CATALOGUE["mass_matrix"], Tail(1, 96))[0] == "loops"
 
 
-def _spread(rows, wide):
-    """The step that puts columns into lanes."""
-    from serpentail_codegen.ir.step import Step
-    from serpentail_codegen.ir.tape import Tape
-
-    tape, results = Tape(), []
-    columns = [[tape.input(c * rows + k) for k in range(rows)] for c in range(wide)]
-    at = [tape.input(wide * rows + c) for c in range(wide)]
-    for k in range(rows):
-        total = tape.const(0)
-        for c in range(wide):
-            total = tape.add(total, tape.mul(at[c], columns[c][k]))
-        results.append(total)
-    inputs = (*((f"b{c}", rows) for c in range(wide)), *((f"at{c}", 1) for c in range(wide)))
-    return Step("spread", "Spread.", inputs, (("x", rows),), tuple(tape.nodes), tuple(results))
+def test_the_manifest_tells_forms_and_the_rule_that_chose_them():
+    for name in ("m1_n3", "m3_n4", "straight", "loops", "lanes", "segments"):
+        manifest, auto = zoo.model(name).manifest, name.startswith("m")
+        form = {"m1_n3": "straight", "m3_n4": "lanes"}.get(name, name)
+        with row(name):
+            assert manifest["functions"][FUNCTION]["emission"] == form
+            assert manifest["functions"]["energy"]["emission"] in ("straight", "loops")
+            assert manifest.get("forms") == (RULE if auto else None)
 
 
-def test_matrices_beyond_the_limit_keep_their_loops():
-    long = assemble(FUNCTIONS["forward_dynamics"], Tail(7, 1), "lanes")
-    assert unrolled_ldl(long, 12) == long
+# ---- eliminations --------------------------------------------------------------------------------
 
 
 def test_factor_and_solve_invert():
@@ -125,41 +159,29 @@ def test_factor_and_solve_invert():
     half = rng.normal(size=(6, 6))
     matrix, b = half @ half.T + np.eye(6), rng.normal(size=6)
     factored, pivots = ldl_factor(Numbers(np), [list(matrix[k, : k + 1]) for k in range(6)])
-    np.testing.assert_allclose(
-        ldl_solve(Numbers(np), factored, list(b)), np.linalg.solve(matrix, b), rtol=1e-10
-    )
+    found = ldl_solve(Numbers(np), factored, list(b))
+    np.testing.assert_allclose(found, np.linalg.solve(matrix, b), rtol=1e-10)
     assert np.prod(np.array(pivots)) == pytest.approx(np.linalg.det(matrix), rel=1e-10)
 
 
-@pytest.mark.parametrize("size", [(2, 4), (3, 4), pytest.param((7, 3), marks=pytest.mark.slow)])
-def test_long_tails_run_in_lanes_and_agree_with_loops(size):
-    names = ["forward_dynamics", "mass_matrix", "bias_force"]
-    fast, plain = (
-        st.load(model_folder(*size, functions=names, emission=e)) for e in ("lanes", "loops")
-    )
-    text = (fast.folder / "src" / f"{fast.name}.c").read_text()
-    assert (
-        "gather_lanes" in text
-        and "gather_lanes" not in (plain.folder / "src" / f"{plain.name}.c").read_text()
-    )
-    for q, v, *_ in zip(*random_states(size[0], 1, 5, "random"), strict=True):
-        tau = 0.01 * v[6:]
-        H, found = plain.mass_matrix(q), fast.forward_dynamics(q, v, tau)
-        force = np.concatenate([np.zeros(6), tau]) - plain.bias_force(q, v)
-        scale = np.sqrt(np.diag(H))
-        bound = 5e-15 * np.linalg.cond(H / np.outer(scale, scale))
-        expected = plain.forward_dynamics(q, v, tau)
-        assert np.abs(found - expected).max() <= 20 * bound * np.abs(expected).max()
-        assert np.abs(H @ found - force).max() <= 1e-9 * np.abs(force).max()
-
-
-def test_the_fast_form_serves_derivatives_too():
-    tail = Tail(3, 4)
-    name = "forward_dynamics_derivatives"
-    plain, lanes = (
-        assemble(CATALOGUE[name], tail, dynamics) for dynamics in ("composite", "lanes")
-    )
-    given = arguments(plain)
-    expected, found = outputs(plain, given), outputs(lanes, given)
-    for key, value in expected.items():
-        assert np.abs(found[key] - value).max() <= 1e-9 * np.abs(value).max()
+def test_eliminations_written_out_are_the_same():
+    """Bit for bit, of one right-hand side and of several side by side; pivots are guarded."""
+    for size in ((1, 1), (2, 1), (3, 2), (4, 1)):
+        for name in (FUNCTION, "forward_dynamics_derivatives", "pfl"):
+            whole = inlined(assemble(CATALOGUE[name], Tail(*size), "lanes"))
+            largest = max(s.size for s, _ in statements(whole.body) if isinstance(s, Factor))
+            straight, given = unrolled_ldl(whole, largest), arguments(whole)
+            with row(name, size):
+                beyond = unrolled_ldl(whole, largest - 1)  # larger matrices keep their loops
+                assert any(isinstance(s, Factor) for s, _ in statements(beyond.body))
+                assert any(isinstance(s, Solve) for s, _ in statements(beyond.body))
+                assert not any(isinstance(s, Factor | Solve) for s, _ in statements(straight.body))
+                found = outputs(straight, given)
+                for key, expected in outputs(whole, given).items():
+                    np.testing.assert_array_equal(found[key], expected)
+                wrong = given | {"torso_inertia": [-1e3] * 3}
+                pivots, same = (
+                    [float(np.min(x)) for _, x in Run(p, Numbers(np), wrong).guards]
+                    for p in (whole, straight)
+                )
+                assert min(pivots) < 0 and min(same) < 0

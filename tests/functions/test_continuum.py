@@ -4,21 +4,22 @@ polar angles.
 
 import subprocess
 
+import casadi
 import numpy as np
 import pytest
 
 import serpentail as st
+from tests.references.body_set import MP, Animal, Arc, moved
+from tests.references.body_set import exact as exact_numbers
 from tests.references.exact_continuum import ExactContinuum
 from tests.references.metrics import block_error, equilibrated_condition, mass_matrix_error
 from tests.references.parameters import TABLE_1
+from tests.support import zoo
 from tests.support.models import model_folder
+from tests.support.rows import row
 
 BENDS = (0.0, 1e-300, 1e-16, 1e-8, 1e-4, 1e-2, 0.5, 2.0, np.pi, 5.0, 2 * np.pi)
-
-
-@pytest.fixture(scope="module")
-def model():
-    return st.load(model_folder(1, None))
+SHIFT = MP.mpf(10) ** -7
 
 
 @pytest.fixture(scope="module")
@@ -26,78 +27,116 @@ def exact():
     return ExactContinuum(dict(TABLE_1), 1)
 
 
-def bent(theta, seed=0):
+def bent(theta):
     """A state whose one segment is bent by theta in a random plane."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     q, v, phi = rng.normal(size=9), 10 * rng.normal(size=8), rng.uniform(0, 2 * np.pi)
     q[3:7] /= np.linalg.norm(q[3:7])
     q[7:] = theta * np.cos(phi), theta * np.sin(phi)
     return q, v, 1e-3 * rng.normal(size=2)
 
 
-@pytest.mark.parametrize("theta", BENDS)
-def test_every_bend_is_right_to_rounding(model, exact, theta):
-    q, v, tau = bent(theta)
-    H = exact.mass_matrix(q)
-    assert mass_matrix_error(model.mass_matrix(q), H) <= 1e-14
-    assert block_error(model.bias_force(q, v), exact.bias_force(q, v)) <= 2e-14
-    error = block_error(model.forward_dynamics(q, v, tau), exact.forward_dynamics(q, v, tau))
-    assert error <= 5e-15 * equilibrated_condition(H)
+def test_every_bend_is_right_to_rounding(exact):
+    model = zoo.model("arcs1")
+    for theta in BENDS:
+        q, v, tau = bent(theta)
+        H = exact.mass_matrix(q)
+        with row(theta):
+            assert mass_matrix_error(model.mass_matrix(q), H) <= 1e-14
+            assert block_error(model.bias_force(q, v), exact.bias_force(q, v)) <= 2e-14
+            v_dot = model.forward_dynamics(q, v, tau), exact.forward_dynamics(q, v, tau)
+            assert block_error(*v_dot) <= 5e-15 * equilibrated_condition(H)
 
 
-def test_beyond_the_range_is_refused(model):
-    q, v, tau = bent(6.3)
-    with pytest.raises(
-        st.StateError, match=r"segment 1 is bent by 6\.3 rad, beyond the scene's 6\.28"
-    ):
+@pytest.mark.parametrize(
+    "bends", [BENDS[::5], pytest.param(BENDS[1::2], marks=pytest.mark.slow)], ids=["some", "others"]
+)
+def test_derivatives_are_right_at_every_bend(bends):
+    """First and second ones along a direction in which all but the torso's place changes: of
+    compiled functions and of CasADi's expressions, against differences of 60 digits.
+    """
+    model = zoo.model("arcs1")
+    body = Arc(TABLE_1["tail_mass"], TABLE_1["tail_length"])
+    given = {name: TABLE_1[name] for name in ("torso_mass", "torso_inertia", "tail_mount")}
+    animal, rng = Animal(segments=(body,), **given), np.random.default_rng(6)
+    for bend in bends:
+        q, v, tau = bent(bend)
+        (by_q, by_v), (v_dot, weights) = rng.normal(size=(2, 2, 8))
+        by_q[:3], by_v[:3] = 0, 0
+        sides = [
+            animal.inverse_dynamics(
+                moved(exact_numbers(q), by_q, h), exact_numbers(v) + h * exact_numbers(by_v), v_dot
+            )
+            for h in (-SHIFT, 0 * SHIFT, SHIFT)
+        ]
+        first = ((sides[2] - sides[0]) / (2 * SHIFT)).astype(float)
+        second = ((sides[2] - 2 * sides[1] + sides[0]) / SHIFT**2).astype(float) @ weights
+        dq, dv = model.inverse_dynamics_derivatives(q, v, v_dot)
+        qq, qv, vv, _ = model.inverse_dynamics_hessian(q, v, v_dot, weights)
+        curved = by_q @ qq @ by_q + 2 * by_q @ qv @ by_v + by_v @ vv @ by_v
+        most = (1e-12 if bend >= 1e-8 else 1e-5) * abs(second)  # what differences are right to
+        with row(bend):
+            near(dq @ by_q + dv @ by_v, first, 1e-12)
+            assert abs(curved - second) <= most
+            slope, curve, of_motion = along_by_casadi(
+                model, (q, v, v_dot, tau), by_q, by_v, weights
+            )
+            near(slope, first, 1e-12)
+            assert abs(curve - second) <= most
+            dq, dv, _ = model.forward_dynamics_derivatives(q, v, tau)
+            condition = equilibrated_condition(model.mass_matrix(q))
+            near(of_motion, dq @ by_q + dv @ by_v, 1e-13 * condition)
+
+
+def near(found, expected, limit):
+    assert block_error(found, expected) <= limit
+
+
+def along_by_casadi(model, state, by_q, by_v, weights):
+    """The slope of forces, weights times their second derivative, and the slope of v_dot."""
+    q, v, v_dot, tau = state
+    s = casadi.SX.sym("s")
+    angle = np.linalg.norm(by_q[3:6])
+    c, k = casadi.cos(s * angle / 2), casadi.sin(s * angle / 2) / angle
+    turn = by_q[3:6]
+    w, e = q[3], q[4:7]
+    there = [
+        w * c - k * (e @ turn),
+        *(c * e[i] + k * (w * turn + np.cross(e, turn))[i] for i in range(3)),
+    ]
+    place = casadi.vertcat(*q[:3], *there, q[7:] + s * by_q[6:])
+    force = model.casadi.inverse_dynamics(place, v + s * by_v, v_dot)
+    motion = model.casadi.forward_dynamics(place, v + s * by_v, tau)
+    slope = casadi.jacobian(force, s)
+    curve = casadi.jacobian(casadi.jacobian(casadi.dot(weights, force), s), s)
+    found = casadi.Function("along", [s], [slope, curve, casadi.jacobian(motion, s)])(0)
+    return found[0].full().ravel(), float(found[1]), found[2].full().ravel()
+
+
+def test_beyond_the_range_is_refused():
+    model, (q, v, tau) = zoo.model("arcs1"), bent(6.3)
+    with pytest.raises(st.StateError, match=r"segment 1 .*6\.3 .*6\.28"):
         model.forward_dynamics(q, v, tau)
-    batch = np.stack([bent(1.0)[0], q])
-    with pytest.raises(st.StateError, match="segment 1 of state 1 is bent"):
-        model.mass_matrix(batch)
+    with pytest.raises(st.StateError, match="segment 1 of state 1 "):
+        model.mass_matrix(np.stack([bent(1.0)[0], q]))
     assert np.isnan(np.array(model.casadi.mass_matrix(q))).any()
 
 
 def test_a_wider_range_is_right_too(exact):
+    """The range is the point: the series of the model are longer."""
     model = st.load(model_folder(1, None, bend_range=12.0, functions=["mass_matrix", "bias_force"]))
     q, v, _ = bent(11.9)
     assert mass_matrix_error(model.mass_matrix(q), exact.mass_matrix(q)) <= 1e-13
     assert block_error(model.bias_force(q, v), exact.bias_force(q, v)) <= 1e-12
 
 
-def test_two_half_segments_are_one(model):
-    halves = st.load(model_folder(2, None))
-    q, v, _ = bent(2.0)
-    pair_q, pair_v = np.concatenate([q, q[7:]]), np.concatenate([v, v[6:]])
-    pair_q[7:] /= 2
-    pair_v[6:] /= 2
-    assert np.allclose(halves.energy(pair_q, pair_v), model.energy(q, v), rtol=1e-13)
-    assert np.allclose(halves.momentum(pair_q, pair_v)[1], model.momentum(q, v)[1], rtol=1e-12)
-
-
-def test_the_articulated_tail_converges_to_it(model):
-    q = bent(1.5)[0]
-    errors = []
-    for links in (16, 32, 64):
-        folder = model_folder(
-            1, links, functions=["mass_matrix"], parameters={"link_inertia": [0.0, 0.0, 0.0]}
-        )
-        joints, scale = q.copy(), np.diag([1.0] * 6 + [1 / links] * 2)
-        joints[7:] /= links
-        H = scale @ st.load(folder).mass_matrix(joints) @ scale
-        errors.append(mass_matrix_error(H, model.mass_matrix(q)))
-    assert errors[0] / errors[1] == pytest.approx(2, abs=0.1)
-    assert errors[1] / errors[2] == pytest.approx(2, abs=0.05)
-
-
-def test_flight_keeps_energy_and_momentum(model):
+def test_a_flight_keeps_energy_and_momentum():
     q, v = np.zeros(9), np.zeros(8)
     q[3], q[7:], v[3:] = 1.0, (0.8, 0.5), (6.0, 1.0, -2.0, 3.0, -4.0)
-    flight = st.simulate(model, q, v, t_span=0.5, step=1e-4)
+    flight = st.simulate(zoo.model("arcs1"), q, v, t_span=0.5, step=1e-4)
     assert np.ptp(flight.energy) <= 1e-9 * flight.kinetic[0]
-    assert (
-        np.abs(flight.angular_momentum - flight.angular_momentum[0]).max()
-        <= 1e-10 * np.abs(flight.angular_momentum).max()
-    )
+    most = np.abs(flight.angular_momentum).max()
+    assert np.ptp(flight.angular_momentum, axis=0).max() <= 1e-10 * most
 
 
 def test_polar_angles_are_a_conversion():
@@ -114,22 +153,22 @@ def test_polar_angles_are_a_conversion():
 
 
 def test_a_straight_segment_has_no_polar_angle():
-    with pytest.raises(st.StateError, match=r"segment \[1\] is straight"):
+    with pytest.raises(st.StateError, match=r"segment \[1\]"):
         st.bend_to_polar([0.1, 0.0], [0.2, 0.0])
 
 
-def test_info_tells_of_arcs(model):
+def test_a_model_tells_of_arcs():
+    model = zoo.model("arcs1")
     assert (model.kind, model.links, model.samples) == ("continuum", None, 5)
     assert "1 continuum segments" in repr(model)
     assert model.tail_points(bent(1.0)[0]).shape == (6, 3)
 
 
 def test_the_c_example_without_forward_dynamics_tells_the_sizes(tmp_path):
+    """Every model of the zoo has forward dynamics."""
     folder = model_folder(2, None, functions=["energy"])
     sources = [folder / "example" / "main.c", folder / "src" / f"{folder.name}.c"]
-    subprocess.run(
-        ["cc", "-std=c99", "-I", folder / "include", *sources, "-lm", "-o", tmp_path / "main"],
-        check=True,
-    )
+    command = ["cc", "-std=c99", "-I", folder / "include", *sources, "-lm", "-o", tmp_path / "main"]
+    subprocess.run(command, check=True)
     printed = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=True).stdout
     assert printed == "continuum_m2: 2 segments, 5 samples each\n"

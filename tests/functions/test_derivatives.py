@@ -4,236 +4,176 @@ mechanics.
 
 from functools import cache
 
+import casadi as ca
 import numpy as np
 import pytest
 
+from serpentail.model.kernel import Kernel
 from serpentail_codegen.scene.signatures.table import DERIVATIVES
 from tests.references.metrics import block_error
 from tests.support.derivative_models import (
     FIRST,
+    NEGLIGIBLE,
     complex_step,
     jacobian_error,
+    of_every_kind,
     parameter_scales,
-    states,
+    tangent_of_q,
 )
+from tests.support.rows import row
 
-from .compared import ROUNDING, called, limit
+from .compared import QUICK, ROUNDING, called, every_free, limit, marked, model_of
+
+PASSIVE = ["elastic", "elastic_arcs"]
+FIXED = ["fixed", "fixed_arcs", "fixed_mixed"]
+every_model = pytest.mark.parametrize(
+    "name", marked([*PASSIVE, *FIXED], quick=["mixed", "elastic", "fixed_mixed"])
+)
+free_or_passive = pytest.mark.parametrize("name", marked(PASSIVE, quick=["mixed", "elastic"]))
 
 
 def test_every_derivative_function_is_compared():
-    others = {
-        "inverse_dynamics_vjp",
-        "forward_dynamics_jvp",
-        "forward_dynamics_vjp",
-        "inverse_dynamics_hessian",
-    }
-    assert {*FIRST, *others} == set(DERIVATIVES)
+    others = {"inverse_dynamics_vjp", "forward_dynamics_jvp", "forward_dynamics_vjp"}
+    assert {*FIRST, *others, "inverse_dynamics_hessian"} == set(DERIVATIVES)
 
 
-@pytest.mark.parametrize("name", FIRST)
-def test_first_derivatives_are_those_of_a_complex_step(model, some_states, name):
-    function, outputs = FIRST[name]
-    for state in some_states:
-        found = called(model, name, state)
-        assert set(found) == set(outputs)
-        step = cache(lambda argument, state=state: complex_step(model, function, state, argument))
-        for output, (of, argument) in outputs.items():
-            scale = parameter_scales(model) if argument == "parameters" else 1.0
-            error = jacobian_error(found[output] * scale, step(argument)[of] * scale, model.nv)
-            assert error <= limit(model, name, state), (output, error)
+@every_model
+def test_first_derivatives_are_those_of_a_complex_step(name):
+    model = model_of(name)
+    names, singles = zip(*of_every_kind(model), strict=True)
+    stack = {argument: np.array([s[argument] for s in singles]) for argument in singles[0]}
+    step = cache(lambda function, argument: complex_step(model, function, stack, argument))
+    for derivative in FIRST.keys() & model.manifest["functions"].keys():
+        function, outputs = FIRST[derivative]
+        for k, state in enumerate(singles):
+            found = called(model, derivative, state)
+            assert set(found) == set(outputs)
+            for output, (of, argument) in outputs.items():
+                scale = parameter_scales(model) if argument == "parameters" else 1.0
+                expected = step(function, argument)[of][k] * scale
+                with row(derivative, output, names[k]):
+                    error = jacobian_error(found[output] * scale, expected, model.nv)
+                    assert error <= limit(model, derivative, state)
 
 
-# Inverse and forward dynamics
+@pytest.mark.parametrize("name", QUICK)
+def test_batches_are_those_of_single_states(name, monkeypatch):
+    """In the C of many states side by side, with a rest."""
+    monkeypatch.setattr("serpentail.model.batch.MIN_BATCH", 1)
+    model = model_of(name)
+    singles = [state for _, state in of_every_kind(model)]
+    singles = [singles[k % len(singles)] for k in range(model.batch_library.states + 1)]
+    stack = {argument: np.array([s[argument] for s in singles]) for argument in singles[0]}
+    for function in ("inverse_dynamics_derivatives", "forward_dynamics_derivatives"):
+        alone = [called(model, function, state) for state in singles]
+        with monkeypatch.context() as within:
+            within.setattr(Kernel, "_each", lambda *_: pytest.fail("one by one"))
+            together = called(model, function, stack)
+        for k, state in enumerate(singles):
+            for output, expected in alone[k].items():
+                error = jacobian_error(together[output][k], expected, model.nv)
+                assert error <= limit(model, function, state), (function, output, k)
 
 
-def test_derivatives_with_respect_to_torques_are_columns_of_the_inverse_inertia(model, some_states):
-    for state in some_states:
-        H, (*_, dtau) = (
-            model.mass_matrix(state["q"]),
-            called(model, "forward_dynamics_derivatives", state).values(),
-        )
-        scale = np.sqrt(np.diag(H))
-        products = (H @ dtau - np.eye(model.nv)[:, 6:]) / np.outer(scale, 1 / scale[6:])
-        assert np.abs(products).max() <= limit(model, "forward", state)
+# ---- energy, momentum and position ---------------------------------------------------------------
 
 
-def test_both_dynamics_differ_by_the_inertia(model, some_states):
-    """H d(v_dot) = -d(H v_dot + C) at the v_dot of forward dynamics."""
-    for state in some_states:
-        H, v_dot = (
-            model.mass_matrix(state["q"]),
-            model.forward_dynamics(*(state[x] for x in ("q", "v", "tau"))),
-        )
-        inverse = called(model, "inverse_dynamics_derivatives", state | {"v_dot": v_dot})
-        forward = called(model, "forward_dynamics_derivatives", state)
-        for name in ("dq", "dv"):
-            left, size = (
-                H @ forward[name] + inverse[name],
-                np.abs(H) @ np.abs(forward[name]) + np.abs(inverse[name]),
-            )
-            assert np.all(
-                np.abs(left) <= ROUNDING * np.maximum(size, 1e-6 * size.max(axis=1, keepdims=True))
-            ), name
-
-
-def test_position_and_velocity_of_the_torso_matter_to_nothing_but_its_energy(model, some_states):
+@every_free
+def test_position_and_velocity_of_the_torso_matter_to_nothing_but_its_energy(name):
     """Every column of the position is zero, to the last bit, and so is the velocity's but in the
     momentum.
     """
+    model = model_of(name)
     mass = model.parameters["torso_mass"] + model.parameters["tail_mass"]
-    for state in some_states:
-        for name in FIRST:
-            for output, values in called(model, name, state).items():
-                if output.endswith("dq") and not output.startswith("potential"):
-                    assert not np.any(values[..., :3])
-                if output == "dv":
-                    assert not np.any(values[..., :3])
-        potential = called(model, "energy_derivatives", state)["potential_dq"]
-        np.testing.assert_allclose(
-            potential[:3], [0, 0, mass * model.parameters["gravity"]], rtol=1e-14, atol=1e-16
-        )
+    for at, state in of_every_kind(model):
+        with row(at):
+            for derivative in FIRST:
+                for output, values in called(model, derivative, state).items():
+                    if output.endswith("dq") and not output.startswith("potential"):
+                        assert not np.any(values[..., :3])
+                    if output == "dv":
+                        assert not np.any(values[..., :3])
+            potential = called(model, "energy_derivatives", state)["potential_dq"]
+            pull = [0, 0, mass * model.parameters["gravity"]]
+            np.testing.assert_allclose(potential[:3], pull, rtol=1e-14, atol=1e-16)
+            J = called(model, "momentum_derivatives", state)
+            of_speed = mass * np.eye(3)
+            np.testing.assert_allclose(J["linear_dv"][:, :3], of_speed, rtol=0, atol=1e-14 * mass)
+            assert np.abs(J["angular_dv"][:, :3]).max() <= 1e-15 * np.abs(J["angular_dv"]).max()
 
 
-def test_a_turn_of_the_world_turns_what_is_given_in_its_axes(model):
-    """A state and its turned copy have the same derivatives in torso axes; force and p_ddot turn
-    along.
-    """
-    for state in states(model, "random"):
-        half = np.sqrt(0.5)
-        w, x, y, z = state["q"][3:7]  # about the vertical, so that gravity stays
-        turned = {
-            **state,
-            "q": np.concatenate(
-                [state["q"][:3], half * np.array([w - z, x - y, y + x, z + w]), state["q"][7:]]
-            ),
-        }
-        R = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
-        for name in ("v", "v_dot"):
-            turned[name] = np.concatenate([R @ state[name][:3], state[name][3:]])
-        for name in ("inverse_dynamics_derivatives", "forward_dynamics_derivatives"):
-            one, other = called(model, name, state), called(model, name, turned)
-            for output in one:
-                expected = np.concatenate([R @ one[output][:3], one[output][3:]])
-                assert jacobian_error(other[output], expected, model.nv) <= limit(
-                    model, name, state
-                )
+# ---- products with Jacobians ---------------------------------------------------------------------
 
 
-# Products with Jacobians
-
-
-def test_products_from_the_left_are_products_with_the_jacobians(model, some_states):
-    for state in some_states:
+@free_or_passive
+def test_products_are_those_with_the_jacobians(name):
+    """From the left and from the right, by sweeps that never form a Jacobian."""
+    model, rng = model_of(name), np.random.default_rng(3)
+    for at, state in of_every_kind(model):
         weights, H = state["multiplier"], model.mass_matrix(state["q"])
         for function in ("inverse", "forward"):
             J = called(model, f"{function}_dynamics_derivatives", state) | {"dv_dot": H}
             for output, gradient in called(model, f"{function}_dynamics_vjp", state).items():
                 terms = np.abs(weights) @ np.abs(J[output])  # what may cancel
                 error = np.abs(gradient - weights @ J[output])
-                assert np.all(
-                    error <= limit(model, function, state) * np.maximum(terms, 1e-4 * terms.max())
-                ), output
-
-
-def test_the_gradient_along_accelerations_is_inertia_times_multiplier(model, some_states):
-    for state in some_states:
-        H = model.mass_matrix(state["q"])
-        gradient = called(model, "inverse_dynamics_vjp", state)["dv_dot"]
-        assert block_error(gradient, H @ state["multiplier"]) <= ROUNDING
-
-
-def test_products_from_the_right_are_products_with_the_jacobians(model, some_states):
-    rng = np.random.default_rng(3)
-    for state in some_states:
-        directions = {name: rng.uniform(-1, 1, len(state[name])) for name in ("v", "tau")} | {
-            "q": rng.uniform(-1, 1, model.nv)
-        }
+                most = limit(model, function, state) * np.maximum(terms, 1e-4 * terms.max())
+                with row(at, function, output):
+                    assert np.all(error <= most)
         J = called(model, "forward_dynamics_derivatives", state)
-        arguments = {f"d{name}": direction for name, direction in directions.items()}
-        found = called(model, "forward_dynamics_jvp", state | arguments)["dv_dot"]
-        expected = sum(J[name] @ arguments[name] for name in J)
-        assert block_error(found, expected) <= limit(model, "forward", state)
+        along = {d: rng.uniform(-1, 1, J[d].shape[1]) for d in J}
+        found = called(model, "forward_dynamics_jvp", state | along)["dv_dot"]
+        expected = sum(J[d] @ along[d] for d in J)
+        with row(at, "from the right"):
+            assert block_error(found, expected) <= limit(model, "forward", state)
 
 
-def test_both_products_pair_to_the_same_number(model, some_states):
-    """lambda^T (J d) = (J^T lambda)^T d, by the two sweeps that never form J."""
-    rng = np.random.default_rng(4)
-    for state in some_states:
-        directions = {
-            "dq": rng.uniform(-1, 1, model.nv),
-            "dv": rng.uniform(-1, 1, model.nv),
-            "dtau": 1e-3 * rng.uniform(-1, 1, model.nv - 6),
-        }
-        forward = (
-            state["multiplier"]
-            * called(model, "forward_dynamics_jvp", state | directions)["dv_dot"]
-        )
-        back = called(model, "forward_dynamics_vjp", state)
-        terms = np.concatenate([back[name] * directions[name] for name in directions])
-        assert abs(forward.sum() - terms.sum()) <= limit(model, "forward", state) * (
-            np.abs(forward).sum() + np.abs(terms).sum()
-        )
+# ---- second derivatives --------------------------------------------------------------------------
 
 
-# Second derivatives
-
-
-def test_hessians_are_symmetric(model, some_states):
-    for state in some_states:
-        blocks = called(model, "inverse_dynamics_hessian", state)
-        for name in ("qq", "vv"):
-            np.testing.assert_array_equal(blocks[name], blocks[name].T)
-        assert not any(
-            np.any(block[:, :3]) or (name != "aq" and np.any(block[:3]))
-            for name, block in blocks.items()
-        )
-
-
-def test_hessians_are_linear_in_multipliers_and_affine_in_accelerations(model):
-    for state in states(model, "random"):
-        other = {"multiplier": state["multiplier"][::-1].copy()}
-        sum_ = {"multiplier": state["multiplier"] + other["multiplier"]}
-        one, two, both = (
-            called(model, "inverse_dynamics_hessian", state | change)
-            for change in ({}, other, sum_)
-        )
-        for (
-            name,
-            block,
-        ) in both.items():  # in "aq", the mass of the whole animal cancels in its turns
-            limit = 10 * ROUNDING if name == "aq" else ROUNDING
-            assert jacobian_error(block, one[name] + two[name], model.nv) <= limit
-        at_rest = called(model, "inverse_dynamics_hessian", state | {"v_dot": 0 * state["v_dot"]})
-        for name in ("qv", "vv", "aq"):  # C alone has velocities
-            assert jacobian_error(at_rest[name], one[name], model.nv) <= ROUNDING
-
-
-def test_hessians_contracted_with_velocities(model, some_states):
-    """C is quadratic in v but for gravity, and H v_dot linear in v_dot: so Euler's theorem on
-    homogeneous functions.
+@cache
+def hessian_by_casadi(model):
+    """A function of (q, v, v_dot, multiplier) to the Hessian of multiplier^T (H v_dot + C) over all
+    but the last.
     """
-    for state in some_states:
-        blocks, J = (
-            called(model, "inverse_dynamics_hessian", state),
-            called(model, "inverse_dynamics_derivatives", state),
-        )
-        still = state | {"v": 0 * state["v"]}
-        moving, at_rest = (
-            state["multiplier"] @ J["dq"],
-            state["multiplier"] @ called(model, "inverse_dynamics_derivatives", still)["dq"],
-        )
-        scale = np.abs(state["multiplier"]) @ np.abs(J["dq"]) + 1e-3 * np.abs(moving).max()
-        assert np.all(
-            np.abs(blocks["qv"] @ state["v"] - 2 * (moving - at_rest)) <= 10 * ROUNDING * scale
-        )
-        by_v = np.abs(state["multiplier"]) @ np.abs(J["dv"]) + 1e-12
-        assert np.all(
-            np.abs(blocks["vv"] @ state["v"] - state["multiplier"] @ J["dv"])
-            <= 10 * ROUNDING * by_v
-        )
-        weightless = called(
-            model.with_parameters(gravity=0.0), "inverse_dynamics_derivatives", still
-        )["dq"]
-        inertial = np.abs(state["multiplier"]) @ np.abs(weightless)
-        error = np.abs(state["v_dot"] @ blocks["aq"] - state["multiplier"] @ weightless)
-        assert np.all(error <= 10 * ROUNDING * np.maximum(inertial, 1e-6 * inertial.max()))
+    sizes = {"q": model.nq, "v": model.nv, "v_dot": model.nv, "multiplier": model.nv}
+    q, v, v_dot, multiplier = arguments = [ca.SX.sym(name, size) for name, size in sizes.items()]
+    out = model.casadi.symbolic("inverse_dynamics")(q, v, v_dot, model.casadi.parameter_vector)
+    x = ca.vertcat(q, v, v_dot)
+    gradient = ca.jtimes(out, x, multiplier, True)
+    return ca.Function("hessian", arguments, [ca.jacobian(gradient, x)])
+
+
+@free_or_passive
+def test_hessians_are_casadis(name):
+    """By the numbers of the quaternion, brought to turns: the force depends on the direction of the
+    quaternion alone, so the second derivative along it, by which the exponential map leaves the
+    tangent, is zero.
+    """
+    model = model_of(name)
+    nq, nv = model.nq, model.nv
+    q, v, a = (slice(k * nv, (k + 1) * nv) for k in range(3))
+    for at, state in of_every_kind(model):
+        T = np.zeros((nq + 2 * nv, 3 * nv))
+        T[:nq, :nv], T[nq:, nv:] = tangent_of_q(state["q"], nv), np.eye(2 * nv)
+        arguments = (state[x] for x in ("q", "v", "v_dot", "multiplier"))
+        H = T.T @ np.array(hessian_by_casadi(model)(*arguments)) @ T
+        expected = {"qq": H[q, q], "qv": H[q, v], "vv": H[v, v], "aq": H[a, q]}
+        assert not H[a, v].any() and not H[a, a].any()  # these blocks are left out: they are zero
+        found = called(model, "inverse_dynamics_hessian", state)
+        for block in ("qq", "vv"):
+            np.testing.assert_array_equal(found[block], found[block].T)
+        for block, values in found.items():
+            with row(at, block):
+                # the position of the torso has none, to the last bit
+                assert not values[:, :3].any() and (block == "aq" or not values[:3].any())
+                assert hessian_error(values, expected[block], nv) <= ROUNDING
+        # a turn moves as much force from axis to axis
+        scale = np.abs(model.mass_matrix(state["q"])[:3] @ state["multiplier"]).max()
+        assert np.abs(found["aq"][:3] - expected["aq"][:3]).max() <= ROUNDING * scale, at
+
+
+def hessian_error(found, expected, nv):
+    """The error over blocks of turns and tail, smaller ones compared with their rows' largest."""
+    moving = slice(3, None)
+    assert found.shape == expected.shape
+    return jacobian_error(found[moving, moving], expected[moving, moving], nv - 3, 1e3 * NEGLIGIBLE)

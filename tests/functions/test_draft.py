@@ -9,6 +9,7 @@ from serpentail_codegen.ir.program import Apply, statements
 from serpentail_codegen.mechanics import contact, rotations, torso
 from serpentail_codegen.mechanics.lower import derive
 from serpentail_codegen.mechanics.shapes import M33, V3
+from tests.support.rows import row
 
 
 def draft_with(**sizes):
@@ -25,50 +26,50 @@ def applied(draft):
 
 
 def test_parameters_are_found_by_their_names_and_all_else_is_passed():
+    """A step takes from a scope what it declares, and what stands for a parameter says so."""
+    step = rotations.world_acceleration
+    for scope, names in ((dict, "Ra"), (Vectors, "Raw")):
+        draft, given = draft_with(R=9, a=3, w=3, p_ddot=3)
+        reads = scope({name: given[name] for name in names})
+        draft.step(step, reads, p_ddot=given["p_ddot"])
+        assert applied(draft) == {"R": "R", "gravity": "gravity", "a": "a"}
     draft, given = draft_with(R=9, a=3, p_ddot=3)
-    p_ddot = given.pop("p_ddot")
-    draft.step(rotations.world_acceleration, given, p_ddot=p_ddot)
-    assert applied(draft) == {"R": "R", "gravity": "gravity", "a": "a"}
-
-
-def test_a_step_takes_from_a_scope_what_it_declares():
-    draft, given = draft_with(R=9, a=3, w=3, p_ddot=3)
-    p_ddot = given.pop("p_ddot")
-    draft.step(rotations.world_acceleration, Vectors(given), p_ddot=p_ddot)
-    assert set(applied(draft)) == {"R", "gravity", "a"}
-
-
-def test_a_read_that_is_not_declared_is_refused():
-    draft, given = draft_with(R=9, a=3, w=3, p_ddot=3)
-    p_ddot = given.pop("p_ddot")
-    with pytest.raises(ValueError, match="world_acceleration in drafted: it does not read w"):
-        draft.step(rotations.world_acceleration, given, p_ddot=p_ddot)
-
-
-def test_a_read_that_is_missing_is_refused():
-    draft, given = draft_with(R=9, p_ddot=3)
-    with pytest.raises(ValueError, match=r"world_acceleration.* in drafted: nothing gives a"):
-        draft.step(rotations.world_acceleration, {"R": given["R"]}, p_ddot=given["p_ddot"])
-
-
-def test_a_step_with_the_name_of_an_emitted_function_is_refused():
-    draft, given = draft_with(R=9, a=3, p_ddot=3)
-
-    def forward_dynamics(let, R: M33, a: V3) -> dict:
-        """A step whose name the CasADi module would define twice."""
-        return {"p_ddot": R * a}
-
-    p_ddot = given.pop("p_ddot")
-    with pytest.raises(ValueError, match=r"forward_dynamics in drafted: .* function: rename it"):
-        draft.step(forward_dynamics, given, p_ddot=p_ddot)
+    reads, weightless = {name: given[name] for name in "Ra"}, draft.zero(1)
+    draft.step(step, reads, Instead({"gravity": weightless}), p_ddot=given["p_ddot"])
+    assert applied(draft)["gravity"] == "zero_1"
 
 
 def test_what_only_an_unwanted_output_needs_may_be_missing():
-    draft, given = draft_with(w=3, w_dot=3, a=3, force=3, F_next=6)
+    draft, given = draft_with(a=3, force=3, F_next=6)
     force = given.pop("force")
-    del given["w"], given["w_dot"]
     draft.step(torso.torso_wrench, given, force=force)
     assert set(applied(draft)) == {"torso_mass", "a", "F_next"}
+
+
+def forward_dynamics(let, R: M33, a: V3) -> dict:
+    """A step whose name the CasADi module would define twice."""
+    return {"p_ddot": R * a}
+
+
+def test_wrong_reads_and_writes_are_refused():
+    draft, given = draft_with(R=9, a=3, w=3, p_ddot=3, other=3)
+    p_ddot, R, a = (given[name] for name in ("p_ddot", "R", "a"))
+    right = {"R": R, "a": a}
+    acceleration = rotations.world_acceleration
+    for words, step, *reads in (
+        ("world_acceleration in drafted.* w", acceleration, right | {"w": given["w"]}),
+        ("world_acceleration.* in drafted.* a", acceleration, {"R": R}),
+        ("forward_dynamics in drafted", forward_dynamics, right),
+        ("drafted: a is no parameter", acceleration, {"R": R}, Instead({"a": a})),
+        ("drafted: a is given twice", acceleration, right, Vectors({"a": given["other"]})),
+    ):
+        with row(words), pytest.raises(ValueError, match=words):
+            draft.step(step, *reads, p_ddot=p_ddot)
+    with pytest.raises(ValueError, match=r"vector.*tail_mount"):
+        mount = draft.parameters["tail_mount"]
+        draft.step(rotations.world_vector, {"R": R, "vector": a}, vector=mount)
+    with pytest.raises(TypeError):
+        draft.parameters["tail_mount"] = a
 
 
 @pytest.mark.parametrize("kind", [dict, Vectors])
@@ -80,43 +81,17 @@ def test_no_read_shadows_a_parameter(kind):
     reads = {name: draft.vector(name, size) for name, size in sizes.items()}
     reads |= {"velocity": given["velocity"], "mu": draft.vector("response", 1)}
     writes = {name: given[name] for name in ("force", "rate")}
-    with pytest.raises(ValueError, match=r"contact_force_.* in drafted: mu is a parameter"):
+    with pytest.raises(ValueError, match=r"contact_force_.* in drafted: mu"):
         draft.step(law, kind(reads), **writes)
     del reads["mu"]
     draft.step(law, kind(reads), **writes)
     assert applied(draft)["mu"] == "mu"
 
 
-def test_what_stands_for_a_parameter_says_so():
-    draft, given = draft_with(R=9, a=3, p_ddot=3)
-    reads, weightless = {name: given[name] for name in ("R", "a")}, draft.zero(1)
-    step = rotations.world_acceleration
-    draft.step(step, reads, Instead({"gravity": weightless}), p_ddot=given["p_ddot"])
-    assert applied(draft)["gravity"] == "zero_1"
-    with pytest.raises(ValueError, match="drafted: a is no parameter"):
-        draft.step(step, {"R": given["R"]}, Instead({"a": given["a"]}), p_ddot=given["p_ddot"])
-
-
-def test_a_name_is_given_once():
-    draft, given = draft_with(R=9, a=3, p_ddot=3)
-    reads = {name: given[name] for name in ("R", "a")}
-    twice = Vectors({"a": draft.vector("other", 3)})
-    with pytest.raises(ValueError, match="world_acceleration in drafted: a is given twice"):
-        draft.step(rotations.world_acceleration, reads, twice, p_ddot=given["p_ddot"])
-
-
-def test_nothing_is_assigned_to_a_parameter():
-    draft, given = draft_with(R=9, vector=3)
-    with pytest.raises(TypeError, match="does not support item assignment"):
-        draft.parameters["tail_mount"] = given["vector"]
-    with pytest.raises(ValueError, match="vector would overwrite the parameter tail_mount"):
-        draft.step(rotations.world_vector, given, vector=draft.parameters["tail_mount"])
-
-
 def test_a_constant_is_declared_once():
     draft, _ = draft_with()
     assert draft.fixed("share", [1, 2]) == draft.fixed("share", [1, 2])
-    with pytest.raises(ValueError, match="array share is declared twice in drafted"):
+    with pytest.raises(ValueError, match=r"share.*drafted"):
         draft.fixed("share", [1, 3])
 
 
@@ -125,5 +100,5 @@ def test_without_a_velocity_there_is_no_rate():
     state = State(draft.array("q", draft.tail.nq))
     assert state.angles(0).size == 2
     for read in (lambda: state.rates(0), lambda: state.omega, lambda: state.torso(state.q[0])):
-        with pytest.raises(ValueError, match="no v among its arguments"):
+        with pytest.raises(ValueError, match="no v "):
             read()

@@ -1,178 +1,175 @@
-"""Segments and links of their own: against a set of bodies that shares nothing with generators."""
-
-from dataclasses import replace
+"""Segments of their own, links and arcs in one tail: against a set of bodies that shares nothing
+with generators; what scenes and models say of them.
+"""
 
 import numpy as np
 import pytest
 
 import serpentail as st
+from serpentail.containers.contents import contents
 from serpentail.verification.report import laws
+from serpentail.viewer.shape import shape
+from serpentail_codegen.functions.draft import Draft
 from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.plain import FUNCTIONS
+from serpentail_codegen.functions.sweeps.pieces import each_segment, mechanism
 from serpentail_codegen.functions.tail import Tail
-from serpentail_codegen.scene.shape import Shape
+from serpentail_codegen.scene.shape import Run, Shape
 from tests.functions.test_columns import arguments, outputs
-from tests.references.body_set import MP, Arc, exact, moved
 from tests.references.metrics import block_error, force_error, mass_matrix_error
-from tests.support.own_tails import TAILS, animal, folder, folder_of_tables, states
+from tests.support import zoo
+from tests.support.own_tails import IN_ZOO, animal, dynamics, states
+from tests.support.rows import row
 
-CASES = [(tail, True) for tail in TAILS]
-SHIFT = MP.mpf(10) ** -10
-
-
-@pytest.fixture(scope="module", params=CASES, ids=str)
-def pair(request):
-    """A compiled model, and the same animal as a set of bodies."""
-    return st.load(folder(*request.param)), animal(*request.param)
+every_tail = pytest.mark.parametrize("name", IN_ZOO)
+COUNTED = Shape((3, 3, 5), ("articulated", "articulated", "continuum"), 6, 1)
 
 
-def test_mass_matrix_and_forces(pair):
-    model, bodies = pair
-    for q, v, v_dot, tau in states(model.nq):
-        H, force = bodies.mass_matrix(q), bodies.force(q, v, v_dot)
-        bias = bodies.force(q, v, 0 * v_dot)
-        assert mass_matrix_error(model.mass_matrix(q), H) < 1e-14
-        assert force_error(model.inverse_dynamics(q, v, v_dot), force, H) < 1e-14
-        assert force_error(model.bias_force(q, v), bias, H) < 1e-14
-
-        scale = np.sqrt(np.diag(H))
-        applied = np.concatenate([np.zeros(6), tau]) - bias
-        expected = np.linalg.solve(H / np.outer(scale, scale), applied / scale) / scale
-        assert block_error(model.forward_dynamics(q, v, tau), expected) < 1e-12
-        graph = model.casadi.forward_dynamics(q, v, tau).full().ravel()
-        assert block_error(graph, expected) < 1e-12
-
-
-def test_energy_momentum_and_points(pair):
-    model, bodies = pair
-    for q, v, *_ in states(model.nq):
-        assert np.allclose(model.energy(q, v), bodies.energy(q, v), rtol=1e-14, atol=0)
-        for found, expected in zip(model.momentum(q, v), bodies.momentum(q, v), strict=True):
-            assert np.abs(found - expected).max() < 1e-14 * np.abs(expected).max()
-        assert np.abs(model.tail_points(q) - bodies.tail_points(q)).max() < 1e-15
-
-
-def test_derivatives_by_coordinates(pair):
-    """Differences of 60 digits in the tangent space of q."""
-    model, bodies = pair
-    q, v, v_dot, _ = next(states(model.nq))
-    dq = model.inverse_dynamics_derivatives(q, v, v_dot)[0]
-    for k in (3, 6, model.nv - 1):
-        unit = np.eye(model.nv)[k]
-        ahead, behind = (
-            bodies.inverse_dynamics(moved(exact(q), unit, h), v, v_dot) for h in (SHIFT, -SHIFT)
-        )
-        slope = ((ahead - behind) / (2 * SHIFT)).astype(float)
-        assert np.abs(dq[:, k] - slope).max() < 1e-13 * np.abs(slope).max()
-
-
-def with_number(bodies, name, k, shift):
-    """The animal with number k of a parameter changed."""
-    if not name.startswith(("link_", "arc_")):
-        value = getattr(bodies, name)
-        if not isinstance(value, tuple):
-            return replace(bodies, **{name: MP.mpf(value) + shift})
-        return replace(bodies, **{name: (*value[:k], MP.mpf(value[k]) + shift, *value[k + 1 :])})
-    field = {"es": "mass", "hs": "length", "rs": "center", "as": "inertia"}[name[-2:]]
-    segments = [list(s) if isinstance(s, list) else s for s in bodies.segments]
-    if name.startswith("arc_"):
-        i = [i for i, s in enumerate(segments) if isinstance(s, Arc)][k]
-        segments[i] = replace(segments[i], **{field: MP.mpf(getattr(segments[i], field)) + shift})
-        return replace(bodies, segments=tuple(segments))
-    size = 3 if field == "inertia" else 1
-    links = [(i, s) for i, s in enumerate(segments) if isinstance(s, list)]
-    place = [(i, j) for i, s in links for j in range(len(s))][k // size]
-    link = segments[place[0]][place[1]]
-    value = getattr(link, field)
-    if size == 3:
-        c = k % 3
-        value = (*value[:c], MP.mpf(value[c]) + shift, *value[c + 1 :])
-    else:
-        value = MP.mpf(value) + shift
-    segments[place[0]][place[1]] = replace(link, **{field: value})
-    return replace(bodies, segments=tuple(segments))
-
-
-def test_derivatives_by_parameters(pair):
-    """Every parameter's first and last number, by differences of 60 digits; v_dot's by H."""
-    model, bodies = pair
+@every_tail
+def test_a_model_is_its_set_of_bodies(name):
+    model, bodies = zoo.model(name), animal(IN_ZOO[name], True)
     q, v, v_dot, tau = next(states(model.nq))
-    forces = model.inverse_dynamics_parameter_derivatives(q, v, v_dot)
-    at_rest = model.forward_dynamics(q, v, tau)
-    accelerations = model.forward_dynamics_parameter_derivatives(q, v, tau)
-    H, first, scale = bodies.mass_matrix(q), 0, np.abs(forces).max()
-    for entry in [p for p in model.manifest["parameters"] if p["in_struct"]]:
-        for k in {0, entry["size"] - 1}:
-            ahead, behind = (
-                with_number(bodies, entry["name"], k, h).inverse_dynamics(q, v, v_dot)
-                for h in (SHIFT, -SHIFT)
-            )
-            slope = ((ahead - behind) / (2 * SHIFT)).astype(float)
-            size = np.abs(slope).max() or scale
-            assert np.abs(forces[:, first + k] - slope).max() < 1e-12 * size, entry["name"]
-        first += entry["size"]
-    by_force = model.inverse_dynamics_parameter_derivatives(q, v, at_rest)
-    root = np.sqrt(np.diag(H))
-    expected = -np.linalg.solve(H / np.outer(root, root), by_force / root[:, None]) / root[:, None]
-    largest = np.abs(expected).max(axis=0)
-    assert np.all(np.abs(accelerations - expected).max(axis=0) <= 1e-11 * largest + 1e-300)
+    H, force, bias = dynamics(bodies, q, v, v_dot)
+    assert mass_matrix_error(model.mass_matrix(q), H) < 1e-14
+    assert force_error(model.inverse_dynamics(q, v, v_dot), force, H) < 1e-14
+    assert force_error(model.bias_force(q, v), bias, H) < 1e-14
+    scale = np.sqrt(np.diag(H))
+    applied = np.concatenate([np.zeros(6), tau]) - bias
+    expected = np.linalg.solve(H / np.outer(scale, scale), applied / scale) / scale
+    assert block_error(model.forward_dynamics(q, v, tau), expected) < 1e-12
+    graph = model.casadi.forward_dynamics(q, v, tau).full().ravel()
+    assert block_error(graph, expected) < 1e-12
+    np.testing.assert_allclose(model.energy(q, v), bodies.energy(q, v), rtol=1e-14)
+    for found, momentum in zip(model.momentum(q, v), bodies.momentum(q, v), strict=True):
+        assert np.abs(found - momentum).max() < 1e-14 * np.abs(momentum).max()
+    assert np.abs(model.tail_points(q) - bodies.tail_points(q)).max() < 1e-15
 
 
-@pytest.mark.parametrize("emission", ["straight", "loops", "lanes", "segments"])
-def test_every_form_is_the_same_function(emission):
-    """What goes by segments needs equal links: other tails get lanes."""
-    names = ["mass_matrix", "forward_dynamics"]
-    model = st.load(folder("links", True, emission=emission, functions=names))
-    assert model.manifest["functions"]["forward_dynamics"]["emission"] == (
-        "lanes" if emission == "segments" else emission
-    )
-    bodies = animal("links", True)
-    for q, v, _, tau in states(model.nq, 1):
-        H, bias = bodies.mass_matrix(q), bodies.force(q, v, np.zeros(model.nv))
-        expected = np.linalg.solve(H, np.concatenate([np.zeros(6), tau]) - bias)
-        assert block_error(model.forward_dynamics(q, v, tau), expected) < 1e-11
+def test_every_law_holds():
+    """Derivatives, products, batches, CasADi and flights agree with each other."""
+    assert [check.name for check in laws(zoo.model("mixed")) if not check.passed] == []
+
+
+# ---- programs ------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("kind", ["articulated", "continuum"])
 def test_equal_pieces_by_themselves_are_the_default_tail(kind):
     """The same numbers, whether a tail's mass and length are shared or each piece has its own."""
-    links = {"links": 3} if kind == "articulated" else {}
-    pieces = 6 if links else 2
-    even = {"kind": kind, "segments": 2, **links}
-    body = {"tail_mass": 0.0035, "tail_length": 0.18}
-    inertia = (3e-8, 2e-9, 4e-8)
-    own = {f"{'link' if links else 'arc'}_masses": [0.0035 / pieces] * pieces}
-    own |= {f"{'link' if links else 'arc'}_lengths": [0.18 / pieces] * pieces}
-    if links:
-        body["link_inertia"], own["link_inertias"] = inertia, [inertia] * pieces
-    default, other = (st.load(folder_of_tables(even, parameters)) for parameters in (body, own))
-    for q, v, v_dot, tau in states(default.nq):
-        H, force = default.mass_matrix(q), default.inverse_dynamics(q, v, v_dot)
-        assert mass_matrix_error(other.mass_matrix(q), H) < 1e-15
-        assert block_error(other.inverse_dynamics(q, v, v_dot), force) < 1e-14
-        expected = default.forward_dynamics(q, v, tau)
-        assert block_error(other.forward_dynamics(q, v, tau), expected) < 1e-13
-        assert np.allclose(other.energy(q, v), default.energy(q, v), rtol=1e-14)
-    for name in ("tail_mass", "tail_length"):
-        assert other.parameters[name] == pytest.approx(default.parameters[name], rel=1e-15)
+    links = kind == "articulated"
+    size, pieces, one = (2, 3 if links else 5), 6 if links else 2, "link" if links else "arc"
+    even = Tail(*size, kind)
+    other = Tail(*size, kind, shape=Shape(**{f"{one}s": pieces}))
+    for name in ("mass_matrix", "inverse_dynamics", "forward_dynamics", "energy", "tail_points"):
+        given = arguments(assemble(FUNCTIONS[name], even))
+        (mass,), (length,) = (
+            given.get("tail_mass", [0]),
+            given["tail_length"],
+        )
+        own = given | {f"{one}_masses": [mass / pieces] * pieces}
+        own |= {f"{one}_lengths": [length / pieces] * pieces}
+        if links:
+            own["link_centers"] = [length / pieces / 2] * pieces
+            own["link_inertias"] = given.get("link_inertia", []) * pieces
+        program = assemble(FUNCTIONS[name], other)
+        read = {a.name for a in (*program.of_role("parameters"), *program.of_role("input"))}
+        found = outputs(program, {key: x for key, x in own.items() if key in read})
+        for key, expected in outputs(assemble(FUNCTIONS[name], even), given).items():
+            with row(name, key):
+                error = np.abs(found[key] - expected).max()
+                assert error <= 1e-13 * np.abs(expected).max()
 
 
 @pytest.mark.parametrize("counts", [(3, 2, 2), (1, 4), (2,)])
 def test_sweeps_in_lanes_give_the_same_acceleration(counts):
+    """What goes by segments needs equal links: other tails get lanes."""
     shape = Shape(counts if len(counts) > 1 else (), links=sum(counts), tilted=True)
     tail = Tail(len(counts), max(counts), shape=shape)
-    plain, lanes = (
-        assemble(FUNCTIONS["forward_dynamics"], tail, each) for each in ("composite", "lanes")
+    plain, lanes, segments = (
+        assemble(FUNCTIONS["forward_dynamics"], tail, each)
+        for each in ("composite", "lanes", "segments")
     )
     given = arguments(plain)
     expected, found = outputs(plain, given)["v_dot"], outputs(lanes, given)["v_dot"]
-    assert plain != lanes
+    assert plain != lanes == segments
     assert np.abs(found - expected).max() <= 1e-12 * np.abs(expected).max()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("tail", TAILS)
-def test_every_law_holds(tail):
-    """Derivatives, products, batches, CasADi and flights agree with each other."""
-    checks = laws(st.load(folder(tail, True, functions="all")))
-    assert [check.name for check in checks if not check.passed] == []
+def test_runs_number_the_pieces_of_their_kind():
+    shape = Shape((2, 5, 5, 3), ("articulated", "continuum", "continuum", "articulated"), 5, 2)
+    tail = Tail(4, 5, "mixed", shape=shape)
+    assert tail.runs("articulated") == (Run(0, 1, 0, 2), Run(3, 4, 4, 7, 2, 10, 2))
+    assert tail.runs("continuum") == (Run(1, 3, 2, 4, 2, 2, 1),)
+    assert (tail.pieces, tail.total) == (7, 15)
+
+
+def test_steps_are_those_of_a_stretch():
+    draft = Draft("x", "", tail=Tail(3, 5, "mixed", shape=COUNTED))
+    kinds = [mechanism(draft).pose.__module__.rpartition(".")[2] for _ in each_segment(draft)]
+    assert kinds == ["link", "arc"]
+    with pytest.raises(ValueError, match="segments"):
+        mechanism(draft).pose()
+
+
+# ---- models --------------------------------------------------------------------------------------
+
+
+def test_models_tell_their_kinds():
+    model = zoo.model("mixed")
+    assert model.kind == "mixed"
+    assert model.kinds == ("continuum", "articulated", "continuum", "articulated")
+    assert model.links == (0, 2, 0, 3)
+    assert model.samples == 3
+    assert "an arc, 2 links, an arc, 3 links" in repr(model)
+    assert model.parameters["tail_mass"] == pytest.approx(1.5e-3 + 9e-4 + 1.1e-3 + 1.5e-3)
+    assert model.parameters["tail_length"] == pytest.approx(0.06 + 0.055 + 0.09 + 0.06)
+    radii = np.array(shape(model)["tail_radii"])
+    assert len(radii) == 3 + 2 + 3 + 3
+    arcs = np.sqrt(np.array([1.5e-3 / 0.06, 1.1e-3 / 0.09]) / 1e3 / np.pi)
+    np.testing.assert_allclose(radii[:3], arcs[0])
+    np.testing.assert_allclose(radii[5:8], arcs[1])
+    np.testing.assert_allclose(radii[3], np.sqrt(2 * 2e-9 / 5e-4))
+    other = model.with_parameters(arc_masses=[1e-3, 2e-3], link_masses=[1e-4] * 5)
+    assert other.parameters["tail_mass"] == pytest.approx(3.5e-3)
+
+
+def test_parameters_of_a_wrong_length_are_refused():
+    model = zoo.model("mixed")
+    for name, values in (("arc_masses", [0.1]), ("link_lengths", [0.1] * 4)):
+        with pytest.raises(st.ModelError, match=rf"{name}.*0\.1"):
+            model.with_parameters(**{name: values})
+
+
+def test_arcs_are_guarded_and_links_are_not():
+    model = zoo.model("mixed")
+    q, v, tau = np.zeros(model.nq), np.zeros(model.nv), np.zeros(model.nv - 6)
+    q[3], q[9] = 1, 20.0
+    model.forward_dynamics(q, v, tau)
+    q[11] = 6.3
+    with pytest.raises(st.StateError):
+        model.forward_dynamics(q, v, tau)
+
+
+def test_a_flight_keeps_energy_and_momentum_and_is_labelled():
+    model = zoo.model("mixed")
+    q, v = np.zeros(model.nq), 2 * np.random.default_rng(5).normal(size=model.nv)
+    q[3], q[7:] = 1, [1.5, 2.9, 1.2, 0, 0.3, 0.2, -0.2, 1.3]
+    run = st.simulate(model, q, v, t_span=0.3, method="tsit5", rtol=1e-11)
+    assert np.ptp(run.energy) < 1e-9 * run.kinetic.max()
+    assert np.ptp(run.angular_momentum, axis=0).max() < 1e-9 * np.abs(run.angular_momentum).max()
+    weight = 9.8 * (model.parameters["torso_mass"] + model.parameters["tail_mass"])
+    fallen = run.linear_momentum + np.outer(run.t, [0, 0, weight])
+    assert np.ptp(fallen, axis=0).max() < 1e-9 * weight
+    names = [
+        f"{name}_{k}" for k in (1, 2, 3, 4) for name in (("a", "b") if k % 2 else ("alpha", "beta"))
+    ]
+    assert contents(run).labels["joint"] == names
+    bent = [each for each in run.warnings if "bent" in each]
+    assert ["segment 1 " in bent[0], "segment 4 " in bent[1]] == [True, True]
+
+
+@pytest.mark.parametrize("kind", ["urdf", "xml"])
+def test_other_formats_have_no_arcs(kind, tmp_path):
+    name = "mjcf" if kind == "xml" else kind
+    with pytest.raises(st.ExportError, match="articulated"):
+        st.export(zoo.model("mixed"), name, tmp_path / f"both.{kind}")

@@ -13,4 +13,4 @@ def search(request):
     """Return a function that checks a law on examples: the same ones in every run."""
     from .searching import searched
 
-    return searched(30 if request.param == "few" else 300)
+    return searched(60 if request.param == "few" else 300)

@@ -10,23 +10,13 @@ from hypothesis import assume
 from hypothesis import strategies as some
 
 import serpentail as st
-from tests.support.models import model_folder
+from tests.support import zoo
 
 from .searching import answer, outputs
 from .strange import FORMS, plain, strange
 
-SCENES = {
-    "links": (2, 1, {"functions": "all", "contacts": ["feet", "tail", "torso"]}),
-    "arcs": (1, None, {"functions": "all"}),
-    "floats": (1, 1, {"functions": ["forward_dynamics", "energy"], "real": "float"}),
-}
+MODELS = some.sampled_from(["ground_m1_n1", "arcs1", "single"])
 CLOSE = {np.float64: 1e-9, np.float32: 2e-3}  # of a batch to its states, of the largest number
-
-
-@pytest.fixture(scope="module", params=SCENES)
-def model(request):
-    segments, links, options = SCENES[request.param]
-    return st.load(model_folder(segments, links, **options))
 
 
 def functions(model):
@@ -40,14 +30,12 @@ def functions(model):
     return found
 
 
-def calls(model, value):
-    """Strategies of a function's name with arguments, each by a strategy of its shape."""
-    return some.sampled_from(sorted(functions(model).items())).flatmap(
-        lambda entry: some.tuples(
-            some.just(entry[0]),
-            some.fixed_dictionaries({name: value(shape) for name, shape in entry[1].items()}),
-        )
-    )
+@some.composite
+def calls(draw):
+    """Return a method of a model with moderate arguments, and their shapes."""
+    model = zoo.model(draw(MODELS))
+    name, shapes = draw(some.sampled_from(sorted(functions(model).items())))
+    return getattr(model, name), {word: draw(plain(shape)) for word, shape in shapes.items()}
 
 
 def upright(arguments):
@@ -56,78 +44,93 @@ def upright(arguments):
     assume((np.linalg.norm(q[..., 3:7], axis=-1) > 1e-2).all())
 
 
-def test_a_call_is_answered_or_refused(model, search):
+def test_a_call_is_answered_or_refused(search):
     """One argument or all may be strange."""
 
-    def law(call, wrong, every):
-        name, arguments = call
-        for k, word in enumerate(arguments):
-            if every or k == wrong[0] % len(arguments):
-                shape = functions(model)[name][word]
-                arguments = arguments | {word: wrong[1].draw(strange(shape))}
-        answer(getattr(model, name), **arguments)
+    def law(call, wrong, every, data):
+        method, arguments = call
+        for k, (word, x) in enumerate(arguments.items()):
+            if every or k == wrong % len(arguments):
+                arguments = arguments | {word: data.draw(strange(x.shape))}
+        answer(method, **arguments)
 
-    search(
-        law,
-        call=calls(model, plain),
-        wrong=some.tuples(some.integers(0, 5), some.data()),
-        every=some.booleans(),
-    )
+    search(law, call=calls(), wrong=some.integers(0, 5), every=some.booleans(), data=some.data())
 
 
-@pytest.mark.parametrize("form", FORMS)
-def test_the_same_numbers_give_the_same_bits(model, search, form):
-    def law(call, batch):
-        name, arguments = call
+def test_the_same_numbers_give_the_same_bits(search):
+    def law(call, batch, form):
+        method, arguments = call
         upright(arguments)
         if batch:
             arguments = {word: np.stack([x, x]) for word, x in arguments.items()}
-        expected = answer(getattr(model, name), **arguments)
+        expected = answer(method, **arguments)
         assume(expected is not None)
-        formed = {word: FORMS[form](x) for word, x in arguments.items()}
-        found = answer(getattr(model, name), **formed)
+        found = answer(method, **{word: FORMS[form](x) for word, x in arguments.items()})
         for one, other in zip(outputs(found), outputs(expected), strict=True):
             np.testing.assert_array_equal(one, other)
             assert type(one) is type(other) and one.dtype == other.dtype
 
-    search(law, call=calls(model, plain), batch=some.booleans())
+    search(law, call=calls(), batch=some.booleans(), form=some.sampled_from(sorted(FORMS)))
 
 
-def test_a_batch_is_its_single_calls(model, search):
+def test_a_batch_is_its_single_calls(search):
     """Arguments of one state are repeated over the batch."""
 
     def law(call, several, count):
-        name, arguments = call
+        method, arguments = call
         upright(arguments)
         rows = {}
         for k, (word, x) in enumerate(arguments.items()):
             rows[word] = x if k and several[k] else np.linspace(0.5, 1.5, count)[:, None] * x
-        found = answer(getattr(model, name), **rows)
+        found = answer(method, **rows)
         assume(found is not None)
         for k in range(count):
             of_k = {word: x if x.ndim == 1 else x[k] for word, x in rows.items()}
-            for one, many in zip(
-                outputs(answer(getattr(model, name), **of_k)), outputs(found), strict=True
-            ):
+            for one, many in zip(outputs(answer(method, **of_k)), outputs(found), strict=True):
                 size = max(np.abs(one).max(), 1e-12)
                 near = CLOSE[many.dtype.type]
                 np.testing.assert_allclose(many[k], one, rtol=near, atol=near * size)
 
+    several = some.lists(some.booleans(), min_size=8, max_size=8)
+    search(law, call=calls(), several=several, count=some.sampled_from([1, 2, 3, 9]))
+
+
+def test_a_step_is_made_or_refused(search):
+    """One argument or all may be strange; one run, or nine."""
+
+    def law(name, many, wrong, every, steps, data):
+        model = zoo.model(name)
+        sizes = {"q": model.nq, "v": model.nv, "tau": model.nv - 6}
+        if model.contacts:
+            sizes |= {"bristles": 2 * sum(model.contacts.values()), "legs": 8}
+        given = {"h": 1e-4, "steps": steps}
+        for k, (word, size) in enumerate(sizes.items()):
+            shape = (9, size) if many else (size,)
+            given[word] = data.draw(strange(shape) if every or k == wrong else plain(shape))
+        if wrong == len(sizes):
+            given["h"] = data.draw(strange())
+        answer(model.step, **given)
+
     search(
         law,
-        call=calls(model, plain),
-        several=some.lists(some.booleans(), min_size=8, max_size=8),
-        count=some.sampled_from([1, 2, 3, 9]),
+        name=some.sampled_from(["ground_m1_n1", "m1_n1"]),
+        many=some.booleans(),
+        wrong=some.integers(0, 5),
+        every=some.booleans(),
+        steps=some.sampled_from([1, 3]),
+        data=some.data(),
     )
 
 
-def test_parameters_are_taken_or_refused(model, search):
+def test_parameters_are_taken_or_refused(search):
     """What is taken gives a model that evaluates, and leaves this one as it was."""
-    q = np.array([0, 0, 0, 1.0, 0, 0, 0, *[0.3] * (model.nq - 7)])
-    state = {"q": q, "v": np.full(model.nv, 0.1), "tau": np.zeros(model.nv - 6)}
-    before = model.forward_dynamics(**state)
 
-    def law(name, value):
+    def law(of, which, value):
+        model = zoo.model(of)
+        name = [*model.parameters, "mass"][which % (len(model.parameters) + 1)]
+        state = {"q": np.full(model.nq, 0.3), "v": np.full(model.nv, 0.1)}
+        state["tau"] = np.zeros(model.nv - 6)
+        before = model.forward_dynamics(**state)
         other = answer(model.with_parameters, **{name: value})
         if other is not None:
             answer(other.forward_dynamics, **state)
@@ -135,26 +138,25 @@ def test_parameters_are_taken_or_refused(model, search):
         answer(st.load, model.folder, {name: value}, compiled=False)
         np.testing.assert_array_equal(model.forward_dynamics(**state), before)
 
-    search(law, name=some.sampled_from([*model.parameters, "mass"]), value=strange((3,)))
+    search(law, of=MODELS, which=some.integers(0, 99), value=strange((3,)))
 
 
-def test_models_are_loaded_or_refused(model, search):
-    def law(wrong, which):
+def test_models_and_loads_at_points_are_made_or_refused(search):
+    def law(name, which, value):
+        model = zoo.model(name)
         given = {"folder": model.folder, "parameters": {}, "profile": None, "compiled": False}
-        answer(st.load, **given | {which: wrong})
+        if which in given:
+            answer(st.load, **given | {which: value})
+        else:
+            answer(model.external_force, **{which: value})
 
-    some_word = some.sampled_from(["folder", "parameters", "profile", "compiled"])
-    search(law, wrong=strange(), which=some_word)
-
-
-def test_loads_at_points_are_taken_or_refused(model, search):
-    def law(which, value):
-        answer(model.external_force, **{which: value})
-
-    search(law, which=some.sampled_from(["force", "moment", "tail"]), value=strange((3,)))
+    words = ["folder", "parameters", "profile", "compiled", "force", "moment", "tail"]
+    value = strange() | strange((3,))
+    search(law, name=MODELS, which=some.sampled_from(words), value=value)
 
 
-def test_unknown_words_and_too_many_are_type_errors(model):
+def test_unknown_words_and_too_many_are_type_errors():
+    model = zoo.model("ground_m1_n1")
     for name, shapes in functions(model).items():
         with pytest.raises(TypeError):
             getattr(model, name)(*[np.zeros(3)] * (len(shapes) + 3))

@@ -13,15 +13,9 @@ import pytest
 from serpentail import cli
 from serpentail.verification import report as verify
 from serpentail_codegen.scene.signatures.table import SIGNATURES
-from tests.support.models import model_folder
+from tests.support import zoo
+from tests.support.rows import row
 from tests.support.told import besides_progress
-
-MADE = ("mass_matrix", "forward_dynamics", "energy")  # in their order; a rollout calls one
-
-
-@pytest.fixture(scope="module")
-def folder():
-    return str(model_folder(1, 1, name="tail", functions=["mass_matrix", "energy", "rollout"]))
 
 
 @pytest.fixture
@@ -29,152 +23,119 @@ def run(capsys):
     """Return a function from arguments to status, stdout and stderr."""
 
     def invoke(*arguments):
-        status = cli.main(list(arguments))
+        status = cli.main(list(map(str, arguments)))
         return status, *capsys.readouterr()
 
     return invoke
 
 
-def refused(capsys, *arguments):
-    """Status and stderr of arguments that do not parse."""
-    with pytest.raises(SystemExit) as caught:
-        cli.main(list(arguments))
-    out, err = capsys.readouterr()
-    assert not out
-    return caught.value.code, err
-
-
-def test_info_is_a_table(run, folder):
-    status, out, err = run("info", folder)
+def test_info_is_a_table_in_columns(run):
+    model = zoo.model("m1_n1")
+    status, out, err = run("info", model.folder)
     head, *lines = out.splitlines()
     assert (status, besides_progress(err)) == (0, "")
-    assert head == "tail: 1 x 1 links, nq 9, nv 8, double"
-    rows = [line for line in lines if not line.startswith("    ")]
-    assert [row.split()[0] for row in rows] == [*MADE]
-    for row in rows:
-        _, emission, operations, word = row.split()
-        assert emission == "straight" and int(operations) > 10 and word == "operations"
-    assert len({line.index(" operations") for line in rows}) == 1
-
-
-def test_info_has_arguments_with_shapes_and_units_in_columns(run, folder):
-    _, out, _ = run("info", folder)
-    lines = [line for line in out.splitlines() if line.startswith("    ")]
-    words = [re.split("  +", line.strip()) for line in lines]
-    assert ["out H", "8 x 8", str(SIGNATURES["mass_matrix"].outputs[0].meaning)] in words
+    assert head == "m1_n1: 1 x 1 links, nq 9, nv 8, double"
+    functions = [line for line in lines if not line.startswith("    ")]
+    names = [line.split()[0] for line in functions]
+    assert names == [name for name in SIGNATURES if name in names]
+    assert {"mass_matrix", "forward_dynamics_derivatives", "energy"} <= set(names)
+    for line in functions:  # no column is glued to the next
+        with row(line):
+            assert re.fullmatch(r"  \w+ +(straight|loops) +\d+ operations", line)
+    assert len({line.index(" operations") for line in functions}) == 1
+    ports = [line for line in lines if line.startswith("    ")]
+    words = [re.split("  +", line.strip()) for line in ports]
+    assert ["out H", "8 x 8", SIGNATURES["mass_matrix"].outputs[0].meaning] in words
     assert ["in", "q", "9", SIGNATURES["energy"].inputs[0].meaning] in words
     # each last column begins where the others do
-    assert len({line.index(last) for line, (*_, last) in zip(lines, words, strict=True)}) == 1
-    ports = (p for n in MADE for p in (*SIGNATURES[n].inputs, *SIGNATURES[n].outputs))
-    assert [last for *_, last in words] == [port.meaning for port in ports]
+    assert len({line.index(last) for line, (*_, last) in zip(ports, words, strict=True)}) == 1
+    below = lines.index(functions[names.index("energy")]) + 1
+    told = [line.split("  ")[-1].strip() for line in lines[below : below + 4]]
+    energy = SIGNATURES["energy"]
+    assert told == [port.meaning for port in (*energy.inputs, *energy.outputs)]
 
 
-def test_no_column_of_info_is_glued_to_the_next(run):
-    """The longest name, a form's name and a large number, with spaces in between."""
-    place = model_folder(3, 4, functions=["forward_dynamics_derivatives"])
-    _, out, _ = run("info", str(place))
-    assert re.search(r"^  forward_dynamics_derivatives  \w+ +\d+ operations$", out, re.MULTILINE)
-
-
-def test_info_as_json(run, folder):
-    status, out, err = run("info", folder, "--json", "-")
+def test_info_as_json(run):
+    status, out, err = run("info", zoo.folder("m1_n1"), "--json", "-")
     report = json.loads(out)
     assert (status, err, out.count("\n")) == (0, "", 1)
-    assert {key: report[key] for key in ("name", "real", "segments", "links", "nq", "nv")} == {
-        "name": "tail",
-        "real": "double",
-        "segments": 1,
-        "links": 1,
-        "nq": 9,
-        "nv": 8,
-    }
+    wanted = {"name": "m1_n1", "real": "double", "segments": 1, "links": 1}
+    assert wanted | {"nq": 9, "nv": 8} == {k: report[k] for k in (*wanted, "nq", "nv")}
     assert report["parameters"]["tail_mount"] == [0.0, -0.0405, 0.0045]
     assert report["functions"]["energy"]["inputs"] == {"q": [9], "v": [8]}
     assert report["functions"]["energy"]["outputs"] == {"kinetic": [1], "potential": [1]}
 
 
-def test_verify_finds_nothing_wrong(run, folder):
-    status, out, err = run("verify", folder)
+def test_verify_finds_nothing_wrong(run):
+    status, out, err = run("verify", zoo.folder("bare"))
     assert (status, besides_progress(err)) == (0, "")
-    assert out.startswith("tail: ") and "0 failed" in out and "FAILED" not in out
-
-
-def test_verify_as_json(run, folder):
-    status, out, err = run("verify", folder, "--json", "-")
+    assert "0 failed" in out and "FAILED" not in out
+    status, out, err = run("verify", zoo.folder("bare"), "--json", "-")
     report = json.loads(out)
     assert (status, err, out.count("\n")) == (0, "", 1)
-    assert report["name"] == "tail" and report["passed"] is True and report["counts"]["failed"] == 0
+    assert report["passed"] is True and report["counts"]["failed"] == 0
     assert {check["status"] for check in report["checks"]} == {"passed", "not checked"}
 
 
-@pytest.mark.parametrize("form", [[], ["--json", "-"]])
-def test_failed_check_is_status_1(run, folder, monkeypatch, form):
+def test_failed_check_is_status_1(run, monkeypatch):
     found = [
         verify.Check("a law", "It holds.", 2.0, 1.0, "a state"),
         verify.Check("another", "It holds.", 0.0, 1.0),
     ]
     monkeypatch.setattr(verify, "laws", lambda _: found)
-    status, out, err = run("verify", folder, *form)
-    assert (status, err) == (1, "")
-    if form:
-        assert json.loads(out)["passed"] is False
-    else:
-        assert "FAILED" in out
+    status, out, err = run("verify", zoo.folder("bare"))
+    assert (status, err) == (1, "") and "FAILED" in out
+    status, out, err = run("verify", zoo.folder("bare"), "--json", "-")
+    assert (status, err) == (1, "") and json.loads(out)["passed"] is False
 
 
-@pytest.mark.parametrize("form", [[], ["--json", "-"]])
-@pytest.mark.parametrize("verb", ["info", "verify"])
-def test_missing_folder_is_status_2(run, tmp_path, verb, form):
-    status, out, err = run(verb, str(tmp_path / "nowhere"), *form)
-    assert (status, out) == (2, "")
-    assert (
-        err.startswith(f"{tmp_path / 'nowhere'} is not a generated folder") and "make model" in err
-    )
+def test_what_is_no_folder_is_one_line_and_status_2(run, tmp_path):
+    nowhere = tmp_path / "nowhere"
+    for place, words in [
+        (nowhere, r"nowhere.*no.* generated folder.*make model"),
+        (tmp_path, "not a generated folder"),
+        *((place, "") for place in ("a" * 5000, "a\0b", "/dev/null", "/dev/zero/a")),
+    ]:
+        for verb in (["info"], ["verify", "--json", "-"]):
+            with row(*verb, place):
+                status, out, err = run(*verb, place)
+                assert (status, out) == (2, "") and err.count("\n") == 1 and len(err) < 400
+                assert re.search(words, err)
 
 
-@pytest.mark.parametrize("folder", ["a" * 5000, "a\0b", "/dev/null", "/dev/zero/a"])
-@pytest.mark.parametrize("verb", ["info", "verify"])
-def test_a_path_that_is_none_is_one_line(run, verb, folder):
-    status, out, err = run(verb, folder)
-    assert (status, out) == (2, "") and err.count("\n") == 1 and len(err) < 400
-
-
-def test_missing_compiler_is_status_2(run, folder, monkeypatch):
+def test_missing_compiler_is_status_2(run, monkeypatch):
     monkeypatch.setenv("CC", "no-such-cc")
-    status, out, err = run("info", folder)
+    status, out, err = run("info", zoo.folder("bare"))
     assert (status, out) == (2, "") and "CC='no-such-cc'" in err
 
 
-def test_wrong_usage_is_status_2(capsys, folder):
+def test_wrong_usage_is_status_2_and_help_names_every_verb(capsys):
     for arguments, words in [
-        ([], "required: VERB"),
-        (["fly"], "invalid choice: 'fly'"),
-        (["info"], "required: model"),
-        (["info", folder, "--json", "report.json"], "invalid choice: 'report.json'"),
+        ([], "VERB"),
+        (["fly"], "'fly'"),
+        (["info"], "model"),
+        (["info", "x", "--json", "report.json"], "'report.json'"),
+        (["info", "x", "--nonsense"], "--nonsense"),
     ]:
-        status, err = refused(capsys, *arguments)
-        assert status == 2 and words in err and err.startswith("usage: serpentail")
-
-
-def test_help_names_every_verb(capsys):
+        with row(*arguments), pytest.raises(SystemExit) as caught:
+            cli.main(arguments)
+        out, err = capsys.readouterr()
+        assert (caught.value.code, out) == (2, "")
+        assert words in err and err.startswith("usage: serpentail")
     with pytest.raises(SystemExit) as caught:
         cli.main(["--help"])
     out, err = capsys.readouterr()
-    assert caught.value.code == 0 and not err
-    assert "info" in out and "verify" in out
+    assert (caught.value.code, err) == (0, "")
+    assert all(verb in out for room in cli.ROOMS.values() for verb in room)
 
 
-@pytest.mark.parametrize(
-    "program", [[str(Path(sys.executable).parent / "serpentail")], ["-m", "serpentail.cli"]]
-)
-def test_installed_program(program, folder, tmp_path):
-    command = program if len(program) == 1 else [sys.executable, *program]
-    good, bad = (
-        subprocess.run(
-            [*command, "info", place, "--json", "-"], capture_output=True, text=True, check=False
-        )
-        for place in (folder, str(tmp_path))
-    )
-    assert (good.returncode, besides_progress(good.stderr)) == (0, "")
-    assert json.loads(good.stdout)["name"] == "tail"
-    assert (bad.returncode, bad.stdout) == (2, "") and "is not a generated folder" in bad.stderr
+def test_installed_program(tmp_path):
+    beside = Path(sys.executable).parent / "serpentail"
+    for program, place, status in [
+        ([beside], zoo.folder("bare"), 0),
+        ([sys.executable, "-m", "serpentail.cli"], tmp_path, 2),
+    ]:
+        command = [*program, "info", place, "--json", "-"]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        told = besides_progress(done.stderr)
+        assert done.returncode == status and bool(done.stdout) != bool(told)

@@ -6,7 +6,7 @@ import re
 import tokenize
 from pathlib import Path
 
-import pytest
+from tests.support.rows import row
 
 ROOT = next(folder for folder in Path(__file__).parents if (folder / "pyproject.toml").exists())
 HOMES = (ROOT, ROOT / "codegen" / "serpentail_codegen", ROOT / "runtime" / "serpentail")
@@ -93,16 +93,9 @@ def test_each_equation_has_one_row_in_order():
     assert [number for number, _ in ROWS] == EQUATIONS
 
 
-@pytest.mark.parametrize("row", ROWS, ids=[row[0] for row in ROWS])
-def test_row_is_true(row):
-    number, where = row
-    assert places(where)
-    for file, name in places(where):
-        assert number in named(text_of(file, name)), f"{file}: {name} does not name {number}"
-
-
-@pytest.mark.parametrize("document", sorted(ROOT.glob("docs/*.md")), ids=lambda path: path.name)
-def test_tables_begin_with_their_header(document):
-    text = re.sub(r"(?ms)^```.*?^```$", "", document.read_text(encoding="utf-8"))
-    tables = re.findall(r"(?m)(?:^\|.*\n)+", text)
-    assert [table for table in tables if not re.match(r".*\n\|(?: ?-+:? ?\|)+\n", table)] == []
+def test_rows_are_true():
+    for number, where in ROWS:
+        with row(number):
+            assert places(where)
+            for file, name in places(where):
+                assert number in named(text_of(file, name)), (file, name)

@@ -12,8 +12,9 @@ from serpentail import cli
 from serpentail.building import build as building
 from serpentail.scenes.plan import planned
 from serpentail.verification import report
+from tests.support import zoo
 from tests.support.drawn_flight import flight
-from tests.support.models import model_folder
+from tests.support.rows import row
 
 ROOT = Path(__file__).parents[2]
 RUNTIME = ROOT / "runtime" / "serpentail"
@@ -39,11 +40,6 @@ def without(monkeypatch):
     return lambda name: monkeypatch.setitem(sys.modules, name, None)
 
 
-@pytest.fixture(scope="module")
-def folder():
-    return model_folder(1, 1, functions=["energy", "momentum", "mass_matrix"])
-
-
 def missing(extra):
     return pytest.raises(st.ExtraMissing, match=rf'pip install "serpentail\[{extra}\]"')
 
@@ -60,18 +56,12 @@ def test_every_gate_names_an_extra_that_brings_the_library():
         assert BROUGHT_ALONG.get(module, module) in names(EXTRAS[extra])
 
 
-@pytest.mark.parametrize("library", HOMES)
-def test_libraries_of_extras_are_imported_in_their_rooms_alone(library):
-    importing = re.compile(rf"^ *(?:import|from) {library}\b", re.MULTILINE)
+def test_libraries_of_extras_are_imported_in_their_rooms_alone():
     for path in RUNTIME.rglob("*.py"):
-        if importing.search(path.read_text(encoding="utf-8")):
-            assert path.relative_to(RUNTIME).as_posix().startswith(HOMES[library]), path
-
-
-def test_users_get_all_extras_by_one_name():
-    (text,) = EXTRAS["all"]
-    listed = set(re.search(r"\[(.*)\]", text)[1].split(","))
-    assert listed == set(EXTRAS) - {"all", "dev", "docs", "jax", "peers", "soromox", "torch", "zig"}
+        text = path.read_text(encoding="utf-8")
+        for library, homes in HOMES.items():
+            if re.search(rf"^ *(?:import|from) {library}\b", text, re.MULTILINE):
+                assert path.relative_to(RUNTIME).as_posix().startswith(homes), (library, path)
 
 
 def test_the_core_has_neither_casadi_nor_matplotlib():
@@ -79,12 +69,9 @@ def test_the_core_has_neither_casadi_nor_matplotlib():
     assert names(PROJECT["dependencies"]) == wanted
 
 
-# Without CasADi
-
-
-def test_plan_and_casadi_functions_name_the_extra(without, folder):
+def test_plan_and_casadi_functions_name_the_extra(without):
     without("casadi")
-    model = st.load(folder)
+    model = st.load(zoo.folder("m1_n1"))
     with missing("plan"):
         _ = model.casadi
     with missing("plan"):
@@ -102,34 +89,23 @@ def test_a_scenes_plan_is_refused_before_its_model_is_made(without, monkeypatch,
     assert out == "" and error.count("\n") == 1 and 'pip install "serpentail[plan]"' in error
 
 
-def test_laws_about_casadi_say_that_they_were_not_checked(without, folder):
+def test_laws_about_casadi_say_that_they_were_not_checked(without):
     without("casadi")
-    checks = report.laws(st.load(folder))
+    checks = report.laws(st.load(zoo.folder("bare")))
     skipped = {check.name for check in checks if "serpentail[plan]" in check.omitted}
     assert skipped == {"casadi functions agree", "casadi externals are the compiled code"}
     assert all(check.passed for check in checks)
 
 
-# Without Matplotlib
-
-
-@pytest.mark.parametrize("kind", ["png", "gif", "svg"])
-def test_a_film_names_the_extra(without, tmp_path, kind):
+def test_pictures_name_the_extra(without, tmp_path, monkeypatch, capsys):
     without("matplotlib")
-    with missing("plot"):
-        st.film(flight(), tmp_path / f"film.{kind}")
+    for kind in ("png", "gif", "svg"):
+        with row(kind), missing("plot"):
+            st.film(flight(), tmp_path / f"film.{kind}")
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("draw", [st.filmstrip, st.plot])
-def test_a_figure_names_the_extra(without, draw):
-    without("matplotlib")
-    with missing("plot"):
-        draw(flight())
-
-
-def test_the_command_refuses_a_picture_before_the_run(without, monkeypatch, capsys):
-    without("matplotlib")
+    for draw in (st.filmstrip, st.plot):
+        with missing("plot"):
+            draw(flight())
     monkeypatch.setattr(cli, "run", lambda _: pytest.fail("it ran"))
     assert cli.main(["simulate", "kick", "--film", "kick.png"]) == 2
     assert 'pip install "serpentail[plot]"' in capsys.readouterr().err

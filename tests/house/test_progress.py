@@ -8,9 +8,7 @@ import pytest
 
 import serpentail as st
 from serpentail.stages import Stage, Told
-from tests.support.models import model_folder
-
-TINY = {"tail": "articulated", "segments": 1, "links": 1, "functions": ["energy", "momentum"]}
+from tests.support import zoo
 
 
 class Terminal(io.StringIO):
@@ -28,30 +26,28 @@ def clock(monkeypatch):
     return lambda seconds: now.__setitem__(0, now[0] + seconds)
 
 
-def test_a_function_is_told_each_stage(tmp_path, monkeypatch):
+def test_a_function_is_told_each_stage_and_ends_the_work_by_what_it_raises(tmp_path, monkeypatch):
     monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path))
+    # made anew, because its making is what is told
+    tiny = {"tail": "articulated", "segments": 1, "links": 1, "functions": ["energy", "momentum"]}
+    with pytest.raises(ZeroDivisionError), st.progress(enough):
+        st.build(**tiny)
     told = []
     with st.progress(told.append):
-        st.build(**TINY)
+        st.build(**tiny)  # nothing is left in the way
     ends = [now for now in told if now.ended]
     assert [now.stage for now in ends] == ["derive", "compile"]
     assert ends[0].what == "articulated_m1_n1" and ends[0].left == 0
     parts = [now.done for now in told if now.stage == "derive" and now.done is not None]
     assert parts == sorted(parts) and all(0 <= part < 1 for part in parts)
     count = len(told)
-    st.build(**TINY)
+    st.build(**tiny)
     assert len(told) == count
 
 
-def test_what_it_raises_ends_the_work(tmp_path, monkeypatch):
-    monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path))
-
-    def enough(now):
-        raise ZeroDivisionError
-
-    with pytest.raises(ZeroDivisionError), st.progress(enough):
-        st.build(**TINY)
-    assert st.build(**TINY).segments == 1  # nothing is left in the way
+def enough(now):
+    """End the work."""
+    raise ZeroDivisionError(now.stage)
 
 
 def test_the_estimate_is_of_what_is_left():
@@ -61,31 +57,22 @@ def test_the_estimate_is_of_what_is_left():
     assert str(st.Progress("plan", "rat", 0.25, 10.0, ended=True)) == "plan rat: 10.0 s"
 
 
-def stages(stream, clock):
-    """A stage of half a second, and one of a minute."""
-    hook = Told(stream)
-    with st.progress(hook):
-        with Stage("compile", "short") as stage:
-            clock(0.5)
-            stage.tell(0.5)
-        with Stage("derive", "long") as stage:
-            for part in range(60):
-                clock(1)
-                stage.tell(part / 60)
-
-
-def test_a_pipe_has_few_lines(clock):
-    stream = io.StringIO()
-    stages(stream, clock)
-    lines = stream.getvalue().splitlines()
+def test_a_pipe_has_few_lines_and_a_terminal_one_that_ends_empty(clock):
+    """Of a stage of half a second, and one of a minute."""
+    texts = []
+    for stream in (io.StringIO(), Terminal()):
+        with st.progress(Told(stream)):
+            with Stage("compile", "short") as stage:
+                clock(0.5)
+                stage.tell(0.5)
+            with Stage("derive", "long") as stage:
+                for part in range(60):
+                    clock(1)
+                    stage.tell(part / 60)
+        texts.append(stream.getvalue())
+    lines, text = texts[0].splitlines(), texts[1]
     assert lines[0] == "derive long: 1 s so far" and lines[-1] == "derive long: 60.0 s"
     assert len(lines) == 2 + 5 and lines[1] == "derive long: 17%, 11 s, 55 s left"
-
-
-def test_a_terminal_has_one_line_that_ends_empty(clock):
-    stream = Terminal()
-    stages(stream, clock)
-    text = stream.getvalue()
     assert "\n" not in text and "short" not in text and text.count("derive long") == 60
     assert text.rsplit("\r", 2)[1].isspace() and text.endswith("\r")
 
@@ -103,25 +90,15 @@ def test_a_part_of_another_stage_is_told_to_functions_alone(clock):
     assert [now.depth for now in told] == [0, 1, 1, 0]
 
 
-def test_nobody_is_told_by_default(tmp_path, monkeypatch, capsys):
-    monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path))
-    st.build(**TINY)
-    assert capsys.readouterr() == ("", "")
-
-
-def test_the_log_has_the_end_of_each_stage(caplog):
+def test_nobody_is_told_by_default_and_the_log_of_the_ends(clock, caplog, capsys):
     with caplog.at_level(logging.INFO, "serpentail"):
-        with Stage("compile", "rat.c"):
-            pass
+        with Stage("compile", "rat.c") as stage:
+            clock(60)
+            stage.tell(0.5)
         with pytest.raises(KeyError), Stage("derive", "rat"):
             raise KeyError
-    assert caplog.messages == ["compile rat.c: 0.0 s", "derive rat: 0.0 s, ended by KeyError"]
-
-
-@pytest.fixture(scope="module")
-def rat():
-    functions = ["mass_matrix", "inverse_dynamics", "energy", "momentum", "rollout"]
-    return st.load(model_folder(1, 2, functions=[*functions, "forward_dynamics"]))
+    assert caplog.messages == ["compile rat.c: 60.0 s", "derive rat: 0.0 s, ended by KeyError"]
+    assert capsys.readouterr() == ("", "")
 
 
 def start(model):
@@ -131,44 +108,46 @@ def start(model):
     return q, v
 
 
-@pytest.mark.parametrize("threads", [1, 2])
-def test_runs_are_told_by_the_part_that_is_done(rat, threads):
-    told, (q, v) = [], start(rat)
-    many = np.tile(q, (400, 1))
+def told_of(stage, work):
+    """What a function is told of a stage of some work, by the part that is done."""
+    told = []
     with st.progress(told.append):
-        st.simulate(rat, many, v, t_span=1.0, method="rk4", threads=threads)
-    told = [now for now in told if now.stage == "simulate"]
+        work()
+    told = [now for now in told if now.stage == stage]
     parts = [now.done for now in told]
-    assert "400 runs" in told[0].what
     assert parts == sorted(parts) and parts[-1] == 1.0 and told[-1].ended
+    return told
 
 
-def test_a_long_run_is_told(rat):
-    told, (q, v) = [], start(rat)
-    with st.progress(told.append):
-        st.simulate(rat, q, v, t_span=500, method="rk4", output_step=1.0, step=1e-3)
-    parts = [now.done for now in told]
-    assert len(parts) > 2 and parts == sorted(parts) and parts[0] < 1
-
-
-@pytest.mark.parametrize("what", ["run", "runs", "plan"])
-def test_what_the_function_raises_ends_long_work(rat, what):
+def test_runs_and_a_long_run_are_told_by_the_part_that_is_done():
+    rat = zoo.model("m1_n1")
     q, v = start(rat)
-
-    def enough(now):
-        raise ZeroDivisionError(now.stage)
-
-    with pytest.raises(ZeroDivisionError), st.progress(enough):
-        if what == "plan":
-            st.plan(rat, start=(q, v), duration=0.3)
-        else:
-            st.simulate(rat, np.tile(q, (3, 1)) if what == "runs" else q, v, t_span=500)
+    many = {"q0": np.tile(q, (400, 1)), "v0": v, "t_span": 0.2, "method": "rk4"}
+    for threads in (1, 2):
+        told = told_of("simulate", lambda t=threads: st.simulate(rat, threads=t, **many))
+        assert "400 runs" in told[0].what
+    long = {"t_span": 300, "method": "rk4", "output_step": 1.0, "step": 1e-3}
+    told = told_of("simulate", lambda: st.simulate(rat, q, v, **long))
+    assert len(told) > 2 and told[0].done < 1
 
 
-def test_a_plan_tells_its_rounds(rat):
-    told, (q, v) = [], start(rat)
+def test_what_the_function_raises_ends_long_work():
+    rat = zoo.model("m1_n3")
+    q, v = start(rat)
+    for stage, work in [
+        ("simulate", lambda: st.simulate(rat, q, v, t_span=500)),
+        ("simulate", lambda: st.simulate(rat, np.tile(q, (3, 1)), v, t_span=500)),
+        ("plan", lambda: st.plan(rat, start=(q, v), duration=0.3)),
+    ]:
+        with pytest.raises(ZeroDivisionError, match=stage), st.progress(enough):
+            work()
+
+
+def test_a_plan_tells_its_rounds():
+    rat, told = zoo.model("m1_n3"), []
+    settings = {"duration": 0.3, "intervals": 6, "rounds": 2, "track": False}
     with st.progress(told.append):
-        plan = st.plan(rat, start=(q, v), duration=0.3, track=False)
+        plan = st.plan(rat, start=start(rat), goal=st.Goal(attitude=None), **settings)
     plans = [now for now in told if now.stage == "plan"]
     rounds = {now.what for now in plans if "after round" in now.what}
     assert len(rounds) == plan.report["rounds"] and plans[-1].ended

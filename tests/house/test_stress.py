@@ -11,83 +11,52 @@ import pytest
 import serpentail as st
 from serpentail.model.sizes import UNLIKE as UNLIKE_FROM
 from serpentail.model.sizes import disparity
-from stress import call_fuzz, drops, scene_fuzz, stress_plots
+from stress import call_fuzz, drops, poses, scene_fuzz, stress_plots
 from stress.call_fuzz import Fault, Target
 from stress.figures import Figure, table
 from stress.poses import Point
-from stress.subjects import Errors, Subject, changed, exact_of, state
+from stress.subjects import Errors, Subject, changed, errors, exact_of, judged, state
 from tests.references.metrics import mass_matrix_error
-from tests.support.models import model_folder
+from tests.support import zoo
+from tests.support.rows import row
 
-SCENES = sorted((Path(__file__).parents[2] / "scenes").glob("*.toml"))
-slow_count = pytest.param(10_000, marks=pytest.mark.slow)
-
-
-@pytest.fixture(scope="module")
-def standing():
-    return st.load(model_folder(1, 3, contacts=["feet", "tail"], functions="all"))
+ROOT = Path(__file__).parents[2]
+SCENES = sorted((ROOT / "scenes").glob("*.toml"))
+KINDS = {"links": "feet_tail", "arcs": "ground_arcs"}  # models of the zoo
 
 
-@pytest.fixture(scope="module")
-def lying():
-    return st.load(model_folder(2, None, contacts=["torso"]))
+def numbers(few, many):
+    """Two sizes of a test, the larger of them slow."""
+    return pytest.mark.parametrize("count", [few, pytest.param(many, marks=pytest.mark.slow)])
 
 
-@pytest.mark.parametrize("count", [400, slow_count])
-def test_random_calls_are_answered_or_refused(standing, lying, count, tmp_path, monkeypatch):
+@numbers(150, 4000)
+def test_random_calls_are_answered_or_refused(count, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    for seed, model in enumerate((standing, lying)):
+    for seed, model in enumerate(map(zoo.model, KINDS.values())):
         assert call_fuzz.fuzz(call_fuzz.targets(model, tmp_path), count, seed) == []
 
 
-@pytest.mark.parametrize(
-    ("found", "passed"), [(1.0, True), (1.1, False), (np.nan, False), (np.inf, False)]
-)
-def test_a_figure_beyond_its_limit_fails(found, passed):
-    figure = Figure("it", found, 1.0)
-    assert (figure.passed, figure.row()["passed"], "**FAILED**" in table([figure])) == (
-        passed,
-        passed,
-        not passed,
-    )
-
-
-def test_plots_are_drawn(tmp_path):
-    errors = [Errors(1e-16, 0.0, 1e-15, condition) for condition in (3.0, 1e4)]
-    swept = [
-        Point(tail, bend, e)
-        for tail in ("one", "two")
-        for bend, e in zip((0.0, 1.0), errors, strict=True)
-    ]
-    figures = [
-        Figure("v_dot", 1e-16, 5e-15, "cond(H) 1e4"),
-        Figure("faults", 0, 0),
-        Figure("drift", 0.0, 1e-6),
-    ]
-    stress_plots.draw({"Part": figures}, swept, tmp_path)
-    assert sorted(path.name for path in tmp_path.iterdir()) == [
-        "bends.png",
-        "condition.png",
-        "margins.png",
-    ]
-
-
-@pytest.mark.parametrize("result", [np.array([1.0, np.nan]), (1.0, (np.inf,))])
-def test_the_fuzz_sees_results_that_are_no_numbers(result):
-    found = call_fuzz.fuzz([Target("it", lambda x: result, {"x": 1.0})], 5, 1)
-    assert [fault.kind for fault in found] == ["no number"]
-
-
-def test_the_fuzz_sees_bare_errors():
+def test_the_fuzz_sees_bare_errors_and_results_that_are_no_numbers():
+    for result in (np.array([1.0, np.nan]), (1.0, (np.inf,))):
+        found = call_fuzz.fuzz([Target("it", lambda x, r=result: r, {"x": 1.0})], 5, 1)
+        assert [fault.kind for fault in found] == ["no number"]
     found = call_fuzz.fuzz([Target("it", lambda x: {}["absent"], {"x": 1.0})], 5, 1)
     assert [(fault.kind, fault.target) for fault in found] == [("bare error", "it")]
     assert isinstance(found[0], Fault)
 
 
-def test_an_unusual_number_in_a_scene_is_no_fault(standing, tmp_path, monkeypatch):
+@numbers(100, 1000)
+def test_mutated_scene_files_are_read_or_refused(count, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    dice, model = random.Random(count), zoo.model("ground")
+    assert scene_fuzz.faults(SCENES, count, dice, tmp_path, model) == []
+
+
+def test_an_unusual_number_in_a_scene_is_no_fault(tmp_path, monkeypatch):
     """Warnings are errors here, as in the stress test."""
-    path = tmp_path / "bent.toml"
-    text = (SCENES[0].parent / "kick.toml").read_text(encoding="utf-8")
+    path, standing = tmp_path / "bent.toml", zoo.model("feet_tail")
+    text = (ROOT / "scenes" / "kick.toml").read_text(encoding="utf-8")
     assert "\nheight = " in text
     path.write_text(text.replace("\nheight = ", "\nbends = 11.6\nheight = "), encoding="utf-8")
     monkeypatch.chdir(tmp_path)
@@ -97,30 +66,35 @@ def test_an_unusual_number_in_a_scene_is_no_fault(standing, tmp_path, monkeypatc
     assert scene_fuzz.faults([path], 1, random.Random(1), tmp_path, standing) == []
 
 
-@pytest.mark.parametrize("count", [300, slow_count])
-def test_mutated_scene_files_are_read_or_refused(count, tmp_path, monkeypatch):
-    functions = ["forward_dynamics", "rollout", "energy", "momentum", "pfl"]
-    model = st.load(model_folder(3, 4, contacts=["feet", "tail", "torso"], functions=functions))
-    monkeypatch.chdir(tmp_path)
-    assert scene_fuzz.faults(SCENES, count, random.Random(count), tmp_path, model) == []
+def test_a_figure_beyond_its_limit_fails_and_plots_are_drawn(tmp_path):
+    for found, passed in [(1.0, True), (1.1, False), (np.nan, False), (np.inf, False)]:
+        with row(found):
+            figure = Figure("it", found, 1.0)
+            assert figure.passed == figure.row()["passed"] == passed
+            assert ("**FAILED**" in table([figure])) != passed
+    found = [Errors(1e-16, 0.0, 1e-15, condition) for condition in (3.0, 1e4)]
+    swept = [Point(tail, bend, found[bend]) for tail in ("one", "two") for bend in (0, 1)]
+    figures = [Figure("v_dot", 1e-16, 5e-15, "cond(H) 1e4"), Figure("faults", 0, 0)]
+    stress_plots.draw({"Part": figures}, swept, tmp_path)
+    names = sorted(path.name for path in tmp_path.iterdir())
+    assert names == ["bends.png", "condition.png", "margins.png"]
 
 
-@pytest.mark.parametrize("method", ["ros34pw2", "tsit5", "dop853"])
-def test_a_drop_gains_no_energy(method):
-    """The drop whose samples before the landing once had two thirds too much; dop853 once gave it
-    up.
+@pytest.mark.parametrize("one_arc", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_a_drop_gains_no_energy(one_arc):
+    """Of one arc: the drop whose samples before the landing once had two thirds too much; dop853
+    once gave it up.
     """
-    model, rng = drops.falling(1, None), np.random.default_rng(11)
+    model = drops.falling(1, None) if one_arc else zoo.model("ground_arcs")
+    rng = np.random.default_rng(11)
     for _ in range(26):
         q, v = drops.start(model, rng)
         legs = st.Legs.fixed(rng.uniform(2, 4.5), rng.uniform(-1.5, 1))
-    settings = {
-        "controller": st.Damping(1e-4),
-        "legs": legs,
-        "t_span": drops.DURATION,
-        "output_step": 0.01,
-    }
-    assert drops.gain(st.simulate(model, q, v, method=method, **settings)) <= drops.GAIN
+    settings = {"controller": st.Damping(1e-4), "legs": legs, "t_span": drops.DURATION}
+    for method in ("ros34pw2", "tsit5", "dop853"):
+        with row(method):
+            motion = st.simulate(model, q, v, method=method, output_step=0.01, **settings)
+            assert drops.gain(motion) <= drops.GAIN
 
 
 UNLIKE = {
@@ -132,22 +106,21 @@ UNLIKE = {
 
 
 @pytest.mark.filterwarnings("ignore::serpentail.errors.UnusualSize")
-@pytest.mark.parametrize("change", UNLIKE.values(), ids=UNLIKE)
-def test_bodies_of_unlike_size_are_told(lying, change):
-    with pytest.warns(
-        st.UnlikeBodies,
-        match=r"differ by a factor of .*: H may be off by as many roundings; are the",
-    ):
-        other = lying.with_parameters(**change)
-    with pytest.warns(st.UnlikeBodies):
-        st.load(lying.folder, parameters=change)
-    assert other.parameters["tail_mass"] == lying.parameters["tail_mass"]
+def test_bodies_of_unlike_size_are_told():
+    lying = zoo.model("ground_arcs")
+    for name, change in UNLIKE.items():
+        with row(name):
+            with pytest.warns(st.UnlikeBodies, match=r"factor of .*: H may be off"):
+                other = lying.with_parameters(**change)
+            with pytest.warns(st.UnlikeBodies):
+                st.load(lying.folder, parameters=change)
+            assert other.parameters["tail_mass"] == lying.parameters["tail_mass"]
 
 
 @pytest.mark.slow
-def test_the_warning_is_true(lying):
+def test_the_warning_is_true():
     """It comes where H is off by more than 1e-12, and an error is never more than it says."""
-    off = {}
+    off, lying = {}, zoo.model("ground_arcs")
     for name, change in UNLIKE.items():
         of = changed(Subject("", lying, None), **change)
         straight = [
@@ -162,21 +135,14 @@ def test_the_warning_is_true(lying):
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::serpentail.errors.UnusualSize")
-@pytest.mark.parametrize("name", ["standing", "lying"])
-def test_bodies_without_the_warning_keep_their_digits(request, name):
+@pytest.mark.parametrize("name", KINDS.values())
+def test_bodies_without_the_warning_keep_their_digits(name):
     """Random bodies as unlike as may be without it."""
-    of, rng, quiet = Subject("", request.getfixturevalue(name), None), np.random.default_rng(4), 0
-    while quiet < 12:
-        heavy, long, wide = (
-            10 ** rng.uniform(-4, 4),
-            10 ** rng.uniform(-3, 3),
-            10 ** rng.uniform(-3, 3),
-        )
-        change = {
-            "tail_mass": 3.5e-3 * heavy,
-            "tail_length": 0.2 * long,
-            "tail_mount": (0, -0.04 * wide, 4e-3 * wide),
-        }
+    of, rng, quiet = Subject("", zoo.model(name), None), np.random.default_rng(4), 0
+    while quiet < 8:
+        heavy, long, wide = 10 ** rng.uniform((-4, -3, -3), (4, 3, 3))
+        change = {"tail_mass": 3.5e-3 * heavy, "tail_length": 0.2 * long}
+        change |= {"tail_mount": (0, -0.04 * wide, 4e-3 * wide)}
         if 1e2 < disparity(of.model.parameters | change) < UNLIKE_FROM:
             other, quiet = Subject("", of.model.with_parameters(**change), None), quiet + 1
             for bends in (np.zeros(of.model.nv - 6), rng.uniform(-1, 1, of.model.nv - 6)):
@@ -188,96 +154,67 @@ def errors_of_mass_matrix(of, q):
     return mass_matrix_error(of.model.mass_matrix(q), exact_of(of.model).mass_matrix(q))
 
 
-def test_vjp_of_a_model_with_contacts_is_that_of_flight(standing):
-    flight = st.load(model_folder(1, 3, functions=["forward_dynamics_vjp"]))
-    rng = np.random.default_rng(5)
+def test_coiled_tails_keep_the_limits_of_their_compiler():
+    """Without optimisation the error of H is twice that of fused operations."""
+    model, rng = zoo.model("arcs3"), np.random.default_rng(2)
+    of = Subject("arcs", model, exact_of(model))
+    coiled = {name: bends for name, bends in poses.folds(of).items() if "coiled" in name}
+    assert len(coiled) == 2
+    for name, bends in coiled.items():
+        figures = judged(of, name, [errors(of, *state(of, rng, bends))])
+        assert all(figure.passed for figure in figures), figures
+
+
+def test_vjp_of_a_model_with_contacts_is_that_of_flight():
+    flight, standing, rng = zoo.model("m1_n3"), zoo.model("feet_tail"), np.random.default_rng(5)
     arguments = [rng.normal(size=n) for n in (flight.nq, flight.nv, 2, flight.nv)]
-    for found, expected in zip(
-        standing.forward_dynamics_vjp(*arguments),
-        flight.forward_dynamics_vjp(*arguments),
-        strict=True,
-    ):
+    pairs = zip(*(m.forward_dynamics_vjp(*arguments) for m in (flight, standing)), strict=True)
+    for expected, found in pairs:
         np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize(
-    ("settings", "words"),
-    [
+def test_simulations_that_cannot_be_are_refused():
+    q = np.array([0, 0, 0.3, 1, 0, 0, 0, 0, 0.0])
+    settings = {"legs": st.Legs.fixed(3.6, -0.3), "t_span": 0.01}
+    for change, words in [
         ({"method": np.zeros(2)}, "method"),
         ({"stop_at": np.zeros((2, 2))}, "stop_at"),
-        ({"method": "rk4", "step": 1e-320}, "step 1e-320: too short"),
-        ({"output_step": 1e-320}, "output_step 1e-320: more than"),
-        (
-            {"method": "lsoda", "t_span": 1e-320},
-            "output_step .*: too short to move the time: give 1e-100",
-        ),
-        (
-            {"t_span": (1e10, 1e10 + 4e-6)},
-            "output_step .*: too short to move the time: give 2.2e-06 s",
-        ),
-        ({"method": "ros34pw2", "rtol": 1e-320}, "too close to rounding errors: give 2.2e-14"),
-        ({"method": "dop853", "rtol": 1e-15}, "rtol 1e-15: too close to rounding"),
-        (
-            {"method": "ros34pw2", "most_step": 1e-200},
-            "most_step 1e-200: too short to move the time",
-        ),
-    ],
-)
-def test_simulations_that_cannot_be_are_refused(standing, settings, words):
-    q = np.array([0, 0, 0.3, 1, 0, 0, 0, 0, 0.0])
-    with pytest.raises(st.SimulationError, match=words):
-        st.simulate(
-            standing, q, np.zeros(8), legs=st.Legs.fixed(3.6, -0.3), **({"t_span": 0.01} | settings)
-        )
+        ({"method": "rk4", "step": 1e-320}, "step 1e-320"),
+        ({"output_step": 1e-320}, "output_step 1e-320"),
+        ({"method": "lsoda", "t_span": 1e-320}, "output_step .*give 1e-100"),
+        ({"t_span": (1e10, 1e10 + 4e-6)}, "output_step .*give 2.2e-06 s"),
+        ({"method": "ros34pw2", "rtol": 1e-320}, "rtol .*give 2.2e-14"),
+        ({"method": "dop853", "rtol": 1e-15}, "rtol 1e-15"),
+        ({"method": "ros34pw2", "most_step": 1e-200}, "most_step 1e-200"),
+    ]:
+        with row(change), pytest.raises(st.SimulationError, match=words):
+            st.simulate(zoo.model("feet_tail"), q, np.zeros(8), **settings | change)
 
 
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        (lambda model: st.Legs.ramp(3.6, (-0.3, -1.0), 0.4, 1e-320), "takes inf s"),
-        (
-            lambda model: st.Reference([0.0, 1.0], [1, [2, 3]]),
-            "Reference: angles: type list: needs real numbers",
-        ),
-        (
-            lambda model: st.Pfl(model, ([0.0, 1.0], np.zeros((2, 2))), 10**60),
-            "Pfl: kp: value 10{60}: needs a number from 0",
-        ),
-        (
-            lambda model: st.Pfl(model, np.zeros((2, 3), complex)),
-            "Pfl: times: type complex128: needs real numbers",
-        ),
-        (lambda model: st.Pfl(model, ([0.0], np.zeros((1, 2)))), "Pfl: one node only"),
-        (
-            lambda model: model.external_force(moment=(0, np.nan, 0)),
-            r"external_force: moment\[1\]: value nan: needs a finite number",
-        ),
-    ],
-)
-def test_arguments_that_the_fuzz_once_broke_are_refused(standing, call, words):
-    with pytest.raises(st.SerpentailError, match=words):
-        call(standing)
-
-
-@pytest.mark.parametrize(
-    "call",
-    [
-        lambda: st.polar_to_bend("x", 1.0),
-        lambda: st.polar_to_bend(np.zeros(2), np.zeros(3)),
-        lambda: st.polar_to_bend(np.inf, 1.0),
-        lambda: st.bend_to_polar(5e-324, 0.0, 1.0, 1.0),
-        lambda: st.rotation_matrix(np.zeros(4)),
-        lambda: st.rotation_matrix([np.nan, 0, 0, 0]),
-        lambda: st.rotation_matrix(np.zeros(3)),
-        lambda: st.pitch_roll_yaw(3.0),
-    ],
-)
-def test_conversions_refuse_what_is_no_state(call):
-    with pytest.raises(st.StateError):
-        call()
-
-
-@pytest.mark.parametrize("size", [1e-300, 1e-160, 1.0, 1e160, 1e300])
-def test_rotations_take_quaternions_of_any_norm(size):
-    q = np.array([0.5, 0.5, -0.5, 0.5])
-    np.testing.assert_allclose(st.rotation_matrix(q * size), st.rotation_matrix(q), atol=1e-15)
+def test_arguments_that_the_fuzz_once_broke_are_refused():
+    model, still = zoo.model("feet_tail"), ([0.0, 1.0], np.zeros((2, 2)))
+    for call, words in [
+        (lambda: st.Legs.ramp(3.6, (-0.3, -1.0), 0.4, 1e-320), "inf s"),
+        (lambda: st.Reference([0.0, 1.0], [1, [2, 3]]), "Reference: angles: type list"),
+        (lambda: st.Pfl(model, still, 10**60), "Pfl: kp: value 10{60}"),
+        (lambda: st.Pfl(model, np.zeros((2, 3), complex)), "Pfl: times: type complex128"),
+        (lambda: st.Pfl(model, ([0.0], np.zeros((1, 2)))), "Pfl: one node"),
+        (lambda: model.external_force(moment=(0, np.nan, 0)), r"moment\[1\]: value nan"),
+    ]:
+        with row(words), pytest.raises(st.SerpentailError, match=words):
+            call()
+    for convert, *values in [
+        (st.polar_to_bend, "x", 1.0),
+        (st.polar_to_bend, np.zeros(2), np.zeros(3)),
+        (st.polar_to_bend, np.inf, 1.0),
+        (st.bend_to_polar, 5e-324, 0.0, 1.0, 1.0),
+        (st.rotation_matrix, np.zeros(4)),
+        (st.rotation_matrix, [np.nan, 0, 0, 0]),
+        (st.rotation_matrix, np.zeros(3)),
+        (st.pitch_roll_yaw, 3.0),
+    ]:
+        with row(convert.__name__, values), pytest.raises(st.StateError):
+            convert(*values)
+    for size in (1e-300, 1e-160, 1e160, 1e300):  # quaternions of any norm are rotations
+        q = np.array([0.5, 0.5, -0.5, 0.5])
+        np.testing.assert_allclose(st.rotation_matrix(q * size), st.rotation_matrix(q), atol=1e-15)

@@ -9,28 +9,22 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 import serpentail as st
-from tests.support.models import model_folder
+from tests.support import zoo
 
-FUNCTIONS = [
-    *("mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics", "tail_points"),
-    *("energy", "momentum", "forward_dynamics_derivatives"),
-    "forward_dynamics_parameter_derivatives",
-]
 TORSO = {
     "nose": (0.0, 0.05, 0.015),
     "left": (-0.025, -0.02, 0.02),
     "right": (0.025, -0.02, 0.02),
     "back": (0.0, 0.0, 0.03),
 }
+SPRINGS = {"tail_stiffness": 2e-3, "tail_damping": 5e-5, "tail_rest": 0.0}
+SPRINGS |= {"tail_stop_lower": -3.0, "tail_stop_upper": 3.0}  # never reached
 
 
 @cache
-def elastic(segments=1, links=3, **options):
-    """Return a model with an elastic tail; links None: a continuum."""
-    parameters = {"tail_stiffness": 2e-3, "tail_damping": 5e-5, "tail_rest": 0.0}
-    return st.load(
-        model_folder(segments, links, functions=FUNCTIONS, parameters=parameters, **options)
-    )
+def elastic(name="elastic"):
+    """Return a tail whose coordinates have equal springs and dampers, and no stops."""
+    return zoo.model(name).with_parameters(**SPRINGS)
 
 
 def start(model, seed=0):
@@ -59,7 +53,7 @@ def flown(model, times, x0, torque=None, rtol=1e-10):
         t_eval=times,
         rtol=rtol,
         atol=1e-2 * rtol,
-        max_step=0.005,
+        max_step=0.02,
     )
     return solution.y.T
 
@@ -86,3 +80,14 @@ def tracks(model, times, states, noise=0.0, seed=1, gaps=0.0):
     positions = positions + noise * rng.standard_normal(positions.shape)
     positions[rng.random(positions.shape[:2]) < gaps] = np.nan
     return st.marker_tracks(times, positions, list(placed(model)), unit="m")
+
+
+def scene(markers, *more):
+    """Return the text of a scene with a table [identify] of markers, and further lines."""
+    head = 'kind = "articulated"\nsegments = 1\nlinks = 1\nfunctions = ["energy"]\n'
+    rows = "".join(
+        f'[[identify.marker]]\nname = "{name}"\n'
+        + (f"torso = {list(each.torso)}\n" if each.torso else f"tail = {each.tail}\n")
+        for name, each in markers.items()
+    )
+    return head + "\n".join(more) + "\n" + rows

@@ -18,6 +18,7 @@ from serpentail_codegen.targets.target import UnprintableStatement
 from tests.support.algebras import RATIONAL
 from tests.support.program_runs import unrolled_values
 from tests.support.programs import step_of
+from tests.support.rows import row
 
 COUNT = step_of(
     "count", (("x", 1), ("y", 1)), (("z", 1),), lambda t, x, y: [t.add(t.mul(x, y), t.const(1))]
@@ -60,37 +61,36 @@ def plainly(x, y):
     return u, w
 
 
-@pytest.mark.parametrize("seed", range(20))
-def test_conditions_run_what_they_ask_for_and_unroll_to_choices(seed):
-    rng, p = random.Random(seed), conditional()
-    given = {
-        name: [Fraction(rng.randint(-3, 3), rng.randint(1, 2)) for _ in range(4)] for name in "xy"
-    }
-    values = Run(p, RATIONAL, given).values
-    assert (values["u"], values["w"][0]) == plainly(given["x"], given["y"])
-    assert unrolled_values(p, given, RATIONAL) == {"u": values["u"], "w": values["w"]}
-    assert unrolled_values(p, given, RATIONAL, fixed=["x", "y"]) == {
-        "u": values["u"],
-        "w": values["w"],
-    }
+def test_conditions_run_what_they_ask_for_and_unroll_to_choices():
+    p = conditional()
+    for seed in range(20):
+        rng = random.Random(seed)
+        given = {
+            name: [Fraction(rng.randint(-3, 3), rng.randint(1, 2)) for _ in range(4)]
+            for name in "xy"
+        }
+        values = Run(p, RATIONAL, given).values
+        with row(seed):
+            assert (values["u"], values["w"][0]) == plainly(given["x"], given["y"])
+            found = {"u": values["u"], "w": values["w"]}
+            assert unrolled_values(p, given, RATIONAL) == found
+            assert unrolled_values(p, given, RATIONAL, fixed=["x", "y"]) == found
 
 
-@pytest.mark.parametrize("seed", range(10))
-def test_each_lane_runs_what_its_own_conditions_ask_for(seed):
-    rng, lanes = random.Random(seed), 5
-    each = [
-        {name: [float(rng.randint(-3, 3)) for _ in range(4)] for name in "xy"} for _ in range(lanes)
-    ]
-    many = {name: list(np.array([one[name] for one in each]).T) for name in "xy"}
-    values = Run(batched(conditional(), lanes), Numbers(np), many).values
-    for k, one in enumerate(each):
-        u = [np.broadcast_to(scalar, lanes)[k] for scalar in values["u"]]
-        assert (u, np.broadcast_to(values["w"][0], lanes)[k]) == plainly(**one)
+def test_each_lane_runs_what_its_own_conditions_ask_for():
+    rng, lanes = np.random.default_rng(0), 40
+    many = {name: list(rng.integers(-3, 4, (4, lanes)).astype(float)) for name in "xy"}
+    p = batched(conditional(), lanes)
+    assert {a.name: a.lanes for a in p.arrays}["w"] == lanes  # at first 1 in all of them
+    values = Run(p, Numbers(np), many).values
+    for k in range(lanes):
+        u, w = plainly(*([float(values[k]) for values in many[name]] for name in "xy"))
+        found = [np.broadcast_to(scalar, lanes)[k] for scalar in (*values["u"], values["w"][0])]
+        with row(k):
+            assert found == [*u, w]
 
 
-def test_what_a_condition_of_lanes_decides_about_has_lanes():
-    """The sum w is 1 at first in all lanes, then each adds what it is asked for."""
-    assert {a.name: a.lanes for a in batched(conditional(), 5).arrays}["w"] == 5
+def test_a_number_under_a_condition_of_lanes_has_lanes():
     b = Builder("counts", "A number of its own under a condition.")
     x, u = b.array("x", 1, role="input"), b.array("u", 1, role="output")
     t, one = b.array("t", 1), b.constant("one", [1])
@@ -104,41 +104,28 @@ def test_what_a_condition_of_lanes_decides_about_has_lanes():
     assert list(u) == [1, 0, 1]
 
 
-@pytest.mark.parametrize(
-    ("kind", "record"),
-    [
-        ("Fill", lambda b, u: b.fill(u[0], 1)),
-        ("Guard", lambda b, u: b.guard(u[0], "OUT_OF_RANGE", u[0])),
-    ],
-)
-def test_c_refuses_what_cannot_be_done_in_some_lanes_alone(kind, record):
-    b = Builder("partly", "A statement under a condition.")
-    x, u = b.array("x", 1, role="input"), b.array("u", 1, role="output")
-    b.copy(u[0], x[0])
-    with b.when(x[0]):
-        record(b, u)
-    with pytest.raises(UnprintableStatement, match=f"cannot print {kind}: it cannot be done"):
-        in_loops(batched(b.finish(), 8), "double", "rat")
+def test_what_cannot_be_done_in_some_lanes_alone_is_refused():
+    records = {
+        "Fill": lambda b, u: b.fill(u[0], 1),
+        "Guard": lambda b, u: b.guard(u[0], "OUT_OF_RANGE", u[0]),
+    }
+    for kind, record in records.items():
+        b = Builder("partly", "A statement under a condition.")
+        x, u = b.array("x", 1, role="input"), b.array("u", 1, role="output")
+        b.copy(u[0], x[0])
+        with b.when(x[0]):
+            record(b, u)
+        with row(kind), pytest.raises(UnprintableStatement, match=f"cannot print {kind}"):
+            in_loops(batched(b.finish(), 8), "double", "rat")
+    with pytest.raises(ValueError, match="a guard under a condition"):
+        unroll(b.finish())
 
 
 def test_a_condition_survives_being_called():
-    b = Builder("outer", "Calls.")
-    arrays = {
-        name: b.array(name, 1, 4, role)
-        for name, role in (("x", "input"), ("y", "input"), ("u", "output"))
-    }
-    b.call(conditional(), **arrays, w=b.array("w", 1, role="output"))
+    b, p = Builder("outer", "Calls."), conditional()
+    given = {a.name: b.array(a.name, 1, a.count, a.role) for a in p.arrays if a.role != "local"}
+    b.call(p, **given)
     p, given = b.finish(), {"x": [1, -1, 2, 0], "y": [1, 2, -3, 4]}
     assert branches(p) and not branches(assemble(FUNCTIONS["mass_matrix"], Tail(1, 1)))
     values = Run(p, RATIONAL, given).values
     assert (values["u"], values["w"][0]) == plainly(**given)
-
-
-def test_a_guard_under_a_condition_cannot_be_unrolled():
-    b = Builder("guarded", "A guard.")
-    x, u = b.array("x", 1, role="input"), b.array("u", 1, role="output")
-    with b.when(x[0]):
-        b.guard(x[0], "OUT_OF_RANGE", u[0])
-        b.copy(u[0], x[0])
-    with pytest.raises(ValueError, match="a guard under a condition"):
-        unroll(b.finish())

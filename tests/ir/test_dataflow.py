@@ -19,7 +19,6 @@ from serpentail_codegen.ir.dataflow import (
 )
 from serpentail_codegen.ir.interpret import Run
 from serpentail_codegen.ir.program import Apply, Guard, Loop, statements
-from tests.autodiff.test_forward import arguments_of
 from tests.support.programs import (
     EXACT,
     NEXT,
@@ -31,6 +30,7 @@ from tests.support.programs import (
     numbers,
     step_of,
 )
+from tests.support.rows import row
 
 SPLIT = step_of(
     "split", (("x", 1), ("y", 1)), (("s", 1), ("z", 1)), lambda t, x, y: [t.mul(x, x), t.mul(y, y)]
@@ -39,7 +39,7 @@ SPLIT = step_of(
 
 def outputs(program, arguments):
     """The outputs of a run by name."""
-    values = Run(program, EXACT, {name: arguments[name] for name in arguments_of(program)}).values
+    values = Run(program, EXACT, {name: arguments[name] for name in numbers(program)}).values
     return {a.name: values[a.name] for a in program.of_role("output")}
 
 
@@ -47,12 +47,10 @@ def made():
     """Programs as they come from builders, tangents and adjoints."""
     for name, program in PROGRAMS.items():
         yield name, pruned(program)
-        yield f"tangents of {name}", tangent_program(program, arguments_of(program))
+        yield f"tangents of {name}", tangent_program(program, [*numbers(program)])
     for name, program in RECTANGULAR.items():
-        yield (
-            f"adjoints of {name}",
-            adjoint_program(program, ({"guarded": "mass", "columns": "m"}.get(name, "x"),), ("u",)),
-        )
+        active = {"guarded": "mass", "columns": "m"}.get(name, "x")
+        yield f"adjoints of {name}", adjoint_program(program, (active,), ("u",))
 
 
 # What depends on what
@@ -72,23 +70,12 @@ def diamond():
 
 def test_dependence_goes_both_ways():
     body = diamond().body
-    assert forward_slice(body, {"x"}) == {
-        "x",
-        "p",
-        "q",
-        "w",
-        "u",
-    }  # a step is one: it may take x to u
-    assert forward_slice(body, {"q"}) == {"q", "w"}
-    assert forward_slice(body, {"mass"}) == {"mass"}
-    assert backward_slice(body, {"w"}) == {
-        "w",
-        "p",
-        "q",
-        "x",
-        "mass",
-    }  # an output that is not wanted needs nothing
-    assert backward_slice(body, {"u"}) == {"u", "y"}
+    forward = {"x": "x p q w u", "q": "q w", "mass": "mass"}  # a step is one: it may take x to u
+    backward = {"w": "w p q x mass", "u": "u y"}  # an output that is not wanted needs nothing
+    for slice_of, expected in ((forward_slice, forward), (backward_slice, backward)):
+        for start, reached in expected.items():
+            with row(slice_of.__name__, start):
+                assert slice_of(body, {start}) == set(reached.split())
 
 
 def test_dependence_goes_around_loops():
@@ -111,25 +98,22 @@ def test_sums_read_what_they_add_to():
     added, squared, stored = b.finish().body
     assert reads(added) == (x[0], w[0]) and writes(added) == (w[0],)
     assert reads(squared) == (y[0], u[0]) and reads(stored) == (y[0],)
-    assert (
-        reads(Guard(w[0], "TOO_SMALL", ())) == (w[0],)
-        and writes(Guard(w[0], "TOO_SMALL", ())) == ()
-    )
+    guard = Guard(w[0], "TOO_SMALL", ())
+    assert reads(guard) == (w[0],) and writes(guard) == ()
 
 
 # What nothing needs
 
 
-@pytest.mark.parametrize("name", PROGRAMS)
-def test_pruning_keeps_the_outputs(name):
-    program = PROGRAMS[name]
-    assert outputs(pruned(program), numbers(program)) == outputs(program, numbers(program))
+def test_pruning_keeps_the_outputs():
+    for name, program in PROGRAMS.items():
+        with row(name):
+            given = numbers(program)
+            assert outputs(pruned(program), given) == outputs(program, given)
 
 
 def test_nothing_unneeded_is_left():
-    """Every array matters to an output; every loop has a body; no output of a step is dropped by
-    nobody.
-    """
+    """Every array matters to an output; every loop has a body; every output of a step is needed."""
     for name, program in made():
         needed = backward_slice(program.body, {a.name for a in program.of_role("output")})
         known = {a.name for a in program.arrays if a.role in ("input", "output", "parameters")}
@@ -150,12 +134,8 @@ def test_outputs_of_a_step_go_one_by_one():
         b.apply(TURN, {"x": x.part(0, 2), "y": y[i]}, s=b.array("t", 2)[0])
     program = pruned(b.finish())
     (call,) = [s for s in program.body if isinstance(s, Apply)]
-    assert (call.step.name, call.reads, call.writes, call.adds) == (
-        "split_s",
-        (x[0],),
-        (w[0],),
-        (False,),
-    )
+    found = (call.step.name, call.reads, call.writes, call.adds)
+    assert found == ("split_s", (x[0],), (w[0],), (False,))
     assert not any(isinstance(s, Loop) for s in program.body)
     assert [a.name for a in program.arrays] == ["mass", "x", "y", "u", "w"]
 
@@ -182,38 +162,33 @@ def outer():
     return b, b.array("a", 1, 3, "input"), b.array("y", 1, 3, "input"), b.array("z", 1, 3, "output")
 
 
-@pytest.mark.parametrize("name", sorted(PROGRAMS.keys() - {"columns"}))
-def test_called_program_means_the_same(name):
-    inner = PROGRAMS[name]
-    b, a, y, z = outer()
-    s, w = b.array("s", 1), b.array("w", 1, role="output")
-    b.fill(s[0], 7)
-    b.call(inner, x=a, y=y, u=z, w=w)
-    b.copy(w[0], s[0], adds=True)  # the inner program's own s is another
+def given_to(outer, inner):
+    """The outputs of an outer program, whose a is the inner one's x."""
     given = numbers(inner)
-    found = outputs(b.finish(), {"mass": given["mass"], "a": given["x"], "y": given["y"]})
-    expected = outputs(inner, given)
-    assert found == {"z": expected["u"], "w": [expected["w"][0] + 7]}
+    return outputs(outer, {"mass": given["mass"], "a": given["x"], "y": given["y"]})
+
+
+def test_called_program_means_the_same():
+    for name in sorted(PROGRAMS.keys() - {"columns"}):
+        inner = PROGRAMS[name]
+        b, a, y, z = outer()
+        s, w = b.array("s", 1), b.array("w", 1, role="output")
+        b.fill(s[0], 7)
+        b.call(inner, x=a, y=y, u=z, w=w)
+        b.copy(w[0], s[0], adds=True)  # the inner program's own s is another
+        expected = outputs(inner, numbers(inner))
+        with row(name):
+            found = given_to(b.finish(), inner)
+            assert found == {"z": expected["u"], "w": [expected["w"][0] + 7]}
 
 
 def test_called_names_carry_the_programs_name():
     b, a, y, z = outer()
     b.call(PROGRAMS["nested"], x=a, y=y, u=z, w=b.array("w", 1))
     program = inlined(b.finish())
-    assert [array.name for array in program.arrays] == [
-        "mass",
-        "a",
-        "y",
-        "z",
-        "w",
-        "nest_s",
-        "nest_t",
-    ]
-    assert all(
-        ref.array in program.arrays
-        for s, _ in statements(program.body)
-        for ref in (*reads(s), *writes(s))
-    )
+    assert " ".join(array.name for array in program.arrays) == "mass a y z w nest_s nest_t"
+    for statement, _ in statements(program.body):
+        assert all(ref.array in program.arrays for ref in (*reads(statement), *writes(statement)))
 
 
 def test_called_in_a_loop_it_runs_in_every_iteration():
@@ -223,34 +198,32 @@ def test_called_in_a_loop_it_runs_in_every_iteration():
     with b.loop("l", 2):
         b.call(PROGRAMS["accumulators"], x=a, y=y, u=z, w=w)
         b.copy(total[0], w[0], adds=True)
-    given = numbers(PROGRAMS["accumulators"])
-    found = outputs(b.finish(), {"mass": given["mass"], "a": given["x"], "y": given["y"]})
-    assert found["total"] == [2 * outputs(PROGRAMS["accumulators"], given)["w"][0]]
+    inner = PROGRAMS["accumulators"]
+    expected = outputs(inner, numbers(inner))["w"][0]
+    assert given_to(b.finish(), inner)["total"] == [2 * expected]
 
 
-@pytest.mark.parametrize(
-    ("left_out", "role"), [("x", "input"), ("y", "input"), ("u", "output"), ("w", "output")]
-)
-def test_arguments_that_are_not_bound_are_named(left_out, role):
+def test_arguments_that_are_not_bound_are_named():
     b, a, y, z = outer()
     given = {"x": a, "y": y, "u": z, "w": b.array("w", 1)}
-    given.pop(left_out)
-    with pytest.raises(ValueError, match=f"^nest in outer: {role} {left_out} is not bound$"):
-        b.call(PROGRAMS["nested"], **given)
+    for left_out, role in {"x": "input", "y": "input", "u": "output", "w": "output"}.items():
+        bound = {name: array for name, array in given.items() if name != left_out}
+        with row(left_out), pytest.raises(ValueError, match=f"^nest in outer: {role} {left_out} "):
+            b.call(PROGRAMS["nested"], **bound)
 
 
-def test_what_is_called_twice_has_arrays_of_its_own_each_time():
+def test_what_is_called_several_times_has_arrays_of_its_own_each_time():
     b, a, y, z = outer()
     w, total = b.array("w", 1), b.array("total", 1, role="output")
-    b.call(PROGRAMS["nested"], x=a, y=y, u=z, w=w)
-    b.copy(total[0], w[0])
-    b.call(PROGRAMS["nested"], x=a, y=y, u=z, w=w)
-    b.copy(total[0], w[0], adds=True)
+    b.fill(total[0], 0)
+    for _ in range(3):
+        b.call(PROGRAMS["nested"], x=a, y=y, u=z, w=w)
+        b.copy(total[0], w[0], adds=True)
     names = [array.name for array in inlined(b.finish()).arrays]
     assert len(set(names)) == len(names)
-    given = numbers(PROGRAMS["nested"])
-    found = outputs(b.finish(), {"mass": given["mass"], "a": given["x"], "y": given["y"]})
-    assert found["total"] == [2 * outputs(PROGRAMS["nested"], given)["w"][0]]
+    inner = PROGRAMS["nested"]
+    expected = outputs(inner, numbers(inner))["w"][0]
+    assert given_to(b.finish(), inner)["total"] == [3 * expected]
 
 
 def test_parameters_are_shared():
@@ -258,7 +231,6 @@ def test_parameters_are_shared():
     b.call(PROGRAMS["carry_up"], x=a, y=y, u=z, w=b.array("w", 1))
     program = b.finish()
     assert [array.name for array in program.of_role("parameters")] == ["mass"]
-    run = Run(
-        program, EXACT, {"mass": [Fraction(3)], "a": [Fraction(0)] * 3, "y": [Fraction(1)] * 3}
-    )
+    given = {"mass": [Fraction(3)], "a": [Fraction(0)] * 3, "y": [Fraction(1)] * 3}
+    run = Run(program, EXACT, given)
     assert run.values["z"] == [1, 1, 1]

@@ -10,12 +10,13 @@ from serpentail_codegen.ir import program as ir
 from serpentail_codegen.ir.builder import Builder
 from serpentail_codegen.ir.dataflow import reads, writes
 from serpentail_codegen.ir.interpret import Run
-from tests.support.programs import CROSS, EXACT, numbers
+from tests.support.programs import CROSS, EXACT
+from tests.support.rows import row
 
 ROW = 8  # numbers that store a row of a small matrix
 DIFFERENTIATED = {ir.Apply, ir.Copy, ir.Fill, ir.Guard, ir.Loop}
 TREES = {ir.Loop, ir.When, ir.Call}  # asked of what is in them
-every_type = pytest.mark.parametrize("kind", ir.STATEMENTS, ids=lambda kind: kind.__name__)
+MATRICES = {ir.Factor, ir.Solve, ir.FactorPair, ir.SolvePair}
 
 
 @dataclass(frozen=True)
@@ -44,22 +45,24 @@ def record_condition(b, x, A, wide):
         b.fill(x[0], 9)
 
 
-# how each is recorded, between x = (2, 3), the matrix A and a wide array
-RECORDS = {
-    ir.Apply: lambda b, x, A, wide: b.apply(CROSS, {"x": x[0]}, x=x[0]),
-    ir.Fill: lambda b, x, A, wide: b.fill(x[0], 7),
-    ir.Unit: lambda b, x, A, wide: b.unit(wide[0], 1),
-    ir.Copy: lambda b, x, A, wide: b.copy(x[0], x[0], adds=True),
-    ir.Loop: record_loop,
-    ir.When: record_condition,
-    ir.Factor: lambda b, x, A, wide: b.factor(A, 2),
-    ir.Solve: lambda b, x, A, wide: b.solve(A, x[0]),
-    ir.FactorPair: lambda b, x, A, wide: b.factor_pair(A, 2),
-    ir.SolvePair: lambda b, x, A, wide: b.solve_pair(A, x[0]),
-    ir.Guard: lambda b, x, A, wide: b.guard(x[0], "TOO_SMALL", x[0]),
-    ir.Call: lambda b, x, A, wide: b.call(inner(), x=x, y=x),
-    Sort: lambda b, x, A, wide: b.emit(Sort(x[0])),
+# how each is recorded, between x = (2, 3), the matrix A and a wide array, and what x is then
+EXAMPLES = {
+    ir.Apply: (lambda b, x, A, wide: b.apply(CROSS, {"x": x[0]}, x=x[0]), [3, 6]),
+    ir.Fill: (lambda b, x, A, wide: b.fill(x[0], 7), [7, 7]),
+    ir.Unit: (lambda b, x, A, wide: b.unit(wide[0], 1), [0, 1]),
+    ir.Copy: (lambda b, x, A, wide: b.copy(x[0], x[0], adds=True), [4, 6]),
+    ir.Loop: (record_loop, [5, 1]),
+    ir.When: (record_condition, [9, 9]),
+    # 1 / D = 1 / (5 - 1), and L below it
+    ir.Factor: (lambda b, x, A, wide: b.factor(A, 2), [EXACT.const(1) / 4, 1]),
+    # L^T D L with L = 1 below 1 / D = (5, 1)
+    ir.Solve: (lambda b, x, A, wide: b.solve(A, x[0]), [-5, 8]),
+    ir.FactorPair: (lambda b, x, A, wide: b.factor_pair(A, 2), [EXACT.const(1) / 4, 1]),
+    ir.SolvePair: (lambda b, x, A, wide: b.solve_pair(A, x[0]), [-5, 8]),
+    ir.Guard: (lambda b, x, A, wide: b.guard(x[0], "TOO_SMALL", x[0]), [2, 3]),
+    ir.Call: (lambda b, x, A, wide: b.call(inner(), x=x, y=x), [4, 6]),
 }
+UNKNOWN = lambda b, x, A, wide: b.emit(Sort(x[0]))  # noqa: E731 - as those above
 
 
 def example(kind):
@@ -67,12 +70,12 @@ def example(kind):
     b = Builder("example", "One statement.")
     a, x = b.array("a", 2, role="input"), b.array("x", 2, role="output")
     A, wide = b.array("A", 4 * ROW), b.wide("wide", 1, 3)
-    if kind in (ir.Loop, ir.Factor, ir.Solve, ir.FactorPair, ir.SolvePair):
+    if kind in MATRICES | {ir.Loop}:
         for first in (0, 2 * ROW):
             b.fill(A.part(first, 1), 5)
             b.fill(A.part(first + ROW, 2), 1)
     b.copy(x[0], a[0])
-    RECORDS[kind](b, x, A, wide)
+    EXAMPLES.get(kind, (UNKNOWN,))[0](b, x, A, wide)
     if kind is ir.Unit:
         b.copy(x[0], wide.lane(0, 0, 2))
     if kind in (ir.Factor, ir.FactorPair):
@@ -80,68 +83,44 @@ def example(kind):
     return b.finish()
 
 
-RESULTS = {
-    ir.Apply: [3, 6],
-    ir.Fill: [7, 7],
-    ir.Unit: [0, 1],
-    ir.Copy: [4, 6],
-    ir.Loop: [5, 1],
-    ir.When: [9, 9],
-    ir.Factor: [EXACT.const(1) / 4, 1],  # 1 / D = 1 / (5 - 1), and L below it
-    ir.Solve: [-5, 8],  # L^T D L with L = 1 below 1 / D = (5, 1)
-    ir.FactorPair: [EXACT.const(1) / 4, 1],
-    ir.SolvePair: [-5, 8],
-    ir.Guard: [2, 3],
-    ir.Call: [4, 6],
-}
-
-
 def test_the_list_of_statements_is_complete():
     classes = {c for c in vars(ir).values() if isinstance(c, type) and is_dataclass(c)}
     no_statements = {ir.Step, ir.Index, ir.Array, ir.Ref, ir.Program}
-    assert classes - no_statements == set(ir.STATEMENTS) == set(RESULTS)
+    assert classes - no_statements == set(ir.STATEMENTS) == set(EXAMPLES)
 
 
-@every_type
-def test_the_interpreter_runs_it(kind):
-    run = Run(example(kind), EXACT, {"a": [EXACT.const(2), EXACT.const(3)]})
-    assert run.values["x"] == RESULTS[kind]
-
-
-@every_type
-def test_what_it_reads_and_writes_is_known_or_it_is_refused(kind):
-    (statement,) = [s for s in example(kind).body if type(s) is kind][-1:]
-    if kind in TREES:
-        for question in (reads, writes):
-            with pytest.raises(TypeError, match=f"^no rule says what {kind.__name__} "):
-                question(statement)
-    else:
-        assert all(isinstance(ref, ir.Ref) for ref in reads(statement) + writes(statement))
-        assert writes(statement) or kind is ir.Guard
-
-
-@pytest.mark.parametrize(
-    "derive",
-    [
-        lambda program: tangent_program(program, ("a",)),
-        lambda program: adjoint_program(program, ("a",), ("x",)),
-    ],
-    ids=["forward", "reverse"],
-)
-@every_type
-def test_it_is_differentiated_or_refused_by_its_name(kind, derive):
-    if kind in DIFFERENTIATED:
-        assert derive(example(kind)).body
-    else:
-        with pytest.raises(TypeError, match=f"^no rule .*{kind.__name__}"):
-            derive(example(kind))
-
-
-def test_a_statement_without_a_rule_is_refused_by_its_name():
-    program = example(Sort)
+def test_the_interpreter_runs_each():
+    given = {"a": [EXACT.const(2), EXACT.const(3)]}
+    for kind, (_, expected) in EXAMPLES.items():
+        with row(kind):
+            assert Run(example(kind), EXACT, given).values["x"] == expected
     with pytest.raises(TypeError, match=r"^no rule runs Sort$"):
-        Run(program, EXACT, numbers(program))
-    with pytest.raises(TypeError, match=r"^no rule .*Sort"):
-        tangent_program(program, ("a",))
-    with pytest.raises(TypeError, match=r"^no rule .*Sort"):
-        adjoint_program(program, ("a",), ("x",))
+        Run(example(Sort), EXACT, given)
+
+
+def test_what_each_reads_and_writes_is_known_or_it_is_refused():
+    for kind in EXAMPLES:
+        (statement,) = [s for s in example(kind).body if type(s) is kind][-1:]
+        with row(kind):
+            if kind in TREES:
+                for question in (reads, writes):
+                    with pytest.raises(TypeError, match=f"^no rule .* {kind.__name__} "):
+                        question(statement)
+            else:
+                assert all(isinstance(ref, ir.Ref) for ref in reads(statement) + writes(statement))
+                assert writes(statement) or kind is ir.Guard
+            if kind in MATRICES:
+                own = {"A"} | ({"x"} if kind in (ir.Solve, ir.SolvePair) else set())
+                assert {ref.array.name for ref in reads(statement)} == own
+
+
+def test_each_is_differentiated_or_refused_by_its_name():
+    for kind in (*EXAMPLES, Sort):
+        program = example(kind)
+        for derive, more in ((tangent_program, ()), (adjoint_program, (("x",),))):
+            with row(kind):
+                if kind in DIFFERENTIATED:
+                    assert derive(program, ("a",), *more).body
+                else:
+                    with pytest.raises(TypeError, match=f"^no rule .*{kind.__name__}"):
+                        derive(program, ("a",), *more)

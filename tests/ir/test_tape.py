@@ -1,4 +1,6 @@
-"""The tape: each distinct operation once, folded by identities that hold and round alike."""
+"""The tape: each distinct operation once, folded by identities that hold and round alike; steps,
+which are tapes with names, compacted and specialised.
+"""
 
 import random
 from fractions import Fraction
@@ -7,9 +9,20 @@ import mpmath
 import pytest
 
 from serpentail_codegen.ir.interpret import Numbers
-from serpentail_codegen.ir.tape import BINARY, UNARY, Tape, exact_quotient, lanes_of, replay
+from serpentail_codegen.ir.step import Step, compacted, specialised
+from serpentail_codegen.ir.tape import (
+    BINARY,
+    UNARY,
+    Tape,
+    exact_quotient,
+    lanes_of,
+    live_nodes,
+    operation_count,
+    replay,
+)
 from tests.support.algebras import FLOATS, RATIONAL
 from tests.support.random_tapes import INPUTS, SEEDS, grow
+from tests.support.rows import row
 
 
 @pytest.fixture
@@ -21,96 +34,76 @@ def tape():
     return tape
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_recording_is_exact_in_rational_arithmetic(seed):
-    rng, tape = random.Random(seed), Tape()
-    leaves = [Fraction(rng.randint(-9, 9), rng.randint(1, 9)) for _ in range(INPUTS)]
-    pool = grow(rng, RATIONAL, tape, leaves)
-    values = replay(tape.nodes, leaves, RATIONAL)
-    assert [values[node] for node, _ in pool] == [value for _, value in pool]
+def floats(seed):
+    """Random scalars, and the generator of random numbers that made them."""
+    rng = random.Random(seed)
+    return rng, [rng.uniform(-3, 3) for _ in range(INPUTS)]
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_recording_rounds_as_direct_evaluation_does(seed):
+def test_recording_is_exact_in_rational_arithmetic():
+    for seed in SEEDS:
+        rng, tape = random.Random(seed), Tape()
+        leaves = [Fraction(rng.randint(-9, 9), rng.randint(1, 9)) for _ in range(INPUTS)]
+        pool = grow(rng, RATIONAL, tape, leaves)
+        values = replay(tape.nodes, leaves, RATIONAL)
+        with row(seed):
+            assert [values[node] for node, _ in pool] == [value for _, value in pool]
+
+
+def test_recording_rounds_as_direct_evaluation_does_and_twice_gives_the_same_nodes():
     """Bit for bit but for the sign of a zero: folding adds no rounding and drops none."""
-    rng, tape = random.Random(seed), Tape()
-    leaves = [rng.uniform(-3, 3) for _ in range(INPUTS)]
-    pool = grow(rng, FLOATS, tape, leaves)
-    values = replay(tape.nodes, leaves, FLOATS)
-    assert [values[node].hex() for node, value in pool if value] == [
-        value.hex() for _, value in pool if value
-    ]
-    assert all(values[node] == 0 for node, value in pool if not value)
+    for seed in SEEDS:
+        (rng, leaves), tape, again = floats(seed), Tape(), Tape()
+        pool = grow(rng, FLOATS, tape, leaves)
+        values = replay(tape.nodes, leaves, FLOATS)
+        replay(tape.nodes, [again.input(k) for k in range(INPUTS)], again)
+        with row(seed):
+            assert all(values[node] == value for node, value in pool)
+            assert again.nodes == tape.nodes
+            assert_normal(tape.nodes)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_recording_twice_gives_the_same_nodes(seed):
-    rng, tape, again = random.Random(seed), Tape(), Tape()
-    grow(rng, FLOATS, tape, [rng.uniform(-3, 3) for _ in range(INPUTS)])
-    replay(tape.nodes, [again.input(k) for k in range(INPUTS)], again)
-    assert again.nodes == tape.nodes
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_nodes_are_distinct_ordered_and_in_normal_form(seed):
-    rng, tape = random.Random(seed), Tape()
-    grow(rng, FLOATS, tape, [rng.uniform(-3, 3) for _ in range(INPUTS)])
-    assert len(set(tape.nodes)) == len(tape.nodes)
-    for position, (op, *args) in enumerate(tape.nodes):
+def assert_normal(nodes):
+    """Check that nodes are distinct, ordered and in normal form."""
+    assert len(set(nodes)) == len(nodes)
+    for position, (op, *args) in enumerate(nodes):
         if op in ("input", "const"):
             continue
         assert all(arg < position for arg in args)
-        below = [tape.nodes[arg][0] for arg in args]
+        below = [nodes[arg][0] for arg in args]
         assert "neg" not in below or op in ("sqrt", "select")
         assert op != "select" or below[1:] != ["neg", "neg"]
         assert op not in ("add", "mul") or args == sorted(args)
-        assert below != ["const", "const"]
-        assert op != "neg" or below[0] not in ("sub",)
+        assert below != ["const", "const"] and (op != "neg" or below != ["sub"])
 
 
-@pytest.mark.parametrize("op", UNARY + BINARY)
-def test_same_operation_is_the_same_node(tape, op):
-    arguments = (2, 1) if op in BINARY else (2,)
-    node = getattr(tape, op)(*arguments)
-    size = len(tape.nodes)
-    assert getattr(tape, op)(*arguments) == node
-    assert len(tape.nodes) == size
-    assert node == size - 1
-
-
-def test_equal_constants_are_one_node():
-    tape = Tape()
+def test_same_operations_and_equal_constants_are_one_node(tape):
+    for op in UNARY + BINARY:
+        arguments = (2, 1) if op in BINARY else (2,)
+        node, size = getattr(tape, op)(*arguments), len(tape.nodes)
+        assert getattr(tape, op)(*arguments) == node == size - 1 and len(tape.nodes) == size
     assert len({tape.const(value) for value in (1, 1.0, Fraction(1), True)}) == 1
     assert len({tape.const(value) for value in (0, 0.0, -0.0)}) == 1
     assert tape.const(0.5) == tape.const(Fraction(1, 2))
     assert isinstance(tape.value(tape.const(3.0)), int)
     assert tape.const(Fraction(1, 3)) != tape.const(1 / 3)
     assert tape.value(tape.const(-2.5)) == -2.5
-
-
-def test_input_is_not_a_constant(tape):
     assert [tape.value(node) for node in (0, tape.neg(0), tape.add(0, 1))] == [None] * 3
 
 
 def test_zero_and_one_vanish(tape):
-    a, zero, one = 0, tape.const(0), tape.const(1)
+    a, zero, one, less = 0, tape.const(0), tape.const(1), tape.const(-1)
     assert tape.add(a, zero) == tape.add(zero, a) == tape.sub(a, zero) == a
     assert tape.mul(a, one) == tape.mul(one, a) == tape.div(a, one) == a
     assert tape.mul(a, zero) == tape.mul(zero, a) == tape.div(zero, a) == tape.sub(a, a) == zero
-    assert (
-        tape.sub(zero, a)
-        == tape.mul(a, tape.const(-1))
-        == tape.div(a, tape.const(-1))
-        == tape.neg(a)
-    )
-    assert tape.sin(zero) == tape.sqrt(zero) == zero
-    assert tape.cos(zero) == tape.sqrt(one) == one
-
-
-def test_functions_of_other_constants_are_left_to_the_target(tape):
-    for op in ("sin", "cos", "sqrt"):
+    assert tape.sub(zero, a) == tape.mul(a, less) == tape.div(a, less) == tape.neg(a)
+    assert tape.sin(zero) == tape.sqrt(zero) == zero and tape.cos(zero) == tape.sqrt(one) == one
+    for op in ("sin", "cos", "sqrt"):  # of other constants are left to the target
         four = tape.const(4)
         assert tape.nodes[getattr(tape, op)(four)] == (op, four)
+    for numerator in (a, zero, one):
+        with pytest.raises(ZeroDivisionError, match="zero"):
+            tape.div(numerator, zero)
 
 
 def test_negation_moves_outward(tape):
@@ -137,35 +130,35 @@ def test_selection_folds_where_the_choice_is_known_or_makes_no_difference(tape):
     assert tape.max(a, a) == a and tape.value(tape.max(tape.const(2), tape.const(3))) == 3
 
 
-def test_selection_is_as_wide_as_its_operands(tape):
+def test_operations_are_as_wide_as_their_operands(tape):
     wide = tape.unit(0, 3)
     lanes = [0] * len(tape.nodes)
     lanes[wide] = 3
     assert lanes_of(("select", 0, 1, wide), lanes) == lanes_of(("select", wide, 0, 1), lanes) == 3
     assert lanes_of(("select", 0, 1, 2), lanes) == 0
+    assert lanes_of(("input", 1), [], [0, 5]) == 5 and lanes_of(("input", 1), []) == 0
+    with pytest.raises(ValueError, match=r"add .*\[3, 5\]"):
+        lanes_of(("add", 0, 1), [3, 5])
+    assert tape.lane(0, 2) == 0
+    assert [tape.value(tape.lane(wide, k)) for k in range(3)] == [1, 0, 0]
+    product = tape.mul(wide, 0)
+    assert tape.nodes[tape.lane(product, 2)] == ("lane", product, 2)
+    with pytest.raises(TypeError, match="lane"):
+        tape.placed(wide, 0, 3, 1)
 
 
-def test_operands_of_sums_and_products_are_ordered_by_node(tape):
+def test_commutative_operands_are_ordered_and_nothing_else_is_rearranged(tape):
+    a, b, c, two = 0, 1, 2, tape.const(2)
     for op in (tape.add, tape.mul):
-        assert op(3, 1) == op(1, 3)
-        assert tape.nodes[op(3, 1)][1:] == (1, 3)
-    assert tape.sub(3, 1) != tape.sub(1, 3)
-    assert tape.div(3, 1) != tape.div(1, 3)
-
-
-def test_nothing_is_reassociated_or_distributed(tape):
-    a, b, c = 0, 1, 2
-    for op in (tape.add, tape.mul):
+        assert op(3, 1) == op(1, 3) and tape.nodes[op(3, 1)][1:] == (1, 3)
         assert op(op(a, b), c) != op(a, op(b, c))
+    assert tape.sub(3, 1) != tape.sub(1, 3) and tape.div(3, 1) != tape.div(1, 3)
     assert tape.mul(a, tape.add(b, c)) != tape.add(tape.mul(a, b), tape.mul(a, c))
-    assert tape.mul(tape.div(a, b), b) != a
-    assert tape.sub(tape.add(a, b), b) != a
-    two = tape.const(2)
+    assert tape.mul(tape.div(a, b), b) != a and tape.sub(tape.add(a, b), b) != a
     assert tape.mul(two, tape.mul(two, a)) != tape.mul(tape.const(4), a)
 
 
-def test_constants_fold_exactly():
-    tape = Tape()
+def test_constants_fold_exactly(tape):
     third, half = tape.div(tape.const(1), tape.const(3)), tape.const(Fraction(1, 2))
     assert tape.value(third) == Fraction(1, 3)
     assert tape.value(tape.add(third, half)) == Fraction(5, 6)
@@ -173,19 +166,63 @@ def test_constants_fold_exactly():
     assert tape.value(tape.mul(third, tape.const(3))) == 1
     assert tape.value(tape.div(half, third)) == Fraction(3, 2)
     assert tape.value(tape.div(tape.const(1.0), tape.const(3.0))) == Fraction(1, 3)
-    assert exact_quotient(1, 3) == Fraction(1, 3)
-    assert exact_quotient(1.0, 3) == 1 / 3
+    assert exact_quotient(1, 3) == Fraction(1, 3) and exact_quotient(1.0, 3) == 1 / 3
+    assert exact_quotient(1, 3.0) == 1 / 3 and FLOATS.const(Fraction(1, 3)) == 1 / 3
+    with mpmath.workdps(50):  # divided in the arithmetic of the run
+        many = Numbers(mpmath.mp, mpmath.mpf)
+        assert abs(3 * many.const(Fraction(1, 3)) - 1) < mpmath.mpf(10) ** -49
+        assert many.const(0.1) == mpmath.mpf(Fraction(0.1).numerator) / Fraction(0.1).denominator
 
 
-@mpmath.workdps(50)
-def test_constants_are_divided_in_the_arithmetic_of_the_run():
-    algebra = Numbers(mpmath.mp, mpmath.mpf)
-    assert abs(3 * algebra.const(Fraction(1, 3)) - 1) < mpmath.mpf(10) ** -49
-    assert algebra.const(0.1) == mpmath.mpf(Fraction(0.1).numerator) / Fraction(0.1).denominator
-    assert FLOATS.const(Fraction(1, 3)) == 1 / 3
+# Steps
 
 
-def test_division_by_the_constant_zero_is_an_error(tape):
-    for numerator in (0, tape.const(0), tape.const(1)):
-        with pytest.raises(ZeroDivisionError, match="divides by the constant zero"):
-            tape.div(numerator, tape.const(0))
+def reachable(nodes, node, found):
+    """Collect a node and all below it."""
+    if node not in found:
+        found.add(node)
+        if nodes[node][0] not in ("input", "const"):
+            for arg in nodes[node][1:]:
+                reachable(nodes, arg, found)
+    return found
+
+
+def evaluated(step, **vectors):
+    """Return the scalars of a step's outputs."""
+    scalars = [scalar for name, _ in step.inputs for scalar in vectors[name]]
+    nodes = replay(step.nodes, scalars, FLOATS)
+    return [nodes[result] for result in step.results]
+
+
+def test_compacted_steps_keep_their_meaning_and_drop_what_no_result_reaches():
+    """Random steps, most of whose nodes are dead."""
+    for seed in SEEDS:
+        (rng, scalars), tape = floats(seed), Tape()
+        pool = grow(rng, FLOATS, tape, scalars, 25)
+        results = tuple(node for node, _ in rng.sample(pool, 3))
+        inputs, outputs = (("x", 2), ("y", 2)), (("u", 1), ("w", 2))
+        step = Step("step", "Random.", inputs, outputs, tuple(tape.nodes), results)
+        small, vectors = compacted(step), {"x": scalars[:2], "y": scalars[2:]}
+        with row(seed):
+            live = set().union(*(reachable(step.nodes, node, set()) for node in results))
+            assert live_nodes(step.nodes, results) == sorted(live)
+            count = sum(step.nodes[node][0] in BINARY for node in live)
+            assert operation_count(step.nodes, results) == count
+            assert evaluated(small, **vectors) == evaluated(step, **vectors)
+            assert live_nodes(small.nodes, small.results) == list(range(len(small.nodes)))
+            assert small.outputs == outputs and compacted(small) == small
+            read = {inputs[step.nodes[n][1] // 2] for n in live if step.nodes[n][0] == "input"}
+            assert small.inputs == tuple(entry for entry in inputs if entry in read)
+
+
+def test_a_specialised_step_is_the_step_at_these_values(tape):
+    x, y, z, w = range(4)
+    results = (tape.add(tape.mul(x, y), z), tape.div(w, y))
+    inputs = (("a", 2), ("b", 2))
+    step = Step("step", "Two vectors.", inputs, (("u", 2),), tuple(tape.nodes), results)
+    still = specialised(step, "still", a=(0, 2))
+    assert (still.name, still.doc, still.outputs) == ("still", step.doc, step.outputs)
+    assert still.inputs == (("b", 2),)
+    assert evaluated(still, b=(3.0, 5.0)) == evaluated(step, a=(0, 2), b=(3.0, 5.0)) == [3.0, 2.5]
+    assert operation_count(still.nodes, still.results) == 1
+    assert specialised(step, "step") == step

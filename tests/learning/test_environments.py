@@ -1,4 +1,8 @@
-"""Environments are Gymnasium's: its checker finds nothing, and many are what each is alone."""
+"""Environments are Gymnasium's: its checker finds nothing, many are what each is alone, and what
+they cannot be made of or take is refused in one line.
+"""
+
+import sys
 
 import numpy as np
 import pytest
@@ -7,61 +11,78 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import serpentail as st
 
-TASKS = ("righting", "landing", "self_recovery")
+from ..support import zoo
+from ..support.rows import row
+
+TASKS = {"righting": "m1_n3", "landing": "ground", "self_recovery": "ground"}
 SHORT = {"duration": 0.05, "angle": 100.0}
-every_task = pytest.mark.parametrize("task", TASKS)
 
 
-def actions(rounds, count, nt, seed=1):
-    return np.random.default_rng(seed).uniform(-1.2, 1.2, (rounds, count, nt))
+@pytest.fixture
+def flyer():
+    return zoo.model("m1_n3")
 
 
-@every_task
-def test_the_checker_of_gymnasium_finds_nothing(of_task, task):
-    check_env(st.environment(of_task(task), task, **SHORT), skip_render_check=True)
+def many(task, count, **settings):
+    """Environments of a model that can do the task."""
+    return st.environments(zoo.model(TASKS[task]), task, count, **settings)
 
 
-@every_task
-def test_many_are_what_gymnasium_makes_of_single_ones(of_task, task):
+def actions(rounds, count, seed=1):
+    return np.random.default_rng(seed).uniform(-1.2, 1.2, (rounds, count, 2))
+
+
+def test_the_checker_of_gymnasium_finds_nothing():
+    for task, name in TASKS.items():
+        with row(task):
+            check_env(st.environment(zoo.model(name), task, **SHORT), skip_render_check=True)
+
+
+def test_many_are_what_gymnasium_makes_of_single_ones():
     """Seeds, observations, rewards, ends and new beginnings, step by step."""
-    model, count = of_task(task), 9
-    ours = st.environments(model, task, count, **SHORT)
-    theirs = SyncVectorEnv([lambda: st.environment(model, task, **SHORT)] * count)
-    assert ours.metadata["autoreset_mode"] == theirs.metadata["autoreset_mode"]
-    assert ours.metadata["autoreset_mode"] == AutoresetMode.NEXT_STEP
-    for name in ("observation_space", "action_space", "single_observation_space"):
-        assert getattr(ours, name) == getattr(theirs, name)
-    seen, expected = ours.reset(seed=7)[0], theirs.reset(seed=7)[0]
-    assert np.array_equal(seen, expected)
-    for action in actions(25, count, 2 * model.segments):
-        found, expected = ours.step(action), theirs.step(action)
-        for one, other in zip(found[:4], expected[:4], strict=True):
-            np.testing.assert_allclose(one, other, rtol=1e-5, atol=1e-5)
+    for task, name in TASKS.items():
+        ours = many(task, 9, **SHORT)
+        theirs = SyncVectorEnv(
+            [lambda t=task, n=name: st.environment(zoo.model(n), t, **SHORT)] * 9
+        )
+        assert ours.metadata["autoreset_mode"] == theirs.metadata["autoreset_mode"]
+        assert ours.metadata["autoreset_mode"] == AutoresetMode.NEXT_STEP
+        for space in ("observation_space", "action_space", "single_observation_space"):
+            assert getattr(ours, space) == getattr(theirs, space)
+        assert np.array_equal(ours.reset(seed=7)[0], theirs.reset(seed=7)[0])
+        for k, action in enumerate(actions(25, 9)):
+            found, expected = ours.step(action), theirs.step(action)
+            for one, other in zip(found[:4], expected[:4], strict=True):
+                with row(task, k):
+                    np.testing.assert_allclose(one, other, rtol=1e-5, atol=1e-5)
 
 
-@every_task
-def test_seeds_choose_the_starts(of_task, task):
-    worlds = st.environments(of_task(task), task, 5, **SHORT)
-    first = worlds.reset(seed=3)[0]
-    assert len(np.unique(first, axis=0)) == 5
-    assert not np.array_equal(worlds.reset()[0], first)  # goes on drawing
-    assert np.array_equal(worlds.reset(seed=3)[0], first)
-    assert np.array_equal(worlds.reset(seed=[3, 4, 5, 6, 7])[0], first)
-    assert np.array_equal(worlds.reset(seed=[3] * 5)[0][1:], np.tile(first[0], (4, 1)))
+def test_seeds_choose_the_starts():
+    for task in TASKS:
+        with row(task):
+            worlds = many(task, 5, **SHORT)
+            first = worlds.reset(seed=3)[0]
+            assert len(np.unique(first, axis=0)) == 5
+            assert not np.array_equal(worlds.reset()[0], first)  # goes on drawing
+            assert np.array_equal(worlds.reset(seed=3)[0], first)
+            assert np.array_equal(worlds.reset(seed=[3, 4, 5, 6, 7])[0], first)
+            assert np.array_equal(worlds.reset(seed=[3] * 5)[0][1:], np.tile(first[0], (4, 1)))
 
 
-@every_task
-def test_what_is_seen_and_rewarded_is_of_the_state(of_task, task):
-    worlds = st.environments(of_task(task), task, 6, **SHORT)
-    worlds.reset(seed=0)
-    action = actions(1, 6, 2 * of_task(task).segments)[0]
-    seen, rewards, *_ = worlds.step(action)
-    q, v = worlds.worlds.q, worlds.worlds.v
-    up = st.rotation_matrix(q[:, 3:7])[:, 2, :]
-    expected = [up, v[:, 3:6], q[:, 2:3], v[:, 2:3], q[:, 7:], v[:, 6:]]
-    np.testing.assert_allclose(seen[:, :-1], np.hstack(expected), rtol=1e-5, atol=1e-6)
-    effort = np.mean(np.clip(action, -1, 1) ** 2, axis=1)
-    np.testing.assert_allclose(rewards, (1 + up[:, 2]) / 2 - 0.01 * effort, atol=1e-12)
+def test_what_is_seen_and_rewarded_is_of_the_state():
+    for task in TASKS:
+        with row(task):
+            worlds = many(task, 6, **SHORT)
+            worlds.reset(seed=0)
+            action = actions(1, 6)[0]
+            seen, rewards, *_ = worlds.step(action)
+            q, v = worlds.worlds.q, worlds.worlds.v
+            up = st.rotation_matrix(q[:, 3:7])[:, 2, :]
+            expected = [up, v[:, 3:6], q[:, 2:3], v[:, 2:3], q[:, 7:], v[:, 6:]]
+            np.testing.assert_allclose(seen[:, :-1], np.hstack(expected), rtol=1e-5, atol=1e-6)
+            effort = np.mean(np.clip(action, -1, 1) ** 2, axis=1)
+            expected = (1 + up[:, 2]) / 2 - 0.01 * effort
+            np.testing.assert_allclose(rewards, expected, atol=1e-12)
 
 
 def test_an_action_is_a_torque_that_holds(flyer):
@@ -107,7 +128,7 @@ def test_a_world_that_leaves_what_numbers_hold_ends_alone(flyer):
     assert not seen[3, 8:12].any()
 
 
-def test_starts_are_spread_as_asked_for(flyer, walker):
+def test_starts_are_spread_as_asked_for(flyer):
     worlds = st.environments(flyer, "righting", 400, tilt=1.0, spin=5.0, height=0.7)
     seen, _ = worlds.reset(seed=0)
     tilts, spins = np.arccos(seen[:, 2]), np.linalg.norm(seen[:, 3:6], axis=1)
@@ -115,7 +136,7 @@ def test_starts_are_spread_as_asked_for(flyer, walker):
         assert 0.95 * most < found.max() <= most * 1.001 and 0.4 < found.mean() / most < 0.6
     assert np.abs(seen[:, :2].mean(axis=0)).max() < 0.1
     np.testing.assert_allclose(seen[:, 6], 0.7, rtol=1e-6)
-    lying = st.environments(walker, "self_recovery", 50, tilt=0.2)
+    lying, walker = many("self_recovery", 50, tilt=0.2), zoo.model("ground")
     seen, _ = lying.reset(seed=0)
     assert (seen[:, 2] < -np.cos(0.3)).all()
     points, _ = walker.contact_points(lying.worlds.q, lying.worlds.v, lying.worlds.given["legs"])
@@ -129,3 +150,62 @@ def test_settings_may_be_texts_with_units(flyer):
     np.testing.assert_array_equal(first.reset(seed=1)[0], second.reset(seed=1)[0])
     actions = np.full((3, flyer.layout.nt), 0.5)
     np.testing.assert_array_equal(first.step(actions)[0], second.step(actions)[0])
+
+
+# What is refused
+
+REFUSED = [
+    *(("task", "cooking", "'righting' or"), ("task", "rihgting", "did you mean 'righting'?")),
+    *(("count", 0, "count: value 0"), ("count", 2.5, "count: value 2.5")),
+    *(("torque", 0, "torque: value 0"), ("torque", np.nan, "torque: value nan")),
+    *(("torque", "2 g", "torque: value '2 g': a mass"), ("step", -1e-3, "step: value -0.001")),
+    *(("duration", np.inf, "duration: value inf"), ("tilt", 4, "tilt: value 4: .*0 to 3.14")),
+    *(("tilt", 90, 'to 3.14159 rad, or "90 deg"'), ("tilt", 181, "to 3.14159 rad$")),
+    *(("spin", "fast", "spin: value 'fast'"), ("spin", -1, "spin: value -1")),
+    *(("substeps", 0, "substeps: value 0"), ("substeps", 1001, "substeps: value 1001")),
+    ("spins", 1.0, "righting has no setting 'spins'"),
+]
+MODELS = [
+    ("model", 3, "model: value 3"),
+    ("task", "landing", "landing: m1_n3 has contacts none: needs 'feet'"),
+    ("model", "ground", r"righting: .* needs none.*contacts=\[\]"),
+    ("model", "fixed", "righting: fixed has a fixed base"),
+    ("model", "bare", "without 'rollout'"),
+]
+
+
+def test_what_is_wrong_is_named(flyer):
+    rows = [(*each, st.SimulationError) for each in REFUSED]
+    for name, value, words, error in rows + [(*each, st.ModelError) for each in MODELS]:
+        changed = zoo.model(value) if name == "model" and value in zoo.ZOO else value
+        given = {"model": flyer, "task": "righting", "count": 3} | {name: changed}
+        with row(name, value):
+            with pytest.raises(error, match=words) as raised:
+                st.environments(**given)
+            assert "\n" not in str(raised.value)
+
+
+def test_actions_seeds_options_and_order_are_checked(flyer):
+    worlds = st.environments(flyer, "righting", 3)
+    with pytest.raises(st.SimulationError, match=r"call reset\(\) first"):
+        worlds.step(np.zeros((3, 2)))
+    worlds.reset(seed=0)
+    for action, words in (
+        (np.zeros((3, 3)), r"action has shape \(3, 3\), not \(3, 2\)"),
+        (np.full((3, 2), np.nan), r"action\[0, 0\]: value nan"),
+        ("left", "action: type <U4"),
+    ):
+        with row(words), pytest.raises(st.StateError, match=words):
+            worlds.step(action)
+    for seed in (-1, 1.5, [1, 2], 2**63):
+        with row(seed), pytest.raises(st.SimulationError, match="seed: value"):
+            worlds.reset(seed=seed)
+    for made in (worlds, st.environment(flyer, "righting")):
+        with pytest.raises(st.SimulationError, match="options: value"):
+            made.reset(options={"height": 3})
+
+
+def test_without_gymnasium_the_extra_is_named(flyer, monkeypatch):
+    monkeypatch.setitem(sys.modules, "gymnasium", None)
+    with pytest.raises(st.ExtraMissing, match=r'pip install "serpentail\[gym\]"'):
+        st.environment(flyer, "righting")

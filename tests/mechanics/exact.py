@@ -16,8 +16,6 @@ from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.interpret import Numbers, Run
-from serpentail_codegen.ir.tape import replay
-from serpentail_codegen.mechanics.lower import derive
 
 X, Y, Z = (eye(3).col(k) for k in range(3))
 # an angle is given by the tangent of its half
@@ -138,24 +136,6 @@ class State(SimpleNamespace):
         own = {"q": q, "v": self.v, "v_dot": self.v_dot, "tau": self.tau, "f_ext": self.f_ext}
         return {name: list(values) for name, values in (self.parameters | own).items()}
 
-    def link(self):
-        """The vector that steps know as ``link``, by the parallel axis theorem."""
-        m, L = self.mass, self.length
-        steiner = m * (L / 2) ** 2
-        return Matrix([m, L, m * L / 2]).col_join(
-            self.parameters["link_inertia"] + steiner * Matrix([1, 0, 1])
-        )
-
-    def joint(self, segment):
-        """The vector that steps know as ``joint``."""
-        return Matrix(
-            [
-                f(x)
-                for x in self.halves[2 * segment : 2 * segment + 2]
-                for f in (CIRCLE.cos, CIRCLE.sin)
-            ]
-        )
-
     def tail_vector(self, v, segment):
         """The two entries of a velocity or acceleration that belong to a segment."""
         return v[6 + 2 * segment : 8 + 2 * segment, :]
@@ -232,16 +212,6 @@ def kinetic_form(some, others):
     )
 
 
-def call(function, **vectors):
-    """Replay a derived step on exact numbers; return its outputs as columns."""
-    step = derive(function)
-    values = replay(
-        step.nodes, [scalar for name, _ in step.inputs for scalar in vectors[name]], EXACT
-    )
-    results = iter([values[node] for node in step.results])
-    return {name: Matrix([next(results) for _ in range(size)]) for name, size in step.outputs}
-
-
 def run(name, state):
     """Run a function's program on exact numbers; return its outputs as columns."""
     p = assemble(FUNCTIONS[name], state.tail)
@@ -252,14 +222,9 @@ def run(name, state):
     return {array.name: Matrix(found[array.name]) for array in p.of_role("output")}
 
 
-def in_frame(R, wrench):
-    """Force and moment in the axes of R."""
-    return Matrix.vstack(R.T * wrench[:3, :], R.T * wrench[3:, :])
-
-
-def momentum_about(origin, bodies, R):
-    """Momentum of bodies and its moment about a point, in the axes of R."""
+def momentum_about(origin, bodies):
+    """Momentum of bodies and its moment about a point, world axes."""
     moment = zeros(3, 1)
     for body in bodies:
         moment += body.spin + (body.com[0] - origin).cross(body.mass * body.com[1])
-    return in_frame(R, Matrix.vstack(sum((b.mass * b.com[1] for b in bodies), zeros(3, 1)), moment))
+    return Matrix.vstack(sum((b.mass * b.com[1] for b in bodies), zeros(3, 1)), moment)

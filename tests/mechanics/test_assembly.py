@@ -1,10 +1,15 @@
 """Every function equals its definition, exactly, in rational arithmetic."""
 
+import pytest
 from sympy import Matrix, diag, eye, zeros
 
-from .exact import kinetic_form, momentum_about, run
+from .exact import State, kinetic_form, momentum_about, run
 
-# Functions, from definition.
+
+@pytest.fixture(params=[(1, 3), (2, 2), (3, 1)], ids=["m1_n3", "m2_n2", "m3_n1"])
+def state(request):
+    """A random rational state of a tail; its quaternion is not normalised."""
+    return State(*request.param, seed=7)
 
 
 def world_map(state):
@@ -54,6 +59,11 @@ def test_energy_and_momentum_are_sums_over_bodies(state):
     assert energy["potential"][0] == state.parameters["gravity"][0] * height
     mass = sum(body.mass for body in bodies)
     com = sum((body.mass / mass * body.com[0] for body in bodies), zeros(3, 1))
-    expected = momentum_about(com, bodies, eye(3))
+    expected = momentum_about(com, bodies)
     momentum = run("momentum", state)
     assert Matrix.vstack(momentum["linear"], momentum["angular"]) == expected
+    found, columns = run("center_of_mass", state), state.columns()
+    assert found["position"] == com
+    assert found["velocity"] == momentum["linear"] / mass
+    J = Matrix.hstack(*(momentum_about(com, column)[:3, :] / mass for column in columns))
+    assert Matrix(3, state.tail.nv, list(found["J"])) == J

@@ -1,55 +1,34 @@
-"""Contact with the ground: points, velocities, forces and accelerations against plain NumPy and
-limiting cases.
+"""Contact with the ground: points, velocities, forces, powers and accelerations against plain NumPy
+and limiting cases.
 """
-
-from functools import cache
-from itertools import product
 
 import casadi
 import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.verification.report import laws
-from serpentail_codegen.scene.parse import parse_scene
+from serpentail_codegen.functions.function import assemble
+from serpentail_codegen.functions.plain import FUNCTIONS
+from serpentail_codegen.functions.tail import Tail
+from serpentail_codegen.targets.c.loops import in_loops
+from serpentail_codegen.targets.c.straight import straight_line
 from tests.c.target.emitted import C99, compiled
 from tests.references.contact import Contacts, attitude
 from tests.references.parameters import random_states
-from tests.support.models import folder_of, model_folder
+from tests.support import zoo
+from tests.support.rows import row
 
-ALL = ("feet", "tail", "torso")
-FRICTION = ("cone", "box", "smooth", "paper")
-# segments of a mixed tail
-MIXED = (
-    {"kind": "articulated", "links": 2, "length": 0.08, "mass": 0.0015},
-    {"kind": "continuum", "length": 0.06, "mass": 0.001},
-    {"kind": "articulated", "links": 3, "link_lengths": [0.03, 0.02, 0.02], "mass": 0.0008},
-)
-CASES = {
-    "straight": (1, 3, {"emission": "straight"}),
-    "loops": (2, 2, {"emission": "loops"}),
-    "continuum": (2, None, {"samples": 3}),
-    "continuum_loops": (1, None, {"emission": "loops"}),
-    "baked": (1, 2, {"baked": True}),
-    "mixed": (3, None, {"kind": "mixed", "samples": 3}),
-}
-NAMES = ["mass_matrix", "bias_force", "forward_dynamics", "contact_points", "contact_dynamics"]
+LAWS = ["ground", "box", "smooth", "paper"]  # all laws of friction on one tail
+TAILS = ["ground_m2_n2", "ground_arcs", "ground_mixed"]
+every_model = pytest.mark.parametrize("name", [*LAWS, *TAILS])
+every_law = pytest.mark.parametrize("name", LAWS)
+UPRIGHT = np.array([0, 0, 0, 1.0, 0, 0, 0, 0, 0])
 
 
-@cache
-def touching(segments=1, links=3, contacts=ALL, functions=tuple(NAMES), **options):
-    """A model that can touch the ground."""
-    options = {"contacts": list(contacts), "functions": list(functions), "name": "rat"} | options
-    if options.get("kind") == "mixed":
-        return st.load(folder_of(parse_scene(options | {"segments": MIXED[:segments]}, "rat")))
-    return st.load(model_folder(segments, links, **options))
-
-
-@pytest.fixture(params=CASES)
-def model(request):
-    """A model of each kind and emission."""
-    segments, links, options = CASES[request.param]
-    return touching(segments, links, **options)
+def untilted(name):
+    """A model whose tail is mounted in torso axes, as that of the reference is."""
+    model = zoo.model(name)
+    return model.with_parameters(mount_angles=[0, 0, 0]) if name == "ground_mixed" else model
 
 
 def near_ground(model, seed, count=20):
@@ -72,125 +51,106 @@ def each(model, seed=3, count=20):
     return zip(*near_ground(model, seed, count), strict=True)
 
 
+# ---- points --------------------------------------------------------------------------------------
+
+
 def test_legs_have_the_numbers_of_the_mechanism():
     """gamma = 210 deg: the sole is level; (y, z) of A, M and T from B in mm."""
-    model = touching(1, 1, contacts=("feet",))
     expected = {
         -15: [(-29.46, -14.96), (4.35, -24.02), (20.35, -24.02)],
         -75: [(-46.43, -31.93), (-37.37, -65.74), (-21.37, -65.74)],
     }
     for delta, points in expected.items():
         legs = np.radians([210, delta, 210, delta, 0, 0, 0, 0])
-        found, _ = model.contact_points([0, 0, 0, 1, 0, 0, 0, 0, 0], np.zeros(8), legs)
+        found, _ = zoo.model("feet").contact_points(UPRIGHT, np.zeros(8), legs)
         for side in (0, 3):
             np.testing.assert_allclose(1e3 * found[side : side + 3, 1:], points, atol=0.006)
         np.testing.assert_allclose(found[:, 0], [0.0225] * 3 + [-0.0225] * 3)
         assert abs(found[1, 2] - found[2, 2]) < 1e-17
 
 
-def test_points_and_velocities_are_the_references(model):
-    reference = Contacts(model)
-    for q, v, _, _, legs in each(model):
-        positions, velocities = model.contact_points(q, v, legs)
-        np.testing.assert_allclose(
-            positions, reference.positions(q, legs).real, atol=3e-15 * (1 + abs(q[:3]).max())
-        )
-        scale = abs(velocities).max()
-        np.testing.assert_allclose(velocities, reference.velocities(q, v, legs), atol=1e-13 * scale)
+def test_points_of_the_tail_are_those_of_its_kinematics():
+    """Also on a tilted mount."""
+    for name in ("ground_m2_n2", "ground_arcs", "ground_mixed"):
+        model = zoo.model(name)
+        tail = slice(6, 6 + model.contacts["tail"])
+        for q, v, _, _, legs in each(model, count=3):
+            positions, velocities = model.contact_points(q, v, legs)
+            with row(name):
+                points = model.tail_points(q)[1:]
+                np.testing.assert_allclose(positions[tail], points, atol=1e-14)
+                moving = (model.tail_point_jacobians(q) @ v).reshape(-1, 3)[1:]
+                scale = np.abs(moving).max()
+                np.testing.assert_allclose(velocities[tail], moving, atol=1e-13 * scale)
 
 
 def test_the_torso_touches_by_its_lowest_point():
     """No point of the ellipsoid is lower, and it lies on the ellipsoid."""
-    model = touching(1, 1, contacts=("torso",))
-    axes, rng = np.array(model.parameters["torso_semi_axes"]), np.random.default_rng(1)
-    sphere = rng.normal(size=(20_000, 3))
+    model, rng = zoo.model("ground"), np.random.default_rng(1)
+    axes, sphere = np.array(model.parameters["torso_semi_axes"]), rng.normal(size=(20_000, 3))
     surface = axes * sphere / np.linalg.norm(sphere, axis=1)[:, None]
     for q in random_states(1, 5, 10, "random")[0]:
-        (lowest,), _ = model.contact_points(q, np.zeros(8))
+        lowest = model.contact_points(q, np.zeros(8), np.zeros(8))[0][-1]
         world = q[:3] + surface @ attitude(q[3:7]).T
-        assert world[:, 2].min() >= lowest[2] - 1e-15
-        assert world[:, 2].min() <= lowest[2] + 1e-3
+        assert lowest[2] - 1e-15 <= world[:, 2].min() <= lowest[2] + 1e-3
         place = attitude(q[3:7]).T @ (lowest - q[:3])
         assert np.sum((place / axes) ** 2) == pytest.approx(1, rel=1e-12)
 
 
-def models_of_contact():
-    """All cases and laws of friction; all laws of one case are quick."""
-    for case, friction in product(CASES, FRICTION):
-        quick = case == "straight" or friction == "cone"
-        yield pytest.param(case, friction, marks=() if quick else pytest.mark.slow)
+# ---- forces --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("case", "friction"), list(models_of_contact()))
-def test_forces_and_accelerations_are_the_references(case, friction):
-    """Eqs. 35 to 37, and the residual of H v_dot + C = [0; tau] + J^T f."""
-    segments, links, options = CASES[case]
-    model = touching(segments, links, friction=friction, **options)
-    reference, touched = Contacts(model), 0
-    for q, v, tau, bristles, legs in each(model):
-        v_dot, rates, forces = model.contact_dynamics(q, v, tau, bristles, legs)
-        expected, expected_rates = reference.laws(q, v, bristles, legs)
-        np.testing.assert_allclose(
-            forces, expected, rtol=1e-9, atol=1e-12 * (1 + abs(expected).max())
-        )
-        np.testing.assert_allclose(
-            rates, expected_rates, rtol=1e-9, atol=1e-9 * (1 + abs(expected_rates).max())
-        )
-        load = np.einsum("kai,ka->i", reference.jacobians(q, legs), expected)
-        residual = model.mass_matrix(q) @ v_dot + model.bias_force(q, v) - load
-        residual[6:] -= tau
-        scale = (np.abs(load) + np.abs(model.bias_force(q, v))) / np.sqrt(
-            np.diag(model.mass_matrix(q))
-        )
-        assert np.abs(residual / np.sqrt(np.diag(model.mass_matrix(q)))).max() < 1e-10 * scale.max()
-        touched += np.count_nonzero(expected[:, 2])
-    assert touched > 20
-
-
-# The other targets.
-
-
-@pytest.mark.parametrize("friction", FRICTION)
-def test_operations_are_those_of_the_functions(friction):
-    model = touching(2, 2, friction=friction)
-    for q, v, tau, bristles, legs in each(model, count=5):
-        found = model.casadi.contact_dynamics(q, v, tau, bristles, legs)
-        for one, other in zip(
-            found, model.contact_dynamics(q, v, tau, bristles, legs), strict=True
-        ):
-            scalars = np.array(one).reshape(other.shape)
-            np.testing.assert_allclose(scalars, other, atol=1e-9 * (1 + np.abs(other).max()))
-        found = model.casadi.contact_points(q, v, legs)
-        for one, other in zip(found, model.contact_points(q, v, legs), strict=True):
-            np.testing.assert_allclose(np.array(one), other, atol=1e-12)
-
-
-@pytest.mark.parametrize("friction", FRICTION)
-def test_derivatives_are_numbers_in_the_air_and_right_on_the_ground(friction):
-    """CasADi's derivatives of the operations against central differences of the compiled
-    function.
+@every_model
+def test_points_forces_powers_and_accelerations_are_the_references(name):
+    """Eqs. 35 to 37, and the residual of H v_dot + C = [0; tau] + J^T f; a drive of the legs works
+    against the ground's force on what it moves in the torso.
     """
-    model = touching(1, 2, friction=friction)
-    q, v, tau, bristles, legs = (rows[:6] for rows in near_ground(model, 3, 6))
-    f = model.casadi.contact_dynamics
-    symbols = [casadi.MX.sym(name, f.size1_in(name)) for name in f.name_in()]
-    slope = casadi.Function("slope", symbols, [casadi.jacobian(f(*symbols)[0], symbols[1])])
-    for k in range(6):
-        exact = np.array(slope(q[k], v[k], tau[k], bristles[k], legs[k]))
-        units = 1e-5 * np.eye(model.nv)
-        ends = [
-            model.contact_dynamics(q[k], v[k] + side * units, tau[k], bristles[k], legs[k])[0]
-            for side in (1, -1)
-        ]
-        np.testing.assert_allclose(
-            exact, (ends[0] - ends[1]).T / 2e-5, rtol=1e-3, atol=1e-5 * np.abs(exact).max()
-        )
-    high = q[0] + np.eye(model.nq)[2]
-    assert np.isfinite(np.array(slope(high, v[0], tau[0], bristles[0], legs[0]))).all()
+    model = untilted(name)
+    reference, touched, driven = Contacts(model), 0, 0.0
+    for q, v, tau, bristles, legs in each(model):
+        positions, velocities = model.contact_points(q, v, legs)
+        places, motion = reference.positions(q, legs).real, reference.velocities(q, v, legs)
+        np.testing.assert_allclose(positions, places, atol=3e-15 * (1 + abs(q[:3]).max()))
+        np.testing.assert_allclose(velocities, motion, atol=1e-13 * abs(velocities).max())
+
+        v_dot, rates, forces = model.contact_dynamics(q, v, tau, bristles, legs)
+        expected, by_law = reference.laws(q, v, bristles, legs)
+        most = 1e-12 * (1 + abs(expected).max())
+        np.testing.assert_allclose(forces, expected, rtol=1e-9, atol=most)
+        np.testing.assert_allclose(rates, by_law, rtol=1e-9, atol=1e-9 * (1 + abs(by_law).max()))
+        load = np.einsum("kai,ka->i", reference.jacobians(q, legs), expected)
+        H, bias = model.mass_matrix(q), model.bias_force(q, v)
+        residual, scale = H @ v_dot + bias - load, np.sqrt(np.diag(H))
+        residual[6:] -= tau
+        largest = ((np.abs(load) + np.abs(bias)) / scale).max()
+        assert np.abs(residual / scale).max() < 1e-10 * largest
+
+        *same, heights, powers = model.kernel("contact_rates")(q, v, tau, bristles, legs)
+        for found, value in zip(same, (v_dot, rates, forces), strict=True):
+            np.testing.assert_allclose(found, value, rtol=1e-9, atol=1e-9 * np.abs(value).max())
+        rising = np.stack([places[:, 2], motion[:, 2]], axis=1)
+        np.testing.assert_allclose(np.reshape(heights, (-1, 2)), rising, rtol=1e-9, atol=1e-11)
+        drift = motion - reference.velocities(q, v, np.r_[legs[:4], np.zeros(4)])
+        works = [np.sum(motion * expected), -np.sum(drift * expected)]
+        np.testing.assert_allclose(powers, works, rtol=1e-8, atol=1e-9 * np.abs(works).max())
+        touched, driven = touched + np.count_nonzero(expected[:, 2]), max(driven, abs(works[1]))
+    assert touched > 20 and driven > 1
+
+
+def test_a_leg_that_stretches_against_the_ground_does_work():
+    model = zoo.model("feet")
+    legs = np.radians([210, -15, 210, -15, 0, 0, 0, 0])
+    foot = model.contact_points(UPRIGHT, np.zeros(8), legs)[0]
+    q = UPRIGHT - [0, 0, foot[:, 2].min() + 0.002, 0, 0, 0, 0, 0, 0]
+    for rate in (-1.0, 1.0):
+        legs[[5, 7]] = rate
+        falling = model.contact_points(q, np.zeros(8), legs)[1][1, 2] < 0
+        *_, powers = model.kernel("contact_rates")(q, np.zeros(8), np.zeros(2), np.zeros(12), legs)
+        assert (powers[1] > 0) == falling == (rate < 0)
 
 
 def test_flight_is_contact_dynamics_high_up():
-    model = touching()
+    model = zoo.model("ground")
     q, v, tau, bristles, legs = (rows[0] for rows in near_ground(model, 3, 1))
     q[2] = 10.0
     v_dot, rates, forces = model.contact_dynamics(q, v, tau, bristles, legs)
@@ -199,96 +159,107 @@ def test_flight_is_contact_dynamics_high_up():
     assert not forces.any()
 
 
-@pytest.mark.parametrize("emission", ["straight", "loops"])
-def test_a_flight_pays_nothing_for_contact(emission):
-    """Functions of a flight scene have the same C in a scene with contacts."""
-    names = ["mass_matrix", "forward_dynamics"]
-    texts = []
-    for options in ({}, {"contacts": ["feet"]}):
-        folder = model_folder(2, 2, name="rat", functions=names, emission=emission, **options)
-        text = (folder / "src" / "rat.c").read_text()
-        texts.append(
-            text[text.index("#if defined(__GNUC__)") : text.index("void rat_default")]
-            + text[text.index("}\n") :]
-        )
-        assert ("K_n" in (folder / "include" / "rat.h").read_text()) == bool(options)
-    assert texts[0] == texts[1]
-
-
-def test_verification_judges_what_else_a_model_with_contacts_has():
-    checks = laws(touching(2, 2))
-    assert [c for c in checks if not c.passed] == []
-    assert sum(not c.omitted for c in checks) == 14
-
-
-# Misuse.
-
-
-def test_legs_are_given_where_there_are_feet():
-    with pytest.raises(st.StateError, match="rat has feet: give legs, 4 angles"):
-        touching().contact_points(np.eye(9)[3], np.zeros(8))
-    with pytest.raises(st.StateError, match="rat has no feet, but legs were given"):
-        touching(1, 1, contacts=("torso",)).contact_points(np.eye(9)[3], np.zeros(8), np.zeros(8))
-    with pytest.raises(st.StateError, match=r"legs has shape \(4,\), not \(8,\)"):
-        touching().contact_points(np.eye(9)[3], np.zeros(8), np.zeros(4))
-    with pytest.raises(st.StateError, match=r"bristles has shape \(10, 2\), not \(20,\)"):
-        touching().contact_dynamics(
-            np.eye(9)[3], np.zeros(8), np.zeros(2), np.zeros((10, 2)), np.zeros(8)
-        )
-
-
-@pytest.mark.parametrize(
-    ("name", "value"), [("mu", -0.1), ("K_n", 0.0), ("D_f", 0.0), ("K_f", -1), ("L_m2t", -1)]
-)
-def test_unphysical_parameters_are_refused(name, value):
-    with pytest.raises(st.ModelError, match=f"{name}: value"):
-        touching().with_parameters(**{name: value})
-
-
 def test_parameters_reach_the_compiled_function():
-    model = touching(1, 1, contacts=("feet",)).with_parameters(mu=0.0, hip=(0.1, 0.2, 0.3))
-    legs = np.radians([210, -15, 210, -15, 0, 0, 0, 0])
-    q, v = np.array([0, 0, -0.27, 1, 0, 0, 0, 0, 0.0]), np.array([1.0, 1, 0, 0, 0, 0, 0, 0])
+    model = zoo.model("feet").with_parameters(mu=0.0, hip=(0.1, 0.2, 0.3))
+    legs, q, v = np.radians([210, -15, 210, -15, 0, 0, 0, 0]), UPRIGHT.copy(), np.eye(8)[0]
+    q[2], v[1] = -0.27, 1.0
     _, _, forces = model.contact_dynamics(q, v, np.zeros(2), np.zeros(12), legs)
     assert forces[:, 2].max() > 0 and not forces[:, :2].any()
     assert model.contact_points(q, v, legs)[0][:, 0].tolist() == [0.1] * 3 + [-0.1] * 3
 
 
-@pytest.mark.parametrize(
-    "options", [{"emission": "straight"}, {"emission": "loops"}, {"real": "float"}, {"baked": True}]
-)
-@pytest.mark.parametrize("size", [(2, 2), (2, None)])
-def test_compiles_without_a_warning(tmp_path, size, options):
-    functions = ["contact_points", "contact_dynamics", "pfl", "implicit"]
-    folder = model_folder(*size, name="rat", contacts=list(ALL), functions=functions, **options)
-    for source in ("src/rat.c", "src/rat_host.c", "example/main.c"):
-        compiled(tmp_path, folder / source, *C99, "-fsyntax-only")
+# ---- the other targets ---------------------------------------------------------------------------
 
 
-def test_optimiser_finds_nothing_to_warn_about(tmp_path):
-    functions = ["contact_points", "contact_dynamics", "pfl", "implicit"]
-    folder = model_folder(
-        2, 2, name="rat", contacts=list(ALL), functions=functions, emission="loops"
-    )
-    compiled(tmp_path, folder / "src" / "rat.c", *C99, "-O2")
+@every_law
+def test_operations_are_those_of_the_functions(name):
+    model = zoo.model(name)
+    for state in each(model, count=5):
+        q, v, *_, legs = state
+        for function, given in (("contact_dynamics", state), ("contact_points", (q, v, legs))):
+            expected = getattr(model, function)(*given)
+            for one, other in zip(getattr(model.casadi, function)(*given), expected, strict=True):
+                most = 1e-9 * (1 + np.abs(other).max())
+                scalars = np.array(one).reshape(other.shape)
+                np.testing.assert_allclose(scalars, other, atol=most)
+
+
+@every_law
+def test_derivatives_are_numbers_in_the_air_and_right_on_the_ground(name):
+    """CasADi's derivatives of the operations against central differences of the compiled
+    function.
+    """
+    model = zoo.model(name)
+    f = model.casadi.contact_dynamics
+    symbols = [casadi.MX.sym(name, f.size1_in(name)) for name in f.name_in()]
+    slope = casadi.Function("slope", symbols, [casadi.jacobian(f(*symbols)[0], symbols[1])])
+    units = 1e-5 * np.eye(model.nv)
+    for q, v, *others in each(model, count=6):
+        exact = np.array(slope(q, v, *others))
+        ahead, behind = (
+            model.contact_dynamics(q, v + side * units, *others)[0] for side in (1, -1)
+        )
+        most = 1e-5 * np.abs(exact).max()
+        np.testing.assert_allclose(exact, (ahead - behind).T / 2e-5, rtol=1e-3, atol=most)
+    high = q + np.eye(model.nq)[2]
+    assert np.isfinite(np.array(slope(high, v, *others))).all()
+
+
+def test_a_flight_pays_nothing_for_contact():
+    """Functions of a flight scene have the same C in a scene with contacts."""
+    for name in ("mass_matrix", "forward_dynamics"):
+        for printed in (straight_line, in_loops):
+            flight, ground = (
+                printed(assemble(FUNCTIONS[name], Tail(2, 2, contacts=contacts)), "double", "x")
+                for contacts in ((), ("feet",))
+            )
+            assert flight.lines == ground.lines, (name, printed)
 
 
 def test_single_precision_is_single_precision():
-    model, exact = touching(1, 2, real="float"), touching(1, 2)
+    model, exact = zoo.model("single_ground"), zoo.model("ground")
     for q, v, *others in each(model, count=5):
         state = q, 0.1 * v, *others
-        for one, other in zip(
-            model.contact_dynamics(*state), exact.contact_dynamics(*state), strict=True
-        ):
-            np.testing.assert_allclose(one, other, rtol=1e-3, atol=1e-4 * (1 + np.abs(other).max()))
+        found, expected = (m.contact_dynamics(*state) for m in (model, exact))
+        for one, other in zip(found, expected, strict=True):
+            most = 1e-4 * (1 + np.abs(other).max())
+            np.testing.assert_allclose(one, other, rtol=1e-3, atol=most)
+
+
+@pytest.mark.parametrize("name", ["single_ground", "ground_arcs"])
+def test_compiles_without_a_warning(tmp_path, name):
+    folder = zoo.folder(name)
+    for source in (f"src/{folder.name}.c", f"src/{folder.name}_host.c", "example/main.c"):
+        compiled(tmp_path, folder / source, *C99, "-fsyntax-only")
 
 
 def test_the_manifest_names_the_points():
-    entry = touching(2, 3).manifest["contacts"]
-    assert entry == [
-        {"group": "feet", "count": 6},
-        {"group": "tail", "count": 6},
-        {"group": "torso", "count": 1},
-    ]
-    assert "RAT_CONTACTS = 13 " in (touching(2, 3).folder / "include" / "rat.h").read_text()
-    assert touching(1, 3, contacts=(), functions=("mass_matrix",)).contacts == {}
+    model = zoo.model("ground")
+    groups = [(entry["group"], entry["count"]) for entry in model.manifest["contacts"]]
+    assert groups == [("feet", 6), ("tail", 3), ("torso", 1)]
+    assert "GROUND_CONTACTS = 10 " in (model.folder / "include" / "ground.h").read_text()
+    assert zoo.model("m1_n3").contacts == {}
+
+
+# ---- misuse --------------------------------------------------------------------------------------
+
+
+def test_what_is_given_must_fit_the_contacts():
+    ground, air = zoo.model("ground"), zoo.model("m1_n3")
+    v, tau, legs = np.zeros(8), np.zeros(2), np.zeros(8)
+    for words, call in {
+        "feet.*legs": lambda: ground.contact_points(UPRIGHT, v),
+        r"legs.*\(4,\).*\(8,\)": lambda: ground.contact_points(UPRIGHT, v, np.zeros(4)),
+        r"bristles.*\(10, 2\).*\(20,\)": lambda: ground.contact_dynamics(
+            UPRIGHT, v, tau, np.zeros((10, 2)), legs
+        ),
+    }.items():
+        with row(words), pytest.raises(st.StateError, match=words):
+            call()
+    with pytest.raises(st.ModelError, match="contact_points"):
+        air.contact_points(UPRIGHT, v)
+    with pytest.raises(st.StateError, match=r"no feet.*contacts"):  # all on the ground have feet
+        air._with_legs((UPRIGHT, v), legs)
+    for name, value in (("mu", -0.1), ("K_n", 0.0), ("D_f", 0.0), ("K_f", -1), ("L_m2t", -1)):
+        with row(name), pytest.raises(st.ModelError, match=f"{name}.*{value}"):
+            ground.with_parameters(**{name: value})

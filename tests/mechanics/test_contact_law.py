@@ -10,12 +10,8 @@ from serpentail_codegen.ir.tape import replay
 from serpentail_codegen.mechanics.contact import contact_force
 from serpentail_codegen.mechanics.lower import derive
 
-from .test_contact import FRICTION
-
+FRICTION = ("cone", "box", "smooth", "paper")
 FLOATS = Numbers(math, float)
-
-
-# Limiting cases, by the law of one point.
 
 
 def law(friction, depth, velocity, bristle, **changes):
@@ -32,18 +28,14 @@ def law(friction, depth, velocity, bristle, **changes):
 
 @pytest.mark.parametrize("friction", FRICTION)
 def test_the_ground_never_pulls_and_friction_stays_within_its_bound(friction):
+    """Without depth there is no force, and bristles relax."""
     rng = np.random.default_rng(8)
     for _ in range(500):
+        depth, velocity, bristle = rng.normal(0, 0.01), rng.normal(0, 5, 3), rng.normal(0, 1e-3, 2)
         mu = rng.uniform(0, 2)
-        f, _ = law(
-            friction, rng.normal(0, 0.01), rng.normal(0, 5, 3), rng.normal(0, 1e-3, 2), mu=mu
-        )
+        f, _ = law(friction, depth, velocity, bristle, mu=mu)
         size = np.abs(f[:2]).max() if friction in ("box", "paper") else np.linalg.norm(f[:2])
         assert f[2] >= 0 and size <= mu * f[2] * (1 + 1e-14)
-
-
-@pytest.mark.parametrize("friction", FRICTION)
-def test_no_force_without_depth_and_bristles_relax(friction):
     for depth in (0.0, 0.01):
         f, rate = law(friction, -depth, [1.0, 2.0, 3.0], [1e-3, -2e-3])
         assert not f.any()

@@ -1,6 +1,9 @@
-"""Lowering keeps what SymPy means; steps have names of their own, and stay within their budgets."""
+"""Lowering keeps what SymPy means; steps have names and shapes of their own, and stay within their
+budgets.
+"""
 
 import math
+from itertools import product
 
 import pytest
 import sympy
@@ -9,11 +12,14 @@ from sympy import Matrix, Rational
 from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.tail import Tail
+from serpentail_codegen.ir.builder import Builder
 from serpentail_codegen.ir.interpret import Numbers, Run, unroll
 from serpentail_codegen.ir.program import Apply, statements
 from serpentail_codegen.ir.tape import operation_count, replay
 from serpentail_codegen.mechanics import link
-from serpentail_codegen.mechanics.lower import Recorder, derive
+from serpentail_codegen.mechanics.lower import Recorder, declared_shapes, derive
+from serpentail_codegen.mechanics.shapes import M33, V1, V3
+from tests.support.rows import row
 
 from .exact import EXACT
 
@@ -30,30 +36,19 @@ def lowered(e, **numbers):
     return replay(recorder.tape.nodes, list(numbers.values()), EXACT)[node]
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "x + y - 3*x*y",
-        "2*x/3",
-        "-x/y",
-        "x**3",
-        "x**-2",
-        "y/(3*x)",
-        "1/(x + y)",
-        "x*y/(x - y)/2",
-        "(x + 1)**2*y",
-        "-3",
-    ],
-)
-def test_lowering_keeps_the_value(text):
+def test_lowering_keeps_the_value():
     x, y = Rational(3, 7), Rational(-5, 2)
-    assert lowered(text, x=x, y=y) == sympy.sympify(text).subs({"x": x, "y": y})
+    powers = ("x**3", "x**-2", "(x + 1)**2*y")
+    quotients = ("2*x/3", "-x/y", "y/(3*x)", "1/(x + y)", "x*y/(x - y)/2")
+    for text in ("x + y - 3*x*y", "-3", *powers, *quotients):
+        assert lowered(text, x=x, y=y) == sympy.sympify(text).subs({"x": x, "y": y}), text
 
 
-@pytest.mark.parametrize("text", ["tan(x)", "x**y", "x**Rational(1, 3)", "exp(x)", "pi*x"])
-def test_what_has_no_rule_is_refused(text):
-    with pytest.raises(TypeError, match="no rule lowers"):
-        lowered(text, x=1, y=1)
+def test_what_has_no_rule_is_refused():
+    choices = ("Piecewise((x, x > 0))", "Piecewise((x, Eq(x, y)), (y, True))", "Min(x, y)")
+    for text in ("tan(x)", "x**y", "x**Rational(1, 3)", "exp(x)", "pi*x", *choices):
+        with row(text), pytest.raises(TypeError, match="no rule"):
+            lowered(text, x=1, y=1)
 
 
 def test_let_names_what_is_not_a_symbol_or_number():
@@ -68,9 +63,7 @@ def test_let_names_what_is_not_a_symbol_or_number():
 # Choices.
 
 
-@pytest.mark.parametrize("y", [-1.0, 0.0, 2.0])
-@pytest.mark.parametrize("x", [-1.0, 0.0, 2.0])
-def test_choices_are_lowered_as_sympy_means_them(x, y):
+def test_choices_are_lowered_as_sympy_means_them():
     a, b = sympy.symbols("a b")
     choices = [
         sympy.Piecewise((a, a > b), (b + 1, True)),
@@ -83,18 +76,10 @@ def test_choices_are_lowered_as_sympy_means_them(x, y):
     recorder = Recorder()
     recorder.node_of |= {symbol: recorder.tape.input(k) for k, symbol in enumerate((a, b))}
     nodes = [recorder.lower(e) for e in choices]
-    found = replay(recorder.tape.nodes, [x, y], Numbers(math, float))
-    assert [found[n] for n in nodes] == [float(e.subs({a: x, b: y})) for e in choices]
-
-
-@pytest.mark.parametrize(
-    "e", ["Piecewise((a, a > 0))", "Piecewise((a, Eq(a, b)), (b, True))", "Min(a, b)"]
-)
-def test_choices_that_no_rule_lowers_are_refused(e):
-    recorder = Recorder()
-    symbols = {name: recorder.symbol(name, recorder.tape.input(k)) for k, name in enumerate("ab")}
-    with pytest.raises(TypeError, match="no rule lowers"):
-        recorder.lower(sympy.sympify(e, locals=symbols))
+    for x, y in product((-1.0, 0.0, 2.0), repeat=2):
+        found = replay(recorder.tape.nodes, [x, y], Numbers(math, float))
+        expected = [float(e.subs({a: x, b: y})) for e in choices]
+        assert [found[n] for n in nodes] == expected, (x, y)
 
 
 # Steps as a whole.
@@ -120,10 +105,7 @@ def test_derived_steps_are_named_after_their_function():
     step = derive(link.link_wrench)
     assert (step.name, step.outputs) == ("link_wrench", (("F", 6),))
     assert step.inputs == (("link", 6), ("w", 3), ("w_dot", 3), ("a_joint", 3), ("swing", 3))
-    assert (
-        step.doc
-        == "Inertial wrench of one link at its joint (Eq. 17), Newton and Euler in the link frame."
-    )
+    assert step.doc == link.link_wrench.__doc__
     assert derive(link.link_wrench) is step
 
 
@@ -146,21 +128,16 @@ class Counting:
 def executed(name, m, n):
     """Operations that a function executes in loops."""
     p, algebra = assemble(FUNCTIONS[name], Tail(m, n)), Counting()
-    Run(
-        p,
-        algebra,
-        {a.name: [None] * a.length for a in (*p.of_role("parameters"), *p.of_role("input"))},
-    )
+    given = (*p.of_role("parameters"), *p.of_role("input"))
+    Run(p, algebra, {a.name: [None] * a.length for a in given})
     return algebra.count
 
 
 def straight(name, m, n):
     """Operations of a function without loops."""
     tape, outputs, guards = unroll(assemble(FUNCTIONS[name], Tail(m, n)))
-    guarded = [node for _, node in guards]
-    return operation_count(
-        tape.nodes, [node for nodes in outputs.values() for node in nodes] + guarded
-    )
+    results = [node for nodes in outputs.values() for node in nodes]
+    return operation_count(tape.nodes, results + [node for _, node in guards])
 
 
 def step_cost(*functions):
@@ -177,3 +154,51 @@ def test_steps_stay_within_their_budgets():
 def test_functions_stay_within_their_budgets():
     assert straight("forward_dynamics", 1, 3) <= 1040
     assert executed("forward_dynamics", 3, 4) <= 5340
+
+
+# Shapes: a step says by annotations how many numbers its vectors hold.
+
+
+def carried(let, R: M33, arm: V3, scale: V1) -> dict:
+    """A turned and scaled arm."""
+    return {"carried": R * arm * scale[0], "matrix": R}
+
+
+def unannotated(let, R: M33, arm) -> dict:
+    """An arm of no shape."""
+    return {"carried": R * arm}
+
+
+def mistyped(let, R: M33, arm: Matrix) -> dict:
+    """An arm whose type tells no shape."""
+    return {"carried": R * arm}
+
+
+def with_setting(let, arm: V3, twice: bool = False) -> dict:
+    """An argument with a default is a setting."""
+    return {"carried": arm * (2 if twice else 1)}
+
+
+def test_a_step_reads_what_its_annotations_say():
+    assert declared_shapes(carried) == {"R": (3, 3), "arm": (3, 1), "scale": (1, 1)}
+    step = derive(carried)
+    assert step.inputs == (("R", 9), ("arm", 3), ("scale", 1))
+    assert step.outputs == (("carried", 3), ("matrix", 9))
+    assert declared_shapes(with_setting) == {"arm": (3, 1)}
+
+
+def test_wrong_shapes_are_refused():
+    for function in (unannotated, mistyped):
+        with pytest.raises(TypeError, match=f"{function.__name__}: arm"):
+            derive(function)
+    for name, size in (("R", 3), ("arm", 4), ("carried", 2)):
+        sizes = {"R": 9, "arm": 3, "scale": 1, "carried": 3} | {name: size}
+        builder = Builder("applied", "A step applied.")
+        refs = {vector: builder.array(vector, count)[0] for vector, count in sizes.items()}
+        writes = {"carried": refs.pop("carried")}
+        right = {"R": 9, "arm": 3, "carried": 3}[name]
+        with (
+            row(name),
+            pytest.raises(ValueError, match=f"carried.*applied.*{name}.*{right}.*{size}"),
+        ):
+            builder.apply(derive(carried), refs, **writes)

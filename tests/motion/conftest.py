@@ -10,6 +10,8 @@ from serpentail_codegen.scene.parse import load_scene
 from tests.support.models import folder_of
 from tests.support.scenes import SCENES
 
+from .analytic import motion
+
 
 @cache
 def scene_of(name, **changes):
@@ -20,6 +22,12 @@ def scene_of(name, **changes):
 @cache
 def simulated(name):
     return scene_of(name).simulate()
+
+
+@pytest.fixture
+def flight():
+    """Forty-one samples of the analytic motion."""
+    return motion(np.linspace(0, 0.4, 41))
 
 
 @pytest.fixture
@@ -69,3 +77,11 @@ def at_height(model, height, rows=3):
     q = np.zeros((rows, model.nq))
     q[:, 2], q[:, 3] = height, 1
     return q
+
+
+def down(group, time):
+    return {"time": time, "group": group, "kind": "touch_down"}
+
+
+def off(group, time):
+    return {"time": time, "group": group, "kind": "take_off"}

@@ -11,12 +11,13 @@ from scipy.spatial.transform import Rotation
 import serpentail as st
 from serpentail.motion.through_torso import sunk
 from tests.references import contact as reference
-from tests.support.models import model_folder
+from tests.support import zoo
+from tests.support.rows import row
 
 from .conftest import at_height, made, scene_of
 
 SEMI_AXES = np.array([0.0315, 0.0495, 0.027])  # m: of the rat's torso, by its inertia
-FREE = ["energy", "momentum", "rollout", "tail_points"]
+MOUNT, LENGTH = np.array([0, -0.0405, 0.0045]), 0.19466  # m: where its tail begins, how long it is
 WEIGHT = (0.10572 + 0.00351) * 9.8
 
 
@@ -27,7 +28,7 @@ def the(warnings, word):
 
 
 def millimetres(warning):
-    return float(re.search(r": ([\d.]+) mm below the ground", warning)[1])
+    return float(re.search(r": ([\d.]+) mm ", warning)[1])
 
 
 def sphere(count):
@@ -35,27 +36,21 @@ def sphere(count):
     return directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
 
-# The kick's own, and none of what is sound.
-
-
-def test_the_kick_is_told_all(kick):
+def test_the_kick_is_told_all_and_a_clean_flight_nothing(kick):
     told = kick.warnings
     assert len(told) == 5
     assert millimetres(the(told, "torso: ")) == pytest.approx(10.7, abs=0.2)
     assert millimetres(the(told, "tail: 1")) == pytest.approx(150, abs=2)
-    assert "714 body weights" in the(told, "ground: ") and "t = 0.4 s" in the(told, "ground: ")
-    assert "segment 1 is bent by 7.03 rad" in the(told, "tail: segment")
-    assert "goes through the torso" in the(told, "tail: goes")
+    assert re.search("714 .*t = 0.4 s|t = 0.4 s, 714 ", the(told, "ground: "))
+    assert "7.03 rad" in the(told, "tail: segment 1") and the(told, "tail: goes")
+    # value, time, limit and remedy
     assert all(re.search(r" at t = [\d.]+ s.*more than [\d.]+.*: \w", each) for each in told)
-
-
-@pytest.mark.parametrize(("segments", "links"), [(1, 2), (2, None)])
-def test_a_clean_flight_has_none(segments, links):
-    model = st.load(model_folder(segments, links, functions=FREE))
-    q = np.concatenate([[0, 0, -3, 1, 0, 0, 0], 0.3 * np.cos(np.arange(2 * segments))])
-    v = np.concatenate([[0, 0, 1, 9, 1, 2], np.zeros(2 * segments)])
-    flight = st.simulate(model, q, v, controller=st.Damping(1e-3), t_span=0.3)
-    assert flight.warnings == []
+    for name in ("m1_n3", "arcs2"):
+        model = zoo.model(name)
+        q = np.concatenate([[0, 0, -3, 1, 0, 0, 0], 0.3 * np.cos(np.arange(model.nq - 7))])
+        v = np.concatenate([[0, 0, 1, 9, 1, 2], np.zeros(model.nv - 6)])
+        flight = st.simulate(model, q, v, controller=st.Damping(1e-3), t_span=0.3)
+        assert flight.warnings == [], name
 
 
 # The ground, where a scene has one.
@@ -79,11 +74,9 @@ def test_the_tail_s_depth_by_hand(rat):
     """Straight, hanging from a torso pitched by 60 degrees about its mount."""
     q = at_height(rat, 0.15, 1)
     q[0, 3:5] = np.cos(np.pi / 6), np.sin(np.pi / 6)
-    mount, length = np.array([0, -0.0405, 0.0045]), 0.19466
-    tip = reference.attitude(q[0, 3:7]) @ (mount - [0, length, 0])
-    assert millimetres(the(made(rat, q).warnings, "tail: ")) == pytest.approx(
-        -1e3 * (0.15 + tip[2]), rel=0.01
-    )
+    tip = reference.attitude(q[0, 3:7]) @ (MOUNT - [0, LENGTH, 0])
+    found = the(made(rat, q).warnings, "tail: ")
+    assert millimetres(found) == pytest.approx(-1e3 * (0.15 + tip[2]), rel=0.01)
 
 
 def test_the_legs_depth_by_the_reference(rat):
@@ -99,17 +92,22 @@ def test_the_legs_depth_by_the_reference(rat):
 
 
 def test_a_tenth_of_the_torso_s_length_is_allowed(rat):
-    """9.9 mm; the straight tail is out of the ground."""
+    """9.9 mm; the straight tail is out of the ground. All samples count, also beyond thousands."""
     for depth, count in ((9.8e-3, 0), (10e-3, 1)):
         q = at_height(rat, SEMI_AXES[2] - depth)
         assert len(made(rat, q).warnings) == count
+    q = at_height(rat, 1.0, 10_000)
+    q[9000, 2] = 0.0
+    assert "t = 9000 s" in the(made(rat, q).warnings, "torso: ")
 
 
-def test_what_has_contact_may_be_deep_and_where_is_no_ground_all_may():
-    model = scene_of("self_recovery").model
-    assert made(model, at_height(model, -0.1)).warnings == []
-    for contacts, words in ((["tail"], ["torso"]), (["torso"], ["tail"]), ([], [])):
-        model = st.load(model_folder(1, 2, functions=FREE, contacts=contacts))
+def test_what_has_contact_may_be_deep_and_where_is_no_ground_all_may(rat):
+    for model, words in (
+        (scene_of("self_recovery").model, []),
+        (zoo.model("feet_tail"), ["torso"]),
+        (zoo.model("feet"), ["torso", "tail"]),
+        (zoo.model("m1_n3"), []),
+    ):
         told = made(model, at_height(model, -0.1)).warnings
         assert [each.split(":")[0] for each in told] == words
 
@@ -127,13 +125,13 @@ def through(points, parts=4000):
     return deepest
 
 
-@pytest.mark.parametrize("seed", range(10))
-def test_how_deep_a_tail_goes_by_points_close_together(seed):
-    random = np.random.default_rng(seed)
-    tails = random.normal(size=(20, 6, 3)) * random.uniform(0.3, 2)
-    found = sunk(tails)
-    np.testing.assert_allclose(found, [through(tail) for tail in tails], atol=1e-6)
-    assert (found[0] > 0) or seed != 0
+def test_how_deep_a_tail_goes_by_points_close_together():
+    for seed in range(5):
+        random = np.random.default_rng(seed)
+        tails = random.normal(size=(20, 6, 3)) * random.uniform(0.3, 2)
+        found = sunk(tails)
+        np.testing.assert_allclose(found, [through(tail) for tail in tails], atol=1e-6)
+        assert found.any()
 
 
 def test_tails_that_leave_the_torso_are_not_in_it():
@@ -147,19 +145,17 @@ def test_tails_that_leave_the_torso_are_not_in_it():
     assert sunk(mounts[:, None]).max() == 0  # no link at all
 
 
-def test_a_tail_that_comes_back_into_the_torso_is_told():
+def test_a_tail_that_comes_back_into_the_torso_is_told(rat):
     """One of three links of 65 mm: the first out, the others folded back by nearly half a turn."""
-    model = scene_of("kick").model
-    q = at_height(model, 1.0, 2)
+    q = at_height(rat, 1.0, 2)
     q[1, 7] = 2 * np.pi / 3 * 1.1  # a triangle, whose last link crosses the torso
     q[:, 3:7] = 0.5, 0.7, -0.1, 0.5  # however the torso lies
-    found = the(made(model, q).warnings, "tail: goes")
-    mount, length = np.array([0, -0.0405, 0.0045]), 0.19466 / 3
-    points, way = [mount], np.array([0, -length, 0])
+    points, way = [MOUNT], np.array([0, -LENGTH / 3, 0])
     for _ in range(3):
         way = Rotation.from_rotvec([q[1, 7], 0, 0]).apply(way)
         points.append(points[-1] + way)
     depth = through(np.array(points) / SEMI_AXES)
+    found = the(made(rat, q).warnings, "tail: goes")
     assert f"{depth:.2g} of the way" in found and "t = 1 s" in found
 
 
@@ -172,34 +168,36 @@ def test_blows_from_20_body_weights_on(rat):
         forces[2, :, 2] = weights * WEIGHT / 6
         told = made(rat, at_height(rat, 1.0), forces=forces).warnings
         assert len(told) == count
-        assert all("t = 2 s" in each and "20.1 body weights" in each for each in told)
+        assert all("t = 2 s" in each and "20.1" in each for each in told)
 
 
-@pytest.mark.parametrize(("kind", "parts"), [("joints", 3), ("arcs", 1), ("polar", 1)])
-def test_bends_beyond_half_a_turn(kind, parts):
+def test_bends_beyond_half_a_turn():
     """Of joints what all links turn together; of arcs the length of (a, b), or theta."""
-    options = {"coordinates": "polar"} if kind == "polar" else {}
-    links = 3 if kind == "joints" else None
-    model = st.load(model_folder(2, links, functions=["energy", "momentum", "rollout"], **options))
-    for bend, count in ((3.2, 0), (3.21, 1)):
-        q = at_height(model, 1.0)
-        q[:, 8::2] = 0.1
-        if kind == "arcs":
-            q[2, 9:11] = bend * np.cos(2.0), bend * np.sin(2.0)
-        else:
-            q[2, 10] = -bend / parts
-        told = made(model, q).warnings
-        assert len(told) == count
-        assert all("segment 2 is bent by 3.21 rad at t = 2 s" in each for each in told)
+    along = np.array([np.cos(2.0), np.sin(2.0)])
+    for name, segment, bent in (
+        ("m2_n2", 2, [0, -1 / 2]),
+        ("m2_n2", 2, [1 / 2, 0.1]),
+        ("arcs2", 2, along),
+        ("polar", 1, [0.1, -1]),
+        ("mixed", 1, along),
+        ("mixed", 2, [0.1, 1 / 2]),
+    ):
+        model = zoo.model(name)
+        for bend, count in ((3.2, 0), (3.21, 1)):
+            q = at_height(model, 1.0)
+            q[2, 5 + 2 * segment : 7 + 2 * segment] = bend * np.array(bent)
+            told = [each for each in made(model, q).warnings if each.startswith("tail: segment")]
+            with row(name, segment, bend):
+                assert len(told) == count
+                assert all(f"segment {segment} " in each for each in told)
+                assert all("3.21 rad at t = 2 s" in each for each in told)
 
 
-@pytest.mark.parametrize(("bend", "degrees"), [(12.5, False), (12.6, True)])
-def test_bends_of_more_than_two_turns_are_taken_for_degrees(bend, degrees):
-    model = st.load(model_folder(2, 3, functions=["energy", "momentum", "rollout"]))
-    q = at_height(model, 1.0)
-    q[:, 7] = bend / 3
-    told = the(made(model, q).warnings, "tail: segment 1")
-    assert ("degrees" in told) is degrees and "damp it more" in told
+def test_bends_of_more_than_two_turns_are_taken_for_degrees(rat):
+    for bend, degrees in ((12.5, False), (12.6, True)):
+        q = at_height(rat, 1.0)
+        q[:, 7] = bend / 3
+        assert ("degrees" in the(made(rat, q).warnings, "tail: segment 1")) is degrees
 
 
 # Where the model is, and where it is not.
@@ -213,20 +211,7 @@ def test_files_and_pickles_keep_what_was_found(kick, tmp_path):
     assert again.warnings == kick.warnings and "doubts" not in kick.info
 
 
-def test_runs_that_fail_have_warnings_up_to_there():
-    with pytest.raises(st.SimulationError) as caught:
-        scene_of("kick").simulate(most_steps=400)
-    told = caught.value.trajectory.warnings
-    assert the(told, "torso: ") and the(told, "ground: ")
-
-
 def test_books_that_do_not_balance_come_first(rat):
     motion = made(rat, at_height(rat, 0.0))
     motion.info["warnings"] = ["the books"]
     assert motion.warnings[0] == "the books" and len(motion.warnings) > 1
-
-
-def test_what_lies_beyond_the_first_thousands_of_samples_counts(rat):
-    q = at_height(rat, 1.0, 10_000)
-    q[9000, 2] = 0.0
-    assert "t = 9000 s" in the(made(rat, q).warnings, "torso: ")

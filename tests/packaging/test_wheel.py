@@ -6,36 +6,26 @@ import sys
 import zipfile
 
 import pytest
-from hatchling.metadata.core import ProjectMetadata
-from hatchling.plugin.manager import PluginManager
 
 from tests.packaging.contents import PAGE, ROOT, faults, relative_links
 
 
-@pytest.fixture(scope="module")
-def metadata():
-    """What is published of the project besides its files."""
-    return ProjectMetadata(str(ROOT), PluginManager()).core
-
-
-def test_pictures_and_links_of_the_description_lead_somewhere(metadata):
+def test_the_description_leads_somewhere_and_says_what_the_package_is():
+    pytest.importorskip("hatch_fancy_pypi_readme")
+    plugins = pytest.importorskip("hatchling.plugin.manager").PluginManager()
+    metadata = pytest.importorskip("hatchling.metadata.core").ProjectMetadata
+    found = metadata(str(ROOT), plugins).core
     own = (ROOT / "README.md").read_text(encoding="utf-8")
     assert "](docs/images/" in own  # which a checkout shows without a network
-    assert relative_links(metadata.readme) == []
-    assert metadata.readme.count("](") == own.count("](")
-    assert "main/docs/images/filmstrip.png)" in metadata.readme
-
-
-def test_who_finds_the_package_learns_what_it_is(metadata):
-    assert set(metadata.urls) == {"Homepage", "Documentation", "Source", "Changelog"}
-    assert all(url.startswith("https://") for url in metadata.urls.values())
-    assert metadata.authors and metadata.keywords and "Typing :: Typed" in metadata.classifiers
-    versions = {c.rpartition(" ")[2] for c in metadata.classifiers if "Python :: 3." in c}
-    assert versions == {"3.11", "3.12", "3.13"}
+    assert relative_links(found.readme) == [] and found.readme.count("](") == own.count("](")
+    assert set(found.urls) == {"Homepage", "Documentation", "Source", "Changelog"}
+    assert all(url.startswith("https://") for url in found.urls.values())
+    assert found.authors and found.keywords and "Typing :: Typed" in found.classifiers
 
 
 @pytest.mark.slow
 def test_the_wheel_of_the_sdist_is_whole(tmp_path):
+    pytest.importorskip("build")
     command = ["build", "--no-isolation", "--skip-dependency-check", "--outdir", tmp_path, ROOT]
     done = subprocess.run([sys.executable, "-m", *command], capture_output=True, check=False)
     assert done.returncode == 0, done.stderr
@@ -51,3 +41,28 @@ def test_what_a_wheel_lacks_or_has_too_much_is_told(tmp_path):
     expected = [f"lacks {PAGE}", "lacks serpentail/py.typed", "lacks serpentail/examples/kick.toml"]
     expected += ["has tests/test_all.py", "its text has a relative link: docs/x.png"]
     assert {*expected, "lacks a licence: MIT License"} <= set(told)
+
+
+@pytest.mark.parametrize("later", [True, False])
+def test_the_hook_leaves_the_page_to_later_or_removes_what_it_cannot_make(
+    later, tmp_path, monkeypatch, capsys
+):
+    pytest.importorskip("hatchling")
+    from hatch_build import PAGE as MADE
+    from hatch_build import PageHook
+
+    page = tmp_path / MADE  # of an earlier build, without sources to make it anew
+    page.parent.mkdir(parents=True)
+    page.write_text("old")
+    if later:
+        monkeypatch.setenv("SERPENTAIL_PAGE", "later")
+        monkeypatch.setenv("PATH", "")  # so that nothing is asked for to make it
+    data = {"force_include": {}, "artifacts": []}
+    hook = PageHook(str(tmp_path), {}, None, None, str(tmp_path), "wheel")
+    hook.initialize("editable" if later else "standard", data)
+    if later:
+        assert hook.dependencies() == [] and page.read_text() == "old"
+        assert data == {"force_include": {}, "artifacts": [MADE]}
+    else:
+        assert not page.exists() and "without the page of runs" in capsys.readouterr().err
+        assert data["force_include"] == {str(tmp_path / "scenes"): "serpentail/examples"}

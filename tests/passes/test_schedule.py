@@ -3,14 +3,13 @@
 import random
 from itertools import pairwise
 
-import pytest
-
 from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.interpret import unroll
 from serpentail_codegen.ir.tape import Tape, live_nodes
 from serpentail_codegen.passes import schedule
+from tests.support.rows import row
 
 
 def straight(segments, links):
@@ -19,7 +18,7 @@ def straight(segments, links):
     return tape.nodes, [*outputs["v_dot"], *(node for _, node in guards)]
 
 
-def random_line(seed, length=300):
+def random_line(seed, length=120):
     """Nodes of a random straight line over three inputs, and its last values."""
     rng, tape = random.Random(seed), Tape()
     nodes = [tape.input(k) for k in range(3)]
@@ -36,13 +35,6 @@ def assert_valid(nodes, live, order):
     for n in order:
         if nodes[n][0] not in schedule.LEAVES:
             assert all(place[a] < place[n] for a in nodes[n][1:])
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_random_lines_keep_their_dependencies(seed):
-    nodes, results = random_line(seed)
-    live = live_nodes(nodes, results)
-    assert_valid(nodes, live, schedule.scheduled(nodes, live, results))
 
 
 def scheduled_by_the_rule(nodes, live, results):
@@ -71,40 +63,42 @@ def scheduled_by_the_rule(nodes, live, results):
     return [n for n in live if nodes[n][0] in schedule.LEAVES] + order
 
 
-@pytest.mark.parametrize("registers", [3, 8, 24])
-@pytest.mark.parametrize("seed", range(10))
-def test_the_order_is_that_of_the_rule(seed, registers, monkeypatch):
-    monkeypatch.setattr(schedule, "REGISTERS", registers)
-    nodes, results = random_line(seed, length=120)
-    results = [*results, *random.Random(seed).sample(range(3, len(nodes)), 20)]
-    live = live_nodes(nodes, results)
-    assert schedule.scheduled(nodes, live, results) == scheduled_by_the_rule(nodes, live, results)
+def test_the_order_is_that_of_the_rule(monkeypatch):
+    for seed in range(10):
+        nodes, results = random_line(seed)
+        more = [*results, *random.Random(seed).sample(range(3, len(nodes)), 20)]
+        for registers in (3, 8, 24):
+            monkeypatch.setattr(schedule, "REGISTERS", registers)
+            for wanted in (results, more):
+                live = live_nodes(nodes, wanted)
+                order = schedule.scheduled(nodes, live, wanted)
+                with row(seed, registers):
+                    assert_valid(nodes, live, order)
+                    assert order == scheduled_by_the_rule(nodes, live, wanted)
 
 
-@pytest.mark.parametrize("size", [(1, 1), (1, 3), (3, 2)])
-def test_functions_keep_their_dependencies_and_change_their_order(size):
-    nodes, results = straight(*size)
-    live = live_nodes(nodes, results)
-    order = schedule.scheduled(nodes, live, results)
-    assert_valid(nodes, live, order)
-    assert order != live
-    assert order == schedule.scheduled(nodes, live, results)
-
-
-def test_long_lines_are_left_alone():
-    nodes, results = straight(3, 4)
+def test_functions_keep_their_dependencies_and_change_their_order():
+    for size in ((1, 1), (1, 3), (3, 2)):
+        nodes, results = straight(*size)
+        live = live_nodes(nodes, results)
+        order = schedule.scheduled(nodes, live, results)
+        with row(size):
+            assert_valid(nodes, live, order)
+            assert order != live
+            assert order == schedule.scheduled(nodes, live, results)
+    nodes, results = straight(3, 4)  # long lines are left alone
     live = live_nodes(nodes, results)
     assert schedule.scheduled(nodes, live, results) == live
 
 
-@pytest.mark.parametrize(("more", "alone"), [(0, False), (1, True)])
-def test_lines_of_much_independent_work_are_left_alone(more, alone):
+def test_lines_of_much_independent_work_are_left_alone():
     """Pairs of a sum and its product, 8 cycles: enough to be busy in any order, or one less."""
-    tape, pairs = Tape(), 4 * schedule.MOST_ABREAST + more
-    x = [tape.input(k) for k in range(pairs + 1)]
-    results = [tape.mul(tape.add(a, b), a) for a, b in pairwise(x)]
-    live = live_nodes(tape.nodes, results)
-    assert (schedule.scheduled(tape.nodes, live, results) == live) == alone
+    for more, alone in ((0, False), (1, True)):
+        tape, pairs = Tape(), 4 * schedule.MOST_ABREAST + more
+        x = [tape.input(k) for k in range(pairs + 1)]
+        results = [tape.mul(tape.add(a, b), a) for a, b in pairwise(x)]
+        live = live_nodes(tape.nodes, results)
+        assert (schedule.scheduled(tape.nodes, live, results) == live) == alone
 
 
 def test_the_longest_path_starts_first():

@@ -1,6 +1,7 @@
 """The torso in a view: its outline, and what it hides."""
 
 import dataclasses
+from itertools import product
 
 import numpy as np
 import pytest
@@ -11,9 +12,10 @@ from serpentail.pictures.animal import Pen, above_ground, hull
 from serpentail.pictures.frames import frames, silhouette
 from serpentail.pictures.views import NAMED
 from tests.support.drawn_flight import SEMI_AXES, flight
+from tests.support.rows import row
 
 
-def surface(count=300):
+def surface(count=150):
     """Points on the torso's ellipsoid, in its frame."""
     polar, around = np.meshgrid(np.linspace(0, np.pi, count), np.linspace(0, 2 * np.pi, 2 * count))
     sphere = [np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar)]
@@ -28,9 +30,12 @@ def film_frame(seed, height=0.06):
     return frames(trajectory.model, dataclasses.replace(trajectory, q=q), [0], 0.0)[0]
 
 
-@pytest.mark.parametrize("view", NAMED.values(), ids=lambda view: view.name)
-@pytest.mark.parametrize("seed", range(5))
-def test_silhouette_is_the_outline_of_the_projected_surface(view, seed):
+def seen(seeds):
+    """Yield numbers of attitudes with every view."""
+    return product(range(seeds), NAMED.values())
+
+
+def check_silhouette(seed, view):
     rotation = Rotation.random(rng=seed).as_matrix()
     shadow = view.of(surface() @ rotation.T)[:, :2]
     outline = silhouette(rotation, SEMI_AXES, view, count=721)
@@ -41,9 +46,13 @@ def test_silhouette_is_the_outline_of_the_projected_surface(view, seed):
     np.testing.assert_allclose(outline[0], outline[-1], atol=1e-15)
 
 
-@pytest.mark.parametrize("view", NAMED.values(), ids=lambda view: view.name)
-@pytest.mark.parametrize("seed", range(3))
-def test_the_torso_hides_exactly_what_a_ray_to_the_viewer_hits(view, seed):
+def test_silhouette_is_the_outline_of_the_projected_surface():
+    for seed, view in seen(5):
+        with row(seed, view.name):
+            check_silhouette(seed, view)
+
+
+def check_hidden(seed, view):
     frame = film_frame(seed)
     points = frame.torso + np.random.default_rng(seed).uniform(-0.06, 0.06, (400, 3))
     outside = np.linalg.norm((points - frame.torso) @ frame.rotation / SEMI_AXES, axis=1) > 1
@@ -62,12 +71,15 @@ def test_the_torso_hides_exactly_what_a_ray_to_the_viewer_hits(view, seed):
     assert not (under_but_clear & covered & ~grazing).any()
 
 
-@pytest.mark.parametrize("view", NAMED.values(), ids=lambda view: view.name)
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("height", [-0.02, 0.005])
-def test_what_is_above_the_ground_is_outlined(view, seed, height):
+def test_the_torso_hides_exactly_what_a_ray_to_the_viewer_hits():
+    for seed, view in seen(3):
+        with row(seed, view.name):
+            check_hidden(seed, view)
+
+
+def check_above(seed, view, height):
     frame = film_frame(seed, height)
-    world = frame.torso + surface() @ frame.rotation.T
+    world = frame.torso + surface(300) @ frame.rotation.T
     shadow = view.of(world[world[:, 2] >= 0])[:, :2]
     outline = hull(view.of(above_ground(frame))[:, :2])
     angle = np.linspace(0, 2 * np.pi, 90)
@@ -76,20 +88,26 @@ def test_what_is_above_the_ground_is_outlined(view, seed, height):
     np.testing.assert_allclose(*widths, atol=5e-4)
 
 
+def test_what_is_above_the_ground_is_outlined():
+    for (seed, view), height in product(seen(2), (-0.02, 0.005)):
+        with row(seed, view.name, height):
+            check_above(seed, view, height)
+
+
 def test_a_torso_above_the_ground_has_no_part_below():
     frame = film_frame(1, height=0.06)
     assert above_ground(frame) is None and frame.lowest < 0.06 - SEMI_AXES.min()
     assert len(above_ground(film_frame(1, height=-0.06))) == 0
 
 
-@pytest.mark.parametrize("side", [1, -1])
-def test_a_line_before_the_torso_has_a_rim_and_one_behind_is_hidden(side):
+def test_a_line_before_the_torso_has_a_rim_and_one_behind_is_hidden():
     """Seen from the right, +x: of a line across, what is drawn over the torso, and its rim."""
     frame = dataclasses.replace(film_frame(0), rotation=np.eye(3))
-    axes = Figure().subplots()
-    pen = Pen(axes, frame, NAMED["side"], frame.torso)
-    across = frame.torso + np.array([[0.05 * side, -0.2, 0], [0.05 * side, 0.2, 0]])
-    pen.line(across, color="red", linewidth=1.0)
-    over = [line for line in axes.lines if line.get_zorder() > 0.4]  # the torso's level
-    assert [line.get_color() for line in over] == (["white", "red"] if side > 0 else [])
-    assert all(np.ptp(line.get_xdata()) == pytest.approx(0.4) for line in axes.lines)
+    for side, colours in ((1, ["white", "red"]), (-1, [])):
+        axes = Figure().subplots()
+        pen = Pen(axes, frame, NAMED["side"], frame.torso)
+        across = frame.torso + np.array([[0.05 * side, -0.2, 0], [0.05 * side, 0.2, 0]])
+        pen.line(across, color="red", linewidth=1.0)
+        over = [line for line in axes.lines if line.get_zorder() > 0.4]  # the torso's level
+        assert [line.get_color() for line in over] == colours
+        assert all(np.ptp(line.get_xdata()) == pytest.approx(0.4) for line in axes.lines)

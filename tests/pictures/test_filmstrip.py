@@ -3,6 +3,7 @@ some.
 """
 
 import dataclasses
+from itertools import product
 
 import matplotlib
 import numpy as np
@@ -16,6 +17,7 @@ from serpentail.pictures.page import drawn_points
 from serpentail.pictures.style import STYLE
 from serpentail.pictures.views import NAMED, SIDE, views_of
 from tests.support.drawn_flight import SPEEDS, flight
+from tests.support.rows import row
 
 VIEWS = ("side", "top", "oblique")
 
@@ -32,46 +34,51 @@ def panels_of(figure, axes):
     return [each for each in figure.axes if each in set(axes.ravel()) or each.get_xlabel()]
 
 
-@pytest.mark.parametrize("speed", SPEEDS)
-@pytest.mark.parametrize("frames", [1, 3, pytest.param(13, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("height", [0.0, 0.4, 50.0])
-def test_panels_have_one_scale_and_show_everything(speed, frames, height):
-    motion = lifted(flight(SPEEDS[speed]), height)
-    figure, axes = motion.filmstrip(frames=frames, views=VIEWS)
+def check_scales(figure, axes, motion, frames):
+    """Panels have one scale, lie on the page and show everything."""
     assert axes.shape == (3, frames)
     width, tall = figure.get_size_inches()
     scales = []
     for each in panels_of(figure, axes):
         place, (x, y) = each.get_position(), (np.ptp(each.get_xlim()), np.ptp(each.get_ylim()))
         scales.append((place.width * width / x, place.height * tall / y))
-        assert place.x0 > 0 < place.y0
-        assert place.x1 < 1 > place.y1
+        assert place.x0 > 0 < place.y0 and place.x1 < 1 > place.y1
     np.testing.assert_allclose(*np.transpose(scales), rtol=2e-3)
     np.testing.assert_allclose(scales[: 3 * frames], scales[0][0], rtol=2e-3)
     strip = strip_of([motion], frames, views_of(VIEWS), None, None)
     for k, frame in enumerate(strip.films[0]):
-        for row, name in enumerate(VIEWS):
+        for line, name in enumerate(VIEWS):
             view = NAMED[name]
             shown = drawn_points(frame, view) - view.of(strip.origin(frame))[:2]
-            low, high = np.transpose([axes[row, k].get_xlim(), axes[row, k].get_ylim()])
+            low, high = np.transpose([axes[line, k].get_xlim(), axes[line, k].get_ylim()])
             assert (shown > low).all() and (shown < high).all()
 
 
-@pytest.mark.parametrize("frames", [1, 4, pytest.param(8, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("speed", SPEEDS)
-@pytest.mark.parametrize("height", [0.0, 0.4, 50.0])
-def test_panels_key_and_labels_do_not_overlap(speed, frames, height):
-    with matplotlib.rc_context(STYLE):
-        figure, axes = lifted(flight(SPEEDS[speed]), height).filmstrip(frames=frames)
-        figure.draw_without_rendering()
-        boxes = [each.get_tightbbox() for each in panels_of(figure, axes)]
-        boxes.append(figure.legends[0].get_window_extent())
+def check_overlaps(figure, axes):
+    """Panels, key and labels do not overlap, and lie on the page."""
+    figure.draw_without_rendering()
+    boxes = [each.get_tightbbox() for each in panels_of(figure, axes)]
+    boxes.append(figure.legends[0].get_window_extent())
     for k, box in enumerate(boxes):
         assert figure.bbox.x0 <= box.x0 < box.x1 <= figure.bbox.x1
         assert figure.bbox.y0 <= box.y0 < box.y1 <= figure.bbox.y1
         for other in boxes[:k]:
             shared = matplotlib.transforms.Bbox.intersection(box, other)
             assert shared is None or min(shared.width, shared.height) < 2
+
+
+FEW = [("up", 3, 0.0), ("far", 1, 0.4), ("still", 4, 50.0), ("far", 3, 0.0)]
+MANY = product(SPEEDS, (1, 4, 13), (0.0, 0.4, 50.0))
+
+
+@pytest.mark.parametrize("pages", [FEW, pytest.param(list(MANY), marks=pytest.mark.slow)])
+def test_panels_have_one_scale_show_everything_and_do_not_overlap(pages):
+    for speed, frames, height in pages:
+        motion = lifted(flight(SPEEDS[speed]), height)
+        with row(speed, frames, height), matplotlib.rc_context(STYLE):
+            figure, axes = motion.filmstrip(frames=frames, views=VIEWS)
+            check_scales(figure, axes, motion, frames)
+            check_overlaps(*motion.filmstrip(frames=frames))
 
 
 def test_joints_leave_the_tail_s_colour_in_sight(tmp_path):
@@ -97,15 +104,16 @@ def test_motions_are_rows_at_the_same_times():
         assert abs(first.time - second.time) < np.diff(one.t).max() / 2
 
 
-@pytest.mark.parametrize("count", [2, 5, 8])
-def test_moments_do_not_repeat_what_rests(count):
+def test_moments_do_not_repeat_what_rests():
     """It rests for most of the time, then moves: as a kick, whose first frames were alike."""
     t = np.linspace(0, 1.2, 1201)
     gone = np.clip(t - 0.4, 0, 0.6)
-    times = moments([(t, gone)], count)
-    assert times[0] == 0 and times[-1] == pytest.approx(1.2) and len(times) == count
-    assert ((times > 0) & (times < 0.4)).sum() <= count // 8
-    np.testing.assert_allclose(moments([(t, 0 * t)], count), np.linspace(0, 1.2, count), atol=1e-3)
+    for count in (2, 5, 8):
+        times = moments([(t, gone)], count)
+        assert times[0] == 0 and times[-1] == pytest.approx(1.2) and len(times) == count
+        assert ((times > 0) & (times < 0.4)).sum() <= count // 8
+        even = np.linspace(0, 1.2, count)
+        np.testing.assert_allclose(moments([(t, 0 * t)], count), even, atol=1e-3)
 
 
 def test_the_way_is_that_of_the_drawn_points():
@@ -128,38 +136,29 @@ def test_frames_are_the_samples_nearest_to_wanted_times():
     assert len(strip_of([few], 8, [SIDE], None, None).films[0]) == 3
 
 
-@pytest.mark.parametrize(
-    ("height", "grounded", "anchored"), [(-0.5, False, False), (0.4, True, True), (50, True, False)]
-)
-def test_ground_is_drawn_below_what_stays_above_it(height, grounded, anchored):
-    strip = strip_of([lifted(flight(), height)], 4, [SIDE], None, None)
-    assert (strip.grounded, strip.anchored) == (grounded, anchored)
-    for frame in strip.films[0]:
-        ground = -SIDE.of(strip.origin(frame))[1]
-        low, high = strip.windows()[0][:, 1]
-        assert not anchored or low < ground < high
+def test_ground_is_drawn_below_what_stays_above_it():
+    for height, grounded, anchored in ((-0.5, False, False), (0.4, True, True), (50, True, False)):
+        strip = strip_of([lifted(flight(), height)], 4, [SIDE], None, None)
+        assert (strip.grounded, strip.anchored) == (grounded, anchored)
+        for frame in strip.films[0]:
+            ground = -SIDE.of(strip.origin(frame))[1]
+            low, high = strip.windows()[0][:, 1]
+            assert not anchored or low < ground < high
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"frames": 0}, "frames: value 0: needs a whole number"),
-        ({"frames": 2.5}, "frames: value 2.5: needs a whole number"),
-        ({"frames": True}, "frames: value True: needs a whole number"),
+def test_wrong_arguments_are_named(tmp_path):
+    for change, words in (
+        ({"frames": 0}, "frames: value 0:"),
+        ({"frames": 2.5}, r"frames: value 2\.5:"),
+        ({"frames": True}, "frames: value True:"),
         ({"frames": [0.1, np.nan]}, "frames: value"),
-        ({"names": ["a", "b"]}, "names: value .*: needs 1 names"),
-    ],
-)
-def test_bad_input_is_named_with_a_remedy(tmp_path, change, message):
-    with pytest.raises(st.ViewError, match=message):
-        flight().filmstrip(tmp_path / "film.svg", **change)
+        ({"names": ["a", "b"]}, "names: value .* 1 names"),
+    ):
+        with row(change), pytest.raises(st.ViewError, match=words):
+            flight().filmstrip(tmp_path / "film.svg", **change)
     assert not list(tmp_path.iterdir())
-
-
-def test_a_motion_from_a_file_asks_for_its_model(tmp_path):
-    motion = flight()
-    loaded = st.Trajectory.load(motion.save(tmp_path / "a.npz"))
+    loaded = st.Trajectory.load(flight().save(tmp_path / "a.npz"))
     for draw in (loaded.filmstrip, lambda: loaded.film(tmp_path / "a.gif")):
-        with pytest.raises(st.ViewError, match=r"give model=st.load\(folder\)"):
+        with pytest.raises(st.ViewError, match="model=st"):
             draw()
     assert [path.name for path in tmp_path.iterdir()] == ["a.npz"]

@@ -13,6 +13,7 @@ from serpentail.attitude import rotation_matrix
 from serpentail.pictures.panels import PANELS, attitude
 from serpentail.pictures.style import STYLE
 from tests.support.drawn_flight import flight
+from tests.support.rows import row
 
 
 def labels(axes):
@@ -32,14 +33,6 @@ def test_the_panels_that_are_named_in_their_order():
     assert axes[-1].get_xlabel() == "time [s]"
 
 
-@pytest.mark.parametrize(
-    ("name", "words"), [("hight", "did you mean 'height'"), ("forces", "did you mean 'force'")]
-)
-def test_a_wrong_name_is_refused(name, words):
-    with pytest.raises(st.ViewError, match=rf"panels\[1\]: value '{name}': {words}"):
-        flight().plot("tail", name)
-
-
 def test_axes_that_are_given_are_drawn_on():
     figure = Figure()
     left, right = figure.subplots(1, 2)
@@ -49,15 +42,18 @@ def test_axes_that_are_given_are_drawn_on():
     assert found is figure and both == [left, right] and right.lines
 
 
-@pytest.mark.parametrize("panels", [(), ("tail", "tilt")])
-def test_axes_and_panels_must_be_as_many(panels):
-    with pytest.raises(st.ViewError, match=r"ax: 1 axes for \d+ panels: name one panel for each"):
-        flight().plot(*panels, ax=Figure().subplots())
-
-
-def test_a_path_and_axes_are_refused(tmp_path):
-    with pytest.raises(st.ViewError, match="path: is for a new figure only"):
-        flight().plot("tail", ax=Figure().subplots(), path=tmp_path / "a.png")
+def test_what_cannot_be_plotted_is_refused(tmp_path):
+    ax, path = Figure().subplots(), tmp_path / "a.png"
+    for motion, panels, settings, words in (
+        (flight(), ("tail", "hight"), {}, r"panels\[1\]: value 'hight'.*'height'"),
+        (flight(), ("tail", "forces"), {}, r"panels\[1\]: value 'forces'.*'force'"),
+        (flight(), (), {"ax": ax}, r"ax: 1 axes for \d+ panels"),
+        (flight(), ("tail", "tilt"), {"ax": ax}, "ax: 1 axes for 2 panels"),
+        (flight(), ("tail",), {"ax": ax, "path": path}, "path: "),
+        (flight(samples=1), (), {"path": path}, "two"),
+    ):
+        with row(panels, settings), pytest.raises(st.ViewError, match=words):
+            motion.plot(*panels, **settings)
     assert not list(tmp_path.iterdir())
 
 
@@ -130,11 +126,13 @@ def test_the_tilt_is_the_angle_of_the_back_to_the_vertical():
     np.testing.assert_allclose(curves(axes)["tilt"].get_ydata(), wanted, atol=1e-5)
 
 
-@pytest.mark.parametrize("segments", [0, 1, 3, 8])
-def test_everything_is_labelled_and_legends_cover_nothing(segments):
+def test_everything_is_labelled_and_legends_cover_nothing():
+    every = []
     with matplotlib.rc_context(STYLE):
-        figure, every = flight(segments=segments).plot()
-        figure.draw_without_rendering()
+        for segments in (0, 3, 8):
+            figure, axes = flight(segments=segments).plot()
+            figure.draw_without_rendering()
+            every += list(axes)
     for axes in every:
         assert axes.get_ylabel().endswith("]")
         low, high = axes.get_ylim()
@@ -155,9 +153,3 @@ def test_a_conserved_momentum_is_drawn_flat():
     constant = np.full((59, 3), 1e-3) * (1 + 1e-13 * np.eye(59, 3))
     _, (axes,) = dataclasses.replace(flight(), angular_momentum=constant).plot("angular_momentum")
     assert np.ptp(axes.get_ylim()) >= 0.01
-
-
-def test_one_sample_cannot_be_drawn_over_time(tmp_path):
-    with pytest.raises(st.ViewError, match="give at least two"):
-        flight(samples=1).plot(path=tmp_path / "times.svg")
-    assert not list(tmp_path.iterdir())

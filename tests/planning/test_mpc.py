@@ -3,18 +3,48 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import lsq_linear
 
 import serpentail as st
 from serpentail.attitude import quaternion_rate, tilt_deg
+from serpentail.planning.predictive.kernel import kernel
 from serpentail.planning.result.truth import planned_torques
-from tests.support.models import model_folder
+from tests.support import zoo
 from tests.support.predictive import TORQUE, Reference, correction_of, plan_of
+from tests.support.rows import row
 from tests.support.tumbling import DURATION, rat, start
 
 
 @pytest.fixture(scope="module")
 def plan():
     return plan_of(1)
+
+
+def quadratic(H, g, lower, upper):
+    """The minimum of d H d / 2 + g d within bounds, by the controller's C, and what it returned."""
+    n = len(g)
+    d, chosen, memory = np.zeros(n), np.zeros(n, np.intc), np.zeros(n * (n + 3))
+    arrays = [np.ascontiguousarray(a, float) for a in (H, g, lower, upper)]
+    places = [a.ctypes.data for a in (*arrays, d, chosen, memory)]
+    return d, kernel().mpc_quadratic(n, *places)
+
+
+def test_quadratic_programs_are_solved_as_by_scipy():
+    for n in (1, 2, 12, 36):
+        random, active = np.random.default_rng(n), 0
+        for _ in range(30):
+            A, b = random.normal(size=(n + 3, n)), random.normal(size=n + 3)
+            size = random.uniform(0.01, 1)
+            lower, upper = -size * random.uniform(0, 1, n), size * random.uniform(0, 1, n)
+            lower[0] = 0.0
+            wanted = lsq_linear(A, b, (lower, upper + 1e-12), method="bvls", tol=1e-15).x
+            found, changes = quadratic(A.T @ A, -A.T @ b, lower, upper)
+            assert changes >= 0
+            np.testing.assert_allclose(found, wanted, atol=1e-8)
+            active += int(((found == lower) | (found == upper)).sum())
+        assert active > 10
+    for H in (-np.eye(2), np.full((2, 2), np.nan), np.zeros((2, 2))):  # without a minimum
+        assert quadratic(H, np.ones(2), -np.ones(2), np.ones(2))[1] == -1
 
 
 def disturbed(size: float = 1.0, seed: int = 1):
@@ -36,31 +66,31 @@ GOALS = {
 }
 
 
-@pytest.mark.parametrize(
-    ("goal", "t", "size", "bound", "settings"),
-    [
-        ("upright", 0.003, 1.0, False, {}),
-        ("upright", 0.003, 8.0, True, {}),
-        ("at rest", 0.103, 0.1, False, {"intervals": 2}),
-        ("tail, damped", 0.311, 0.1, True, {"intervals": 4}),
-        ("upright", 0.053, 0.1, True, {"horizon": 0.15}),
-        ("upright", 0.307, 0.1, True, {"horizon": 0.15}),  # of which 0.1 s are left
-    ],
-)
-def test_a_tick_is_the_gauss_newton_step_of_casadi_and_scipy(goal, t, size, bound, settings):
-    plan = plan_of(0, **GOALS[goal])
-    mpc = st.Mpc(rat(), plan, **({"intervals": 3, "step": 0.021} | settings))
-    q, v = disturbed(size, 0)
-    end = min(t + settings.get("horizon", 1.0), DURATION)
-    reference = Reference(mpc, t, q, v, end)
-    wanted = reference.step(np.zeros(reference.N * 2))
-    assert mpc.tick(t, q, v)
-    found = correction_of(mpc)
-    assert bool(mpc.info["set_changes"]) == bound
-    # a step that does not lower the sum of squares is halved, at most four times
-    part = min(2.0 ** -np.arange(5), key=lambda part: np.abs(found - part * wanted).max())
-    assert part == 1 or bound
-    np.testing.assert_allclose(found, part * wanted, atol=1e-8 * TORQUE)
+TICKS = [
+    ("upright", 0.003, 1.0, False, {}),
+    ("upright", 0.003, 8.0, True, {}),
+    ("at rest", 0.103, 0.1, False, {"intervals": 2}),
+    ("tail, damped", 0.311, 0.1, True, {"intervals": 4}),
+    ("upright", 0.053, 0.1, True, {"horizon": 0.15}),
+    ("upright", 0.307, 0.1, True, {"horizon": 0.15}),  # of which 0.1 s are left
+]
+
+
+def test_a_tick_is_the_gauss_newton_step_of_casadi_and_scipy():
+    for goal, t, size, bound, settings in TICKS:
+        mpc = st.Mpc(rat(), plan_of(0, **GOALS[goal]), **{"intervals": 3, "step": 0.021} | settings)
+        q, v = disturbed(size, 0)
+        end = min(t + settings.get("horizon", 1.0), DURATION)
+        reference = Reference(mpc, t, q, v, end)
+        wanted = reference.step(np.zeros(reference.N * 2))
+        with row(goal, t, size):
+            assert mpc.tick(t, q, v)
+            found = correction_of(mpc)
+            assert bool(mpc.info["set_changes"]) == bound
+            # a step that does not lower the sum of squares is halved, at most four times
+            part = min(2.0 ** -np.arange(5), key=lambda part: np.abs(found - part * wanted).max())
+            assert part == 1 or bound
+            np.testing.assert_allclose(found, part * wanted, atol=1e-8 * TORQUE)
 
 
 def test_more_steps_end_where_none_lowers_the_sum_any_more():
@@ -74,9 +104,7 @@ def test_more_steps_end_where_none_lowers_the_sum_any_more():
 
 WRONG = {
     "tail heavier": {"tail_mass": 1.15},
-    "tail lighter": {"tail_mass": 0.85},
     "torso slower": {"torso_inertia": 1.15},
-    "torso faster": {"torso_inertia": 0.85},
 }
 
 
@@ -92,20 +120,17 @@ def tilt(motion) -> float:
     return float(tilt_deg(motion.q[-1, 3:7]))
 
 
-@pytest.mark.parametrize("changes", WRONG.values(), ids=WRONG)
-def test_a_body_unlike_the_planned_one_ends_upright(plan, changes):
-    body, span = other(changes), {"t_span": DURATION}
-    law = st.TorqueCurve(planned_torques(plan.curve))
-    open_loop = st.simulate(body, *start(rat(), 1), controller=law, **span)
-    controlled = st.simulate(body, *start(rat(), 1), controller=st.Mpc(rat(), plan), **span)
-    assert tilt(open_loop) > 1.0 > 20 * tilt(controlled)
-    assert np.abs(controlled.tau).max() <= TORQUE
-    assert controlled.info["mpc"]["ticks"] == 40 and controlled.info["mpc"]["failed"] == 0
-
-
-def test_the_planned_body_flies_as_planned(plan):
-    motion = st.simulate(rat(), *start(rat(), 1), controller=st.Mpc(rat(), plan), t_span=DURATION)
-    np.testing.assert_allclose(motion.q[-1, 3:], plan.trajectory.q[-1, 3:], atol=5e-3)
+def test_bodies_unlike_the_planned_one_end_upright(plan):
+    for name, changes in WRONG.items():
+        body, span = other(changes), {"t_span": DURATION}
+        law = st.TorqueCurve(planned_torques(plan.curve))
+        open_loop = st.simulate(body, *start(rat(), 1), controller=law, **span)
+        controlled = st.simulate(body, *start(rat(), 1), controller=st.Mpc(rat(), plan), **span)
+        with row(name):
+            assert tilt(open_loop) > 1.0 > 20 * tilt(controlled)
+            assert np.abs(controlled.tau).max() <= TORQUE
+            info = controlled.info["mpc"]
+            assert info["ticks"] == 40 and info["failed"] == 0
 
 
 def flown(mpc: st.Mpc, body: st.Model, ticks: int, rate: float):
@@ -125,16 +150,16 @@ def flown(mpc: st.Mpc, body: st.Model, ticks: int, rate: float):
     return np.split(y, sizes)
 
 
-@pytest.mark.parametrize("method", ["tsit5", "dop853", "rk4"])
-def test_ticks_measure_the_state_at_their_times(plan, method):
+def test_ticks_measure_the_state_at_their_times(plan):
     """Whatever a method tries in between: as one tick after another, by hand."""
     body, mpc = other(WRONG["torso slower"]), st.Mpc(rat(), plan, rate=40)
-    q, v = flown(mpc, body, 6, 40)
-    for law in (mpc, st.Phases([(0.0, mpc)])):
-        settings = {"controller": law, "method": method, "t_span": 0.15}
-        motion = st.simulate(body, *start(rat(), 1), **settings)
-        np.testing.assert_allclose(motion.q[-1, 3:], q[3:], atol=2e-6)
-        np.testing.assert_allclose(motion.v[-1, 3:], v[3:], atol=2e-5)
+    q, v = flown(mpc, body, 4, 40)
+    for method in ("tsit5", "dop853", "rk4"):
+        for law in (mpc, st.Phases([(0.0, mpc)])):
+            settings = {"controller": law, "method": method, "t_span": 0.1}
+            motion = st.simulate(body, *start(rat(), 1), **settings)
+            np.testing.assert_allclose(motion.q[-1, 3:], q[3:], atol=2e-6, err_msg=method)
+            np.testing.assert_allclose(motion.v[-1, 3:], v[3:], atol=2e-5, err_msg=method)
 
 
 def test_a_phase_has_a_clock_of_its_own(plan):
@@ -174,20 +199,20 @@ def test_runs_that_share_a_controller_have_memories_of_their_own(plan):
     assert np.abs(runs.tau[0] - runs.tau[1]).max() > 1e-4 and mpc.info["ticks"] == 0
 
 
-@pytest.mark.parametrize("wrong", [np.nan, np.inf, 1e200])
-def test_a_tick_that_fails_is_counted_and_changes_nothing(plan, wrong):
-    mpc = st.Mpc(rat(), plan)
-    q, v = disturbed()
-    assert mpc.tick(0.0, q, v)
-    before = mpc.torque(0.2)
-    assert not mpc.tick(0.01, q, np.where(np.arange(len(v)) == 4, wrong, v))
-    assert not mpc.tick(0.01, np.where(np.arange(len(q)) == 3, wrong, q), v)
-    assert not mpc.tick(0.01, 0 * q, v)
-    np.testing.assert_array_equal(mpc.torque(0.2), before)
-    assert mpc.info["ticks"] == 4 and mpc.info["failed"] == 3
-    mpc.begin()
-    assert mpc.info["ticks"] == mpc.info["failed"] == 0
-    np.testing.assert_allclose(mpc.torque(0.2), plan.torque(0.2)[0], rtol=1e-12)
+def test_a_tick_that_fails_is_counted_and_changes_nothing(plan):
+    for wrong in (np.nan, np.inf, 1e200):
+        mpc = st.Mpc(rat(), plan)
+        q, v = disturbed()
+        assert mpc.tick(0.0, q, v)
+        before = mpc.torque(0.2)
+        assert not mpc.tick(0.01, q, np.where(np.arange(len(v)) == 4, wrong, v))
+        assert not mpc.tick(0.01, np.where(np.arange(len(q)) == 3, wrong, q), v)
+        assert not mpc.tick(0.01, 0 * q, v)
+        np.testing.assert_array_equal(mpc.torque(0.2), before)
+        assert mpc.info["ticks"] == 4 and mpc.info["failed"] == 3
+        mpc.begin()
+        assert mpc.info["ticks"] == mpc.info["failed"] == 0
+        np.testing.assert_allclose(mpc.torque(0.2), plan.torque(0.2)[0], rtol=1e-12)
 
 
 def test_called_by_hand_it_ticks_by_its_clock(plan):
@@ -199,31 +224,31 @@ def test_called_by_hand_it_ticks_by_its_clock(plan):
     np.testing.assert_array_equal(tau, 0 * tau)
 
 
-@pytest.mark.parametrize(
-    ("settings", "words"),
-    [
-        ({"rate": 0}, "rate"),
-        ({"rate": np.nan}, "rate"),
-        ({"rate": 1e9}, "rate: value 1000000000.0: needs at most 2.5e"),
-        ({"horizon": -1}, "horizon"),
-        ({"intervals": 0}, "intervals: value 0: needs a whole number from 1 to 100"),
-        ({"intervals": 2.5}, "intervals"),
-        ({"iterations": True}, "iterations"),
-        ({"delay": 0.02}, "delay: value 0.02: needs at most the time between ticks, 0.01 s"),
-        ({"delay": -1e-3}, "delay"),
-        ({"rest": 0.4}, "rest"),
-        ({"step": 1e-9}, "step"),
-        ({"intervalls": 3}, "did you mean 'intervals'"),
-    ],
-)
-def test_wrong_settings_are_refused(plan, settings, words):
-    with pytest.raises(st.PlanningError, match=words):
-        st.Mpc(rat(), plan, **settings)
+def test_wrong_settings_are_refused(plan):
+    for words, settings in {
+        "rate: value 0": {"rate": 0},
+        "rate: value nan": {"rate": np.nan},
+        "rate: value 1000000000.0: needs at most 2.5e": {"rate": 1e9},
+        "horizon: value -1": {"horizon": -1},
+        "intervals: value 0": {"intervals": 0},
+        "intervals: value 101": {"intervals": 101},
+        "intervals: value 2.5": {"intervals": 2.5},
+        "iterations: value True": {"iterations": True},
+        "delay: value 0.02": {"delay": 0.02},
+        "delay: value -0.001": {"delay": -1e-3},
+        "rest: value 0.4": {"rest": 0.4},
+        "rest: value 0.395": {"rest": 0.395, "delay": 5e-3},
+        "step: value 1e-09": {"step": 1e-9},
+        "'intervalls'.*'intervals'": {"intervalls": 3},
+    }.items():
+        with row(words), pytest.raises(st.PlanningError, match=words):
+            st.Mpc(rat(), plan, **settings)
+    assert st.Mpc(rat(), plan, intervals=100, delay=0.01).settings.intervals == 100
 
 
 def test_the_c_goes_to_a_folder_which_is_made(plan, tmp_path):
     mpc = st.Mpc(rat(), plan)
-    with pytest.raises(st.PlanningError, match=r"write_c: folder: value 3: needs the path of a"):
+    with pytest.raises(st.PlanningError, match=r"write_c: folder: value 3"):
         mpc.write_c(3)
     with pytest.raises(OSError, match="is not a folder"):
         mpc.write_c(mpc.write_c(tmp_path)[0])
@@ -233,43 +258,38 @@ def test_the_c_goes_to_a_folder_which_is_made(plan, tmp_path):
 
 
 def test_models_and_plans_that_do_not_fit_are_refused(plan):
-    with pytest.raises(st.PlanningError, match="lacks airborne_rates, airborne_rates_derivatives"):
-        st.Mpc(rat(exact=False), plan)
-    with pytest.raises(st.PlanningError, match="needs what"):
-        st.Mpc(rat(), plan.trajectory)
-    with pytest.raises(st.PlanningError, match="has 2 tail coordinates, the model 6"):
-        st.Mpc(rat(3, 2), plan)
-    with pytest.raises(st.PlanningError, match="attitude='quaternion'"):
-        st.Mpc(rat(), plan_of(attitude="euler"))
+    longer = zoo.model("m2_n2")
+    for words, model, planned in (
+        ("plan: value", rat(), plan.trajectory),
+        ("2 tail coordinates, the model 4", longer, plan),
+        ("attitude is 'euler'", rat(), plan_of(attitude="euler")),
+        ("float", zoo.model("single"), plan),
+        ("compiled=False", st.load(zoo.folder("m1_n3"), compiled=False), plan),
+    ):
+        with row(words), pytest.raises(st.PlanningError, match=words):
+            st.Mpc(model, planned)
     mpc = st.Mpc(rat(), plan)
     with pytest.raises(st.SimulationError, match="q: value"):
         mpc(0.0, np.zeros(3), np.zeros(8))
-    other = rat(3, 2)
-    with pytest.raises(st.SimulationError, match="tail coordinates"):
-        st.simulate(other, np.r_[np.zeros(3), 1, np.zeros(9)], np.zeros(12), controller=mpc)
-    names = ["rollout", "energy", "momentum"]
-    short = st.load(model_folder(1, 3, functions=names, real="float"))
+    upright, alone = np.r_[np.zeros(3), 1, np.zeros(7)], {"controller": mpc, "t_span": 0.01}
+    with pytest.raises(st.SimulationError, match="tail coordinates: value 4"):
+        st.simulate(longer, upright, np.zeros(10), **alone)
     with pytest.raises(st.SimulationError, match=r"Mpc: .* float: needs double"):
-        st.simulate(short, *start(rat(), 1), controller=mpc, t_span=0.01)
+        legs = st.Legs.fixed(3.6, -0.3)
+        st.simulate(zoo.model("single_ground"), upright[:9], np.zeros(8), legs=legs, **alone)
 
 
 def test_a_phase_of_a_sequence_is_controlled_predictively():
     """From a state that nobody planned for, as by the plan of that state and its controller."""
-    right = {
-        "intervals": 11,
-        "duration": 0.3,
-        "goal": st.Goal(torso_rate=None),
-        "tolerance": None,
-        "track": False,
-    }
+    right = {"intervals": 11, "duration": 0.3, "goal": st.Goal(torso_rate=None)}
+    right |= {"tolerance": None, "track": False}
     tracking = st.Tracking(mpc={"rate": 50, "intervals": 4})
-    fall, planned = st.Phase("fall", 0.05), st.Phase("right", 0.3, plan=right, tracking=tracking)
-    run = st.Sequence(rat(), [fall, planned]).simulate(*start(rat(), 1))
+    phases = [st.Phase("fall", 0.05), st.Phase("right", 0.3, plan=right, tracking=tracking)]
+    run = st.Sequence(rat(), [*phases, st.Phase("after", 0.01)]).simulate(*start(rat(), 1))
     mpc = st.Mpc(rat(), run.phases[1].plan, rate=50, intervals=4)
     alone = st.simulate(rat(), mpc.plan.problem.q0, mpc.plan.problem.v0, controller=mpc, t_span=0.3)
-    np.testing.assert_allclose(run.trajectory.q[-1], alone.q[-1], atol=1e-4)
-    assert run.trajectory.info["mpc"] == alone.info["mpc"]
-    again = st.Sequence(rat(), [fall, planned, st.Phase("after", 0.01)])
-    assert again.simulate(*start(rat(), 1)).trajectory.info["mpc"]["ticks"] == 15
+    end = np.abs(run.trajectory.t - 0.35).argmin()
+    np.testing.assert_allclose(run.trajectory.q[end], alone.q[-1], atol=1e-4)
+    assert run.trajectory.info["mpc"] == alone.info["mpc"] and alone.info["mpc"]["ticks"] == 15
     with pytest.raises(st.SimulationError, match="Tracking: mpc: value 3"):
         st.Tracking(mpc=3)

@@ -15,50 +15,41 @@ import numpy as np
 import pytest
 
 import serpentail as st
+from tests.support import zoo
 from tests.support.tiny_study import titles
 from tests.support.told import besides_progress
-from tests.support.tumbling import rat
 
 PROMPT = 1.0  # s
-TRIES = 3  # of which one must be prompt: other work may hold up a process
+AFTER = (0.3, 1.0, 3.0)  # s of work; one try must be prompt: other work may hold up a process
 PATIENCE = 60.0  # s to begin, and to end at the latest
 HEAR = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-BEGIN = (
-    "import sys, time, numpy as np, serpentail as st\n"
-    "from tests.support.tumbling import start\n"
-    "model = st.load(sys.argv[1], threads=int(sys.argv[2]))\n"
-    "q, v = start(model)\n"
-    "many = np.tile(q, (10**6, 1)), np.tile(v, (10**6, 1))\n"
-    "say = lambda word: print(word, time.monotonic(), flush=True)\n"
-)
-REPORT = (
-    "except KeyboardInterrupt as stop:\n"
-    "    say('ended')\n"
-    "    motion = getattr(stop, 'motion', None)\n"
-    "    print('motion', *([] if motion is None else told(motion)), flush=True)\n"
-)
+# does what each line of stdin tells until Ctrl-C, and tells what is kept
+SERVES = """
+import sys, time, numpy as np, scipy.integrate, serpentail as st
+from tests.processes.jobs import start
+say = lambda *words: print(*words, flush=True)
+model = st.load(sys.argv[1], threads=int(sys.argv[2]))
+q, v = start(model)
+many = np.tile(q, (10**6, 1)), np.tile(v, (10**6, 1))
+for line in sys.stdin:
+    call, told = (eval("lambda: " + part) for part in line.split("|"))
+    say("ready")
+    try:
+        while True:
+            call()
+    except KeyboardInterrupt as stop:
+        ended, motion = time.monotonic(), getattr(stop, "motion", None)
+        say(ended, *([] if motion is None else told()(motion)))
+"""
 # what takes long, and what is told of what is kept
+BEGUN = "lambda m: (float(m.t[-1]) > 0, bool(np.isfinite(m.q).all()))"
+SOME = "lambda m: (any(e is None for e in m.errors), sum(e is not None for e in m.errors) > 1)"
 LONG = {
-    "simulate": (
-        "st.simulate(model, q, v, t_span=1e5, output_step=1.0, method='rk4', step=1e-4)",
-        "lambda m: (float(m.t[-1]) > 0, bool(np.isfinite(m.q).all()))",
-    ),
-    "simulate by a function": (
-        "st.simulate(model, q, v, t_span=1e4, output_step=0.01, controller=lambda t, q, v: [0, 0])",
-        "lambda m: (float(m.t[-1]) > 0, bool(np.isfinite(m.q).all()))",
-    ),
-    "simulate by scipy": (
-        "st.simulate(model, q, v, t_span=1e4, output_step=0.01, method='dop853')",
-        "lambda m: (float(m.t[-1]) > 0, bool(np.isfinite(m.q).all()))",
-    ),
-    "rollouts": (
-        "st.simulate(model, np.tile(q, (10**4, 1)), v, t_span=10, output_step=1.0, rtol=1e-12)",
-        "lambda m: (any(e is None for e in m.errors), sum(e is not None for e in m.errors) > 1)",
-    ),
-    "a batch": (
-        "model.forward_dynamics(*many, [0, 0])",
-        "None",
-    ),
+    "simulate(model, q, v, t_span=1e5, output_step=1.0, method='rk4', step=1e-4)": BEGUN,
+    "simulate(model, q, v, t_span=1e4, output_step=0.01, controller=lambda *_: [0, 0])": BEGUN,
+    "simulate(model, q, v, t_span=1e4, output_step=0.01, method='dop853')": BEGUN,
+    "simulate(model, np.tile(q, (10**4, 1)), v, t_span=1, output_step=0.1, rtol=1e-12)": SOME,
+    "Model.forward_dynamics(model, *many, [0, 0])": None,
 }
 
 
@@ -66,6 +57,7 @@ def child(program, *arguments, **settings) -> subprocess.Popen:
     """Start a program of Python; it hears Ctrl-C, though a shell's background may not."""
     return subprocess.Popen(
         [sys.executable, "-c", HEAR + program, *map(str, arguments)],
+        stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -87,21 +79,26 @@ def ended(process, after: float) -> tuple[str, str, float]:
         process.wait()
 
 
-@pytest.mark.parametrize("threads", [1, 2])
-@pytest.mark.parametrize("what", LONG)
-def test_what_takes_long_ends_and_keeps_what_there_is(what, threads):
-    call, told = LONG[what]
-    program = f"{BEGIN}told = {told}\nsay('ready')\ntry:\n    while True:\n        {call}\n{REPORT}"
-    took = []
-    while not took or (took[-1] > PROMPT and len(took) < TRIES):
-        process = child(program, rat().folder, threads)
-        assert process.stdout.readline().startswith("ready")
-        said, errors, asked = ended(process, after=1.0)
-        words, kept = said.splitlines()
-        assert (process.returncode, errors) == (0, "")
-        assert kept == ("motion" if told == "None" else "motion True True")
-        took.append(float(words.split()[1]) - asked)
-    assert took[-1] <= PROMPT, took
+@pytest.mark.parametrize("threads", [1, pytest.param(2, marks=pytest.mark.slow)])
+def test_what_takes_long_ends_and_keeps_what_there_is(threads):
+    process = child(SERVES, zoo.model("m1_n3").folder, threads)
+    for call, told in LONG.items():
+        expected, found = [] if told is None else ["True", "True"], []
+        for after in AFTER:
+            process.stdin.write(f"st.{call}|{told}\n")
+            process.stdin.flush()
+            assert process.stdout.readline() == "ready\n"
+            time.sleep(after)
+            asked = time.monotonic()
+            process.send_signal(signal.SIGINT)
+            ended, *kept = process.stdout.readline().split()
+            found.append((kept, float(ended) - asked))
+            if kept == expected and found[-1][1] <= PROMPT:
+                break
+        else:
+            raise AssertionError((call, found))
+    said, errors = process.communicate(timeout=PATIENCE)
+    assert (process.returncode, said, errors) == (0, "", "")
 
 
 # The command line.
@@ -110,14 +107,11 @@ COMMAND = (
     "import sys; from serpentail.cli import main; print('ready', file=sys.stderr, flush=True); "
 )
 COMMAND += "sys.exit(main(sys.argv[1:]))"
-LASTING = """
-name = "{name}"
+SCENE = """
+name = "m1_n3"
 kind = "articulated"
 segments = 1
 links = 3
-{tables}
-"""
-FLIGHT = """
 [simulate]
 duration = 500.0
 output_step = 5e-4
@@ -126,8 +120,6 @@ step = 5e-6
 [simulate.start]
 height = 1.0
 rate = [0.1, 0.2, 0.3]
-"""
-PLAN = """
 [plan]
 duration = 0.4
 intervals = 60
@@ -140,26 +132,21 @@ v = [0, -0.3, 2.4, 1, 2, 1, 0, 0]
 """
 
 
-def command(tmp_path, verb, tables, *options, **settings) -> subprocess.Popen:
-    """Start a verb on a scene of the rat."""
-    scene = tmp_path / "scene.toml"
-    scene.write_text(LASTING.format(name=rat().name, tables=tables))
-    words = [verb, scene, "--folder", rat().folder, "--json", "-", *options]
-    process = child(COMMAND, *words, **settings)
-    assert process.stderr.readline() == "ready\n"
-    return process
-
-
-@pytest.mark.parametrize(("verb", "tables"), [("simulate", FLIGHT), ("plan", PLAN)])
-def test_a_command_ends_in_one_line_and_writes_what_there_is(tmp_path, verb, tables):
-    process = command(tmp_path, verb, tables, "--save", tmp_path / "motion.npz")
-    said, errors, _ = ended(process, after=4.0)
+@pytest.mark.parametrize("verb", ["simulate", "plan"])
+def test_a_command_ends_in_one_line_and_writes_what_there_is(tmp_path, verb):
+    scene, saved = tmp_path / "scene.toml", tmp_path / "motion.npz"
+    scene.write_text(SCENE)
+    folder = zoo.model("m1_n3").folder
+    process = child(COMMAND, verb, scene, "--folder", folder, "--json", "-", "--save", saved)
+    while not process.stderr.readline().startswith(verb):  # it tells of itself after a second
+        assert process.poll() is None
+    said, errors, _ = ended(process, after=0.5)
     assert process.returncode == 130
     assert besides_progress(errors) == "serpentail: interrupted; this is the result until then\n"
     assert json.loads(said)["stopped"] == "interrupt"
-    motion = st.Trajectory.load(tmp_path / "motion.npz")
+    motion = st.Trajectory.load(saved)
     assert len(motion.t) > 1 and np.isfinite(motion.q).all()
-    assert {path.name for path in tmp_path.iterdir()} == {"scene.toml", "motion.npz"}
+    assert set(tmp_path.iterdir()) == {scene, saved}
 
 
 SLOW_CC = """#!/bin/sh
@@ -171,11 +158,12 @@ exec cc "$@"
 
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, -15)])
 def test_a_compile_leaves_no_compiler_and_no_half_file(tmp_path, number, status):
+    folder = zoo.folder("bare")
     compiler, pids, cache = tmp_path / "cc", tmp_path / "pids", tmp_path / "cache"
     compiler.write_text(SLOW_CC.format(pids=pids))
     compiler.chmod(0o755)
     environment = os.environ | {"CC": str(compiler), "SERPENTAIL_CACHE": str(cache)}
-    process = child(COMMAND, "info", rat().folder, env=environment)
+    process = child(COMMAND, "info", folder, env=environment)
     assert process.stderr.readline() == "ready\n"
     until(lambda: pids.exists() and len(pids.read_text().split()) >= 2)
     time.sleep(1.0)  # all sources are being compiled
@@ -193,7 +181,7 @@ def test_a_compile_leaves_no_compiler_and_no_half_file(tmp_path, number, status)
             os.kill(pid, signal.SIGKILL)
     # what comes next finds nothing broken
     environment |= {"CC": os.environ.get("CC", "cc")}
-    again = child(COMMAND, "info", rat().folder, env=environment)
+    again = child(COMMAND, "info", folder, env=environment)
     said = again.communicate(timeout=PATIENCE)[1]
     assert besides_progress(said) == "ready\n" and again.returncode == 0
 
@@ -229,11 +217,11 @@ run(main, Path(sys.argv[1]), after=GOES_ON)
 """
 
 
+@pytest.mark.slow
 def test_a_study_keeps_its_parts_and_no_plan_that_was_stopped(tmp_path):
-    rat()
     process = child(STUDY, tmp_path, env=os.environ | {"SERPENTAIL_THREADS": "1"})
     until((tmp_path / "ready").exists)
-    _, errors, _ = ended(process, after=3.0)
+    _, errors, _ = ended(process, after=1.0)
     assert process.returncode == 130
     assert errors.splitlines()[-1] == "interrupted: the same command goes on from here"
     assert "Traceback" not in errors

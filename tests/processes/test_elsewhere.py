@@ -9,18 +9,23 @@ from contextlib import suppress
 
 import pytest
 
-from tests.support.tumbling import rat
+from tests.support import zoo
 
 from .forks import MOMENTS
 from .jobs import JOBS
 from .ways import WAYS
 
-LIMIT = 120.0  # s, then all processes of a test are killed
+LIMIT = 500.0  # s, then all processes of a test are killed
+QUICK = ("fork", "threads", "at rest", "beside rollouts", "beside the compiler")
+BESIDE = [name for name in MOMENTS if name.startswith("beside")]  # where chance decides
 
 
-def told(*words: str) -> list[dict]:
-    """Return the JSON lines that a module of this room prints."""
-    command = [sys.executable, "-m", *words]
+@pytest.mark.parametrize(
+    "ways", [QUICK, pytest.param([*WAYS, *10 * BESIDE], marks=pytest.mark.slow)]
+)
+def test_every_job_is_the_same_elsewhere(ways):
+    zoo.model("m1_n3")  # compiled
+    command = [sys.executable, "-m", "tests.processes.ways", zoo.folder("m1_n3"), *ways]
     environment = os.environ | {"SERPENTAIL_THREADS": "2"}  # in workers of pools, too
     running = subprocess.Popen(
         command, env=environment, stdout=subprocess.PIPE, text=True, start_new_session=True
@@ -32,23 +37,8 @@ def told(*words: str) -> list[dict]:
             os.killpg(running.pid, signal.SIGKILL)
         running.wait()
     assert running.returncode == 0, said
-    return [json.loads(line) for line in said.splitlines()]
-
-
-@pytest.mark.parametrize("way", WAYS)
-def test_every_job_is_the_same_elsewhere(way):
-    found = told("tests.processes.ways", way, str(rat().folder))
-    assert found == [{name: ["same", "same"]} for name in JOBS]
-
-
-@pytest.mark.parametrize("moment", MOMENTS)
-def test_a_forked_child_does_every_job(moment):
-    found = told("tests.processes.forks", moment, str(rat().folder))
-    assert found == [dict.fromkeys(JOBS, "same")]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("moment", MOMENTS)
-def test_many_forked_children_do_every_job(moment):
-    found = told("tests.processes.forks", moment, str(rat().folder), "20")
-    assert found == [dict.fromkeys(JOBS, "same")] * 20
+    found = [json.loads(line) for line in said.splitlines()]
+    expected = {
+        way: dict.fromkeys(JOBS, ["same"] if way in MOMENTS else ["same", "same"]) for way in ways
+    }
+    assert found == [{way: expected[way]} for way in ways]

@@ -1,18 +1,17 @@
-"""A simple scene, to which tests add and of which they replace text."""
+"""A simple scene of the model "feet_tail", to which tests add and of which they replace text."""
 
 import re
 from pathlib import Path
 
 import pytest
 
+import serpentail as st
+from tests.support import zoo
+
 SIMPLE = """kind = "articulated"
 segments = 1
-links = 2
+links = 3
 contacts = ["feet", "tail"]
-functions = [
-  "energy", "momentum", "rollout", "implicit", "pfl", "tail_points",
-  "contact_points", "leg_points", "contact_dynamics",
-]
 [simulate]
 duration = 0.02
 [simulate.start]
@@ -27,14 +26,23 @@ delta = -0.26
 def scene(tmp_path, monkeypatch):
     """Return a function that writes the simple scene, with text added or replaced, and its path."""
     monkeypatch.chdir(tmp_path)
-    text = SIMPLE.replace('kind = "art', 'name = "simple"\nkind = "art')
-    Path("simple.toml").write_text(text)
+    text = 'name = "simple"\n' + SIMPLE
 
     def write(added="", **replaced):
         own = text
         for old, new in replaced.items():
-            own = re.sub(rf"^{old} = .*$", new, own, flags=re.MULTILINE)
+            own = re.sub(rf"^{old} = .*$", lambda _, new=new: new, own, flags=re.MULTILINE)
         Path("simple.toml").write_text(own + added)
         return "simple.toml"
 
     return write
+
+
+@pytest.fixture
+def scenario(scene):
+    """Return a function that reads the simple scene, with text added or replaced, and changes."""
+
+    def read(added="", changes=None, **replaced):
+        return st.scenario(scene(added, **replaced), zoo.folder("feet_tail"), changes)
+
+    return read

@@ -2,8 +2,6 @@
 
 import copy
 import datetime
-import tomllib
-from functools import cache
 from pathlib import Path
 
 import pytest
@@ -12,12 +10,12 @@ from hypothesis import strategies as some
 
 import serpentail as st
 from serpentail.planning.nlp.rules import collocation_rule
-from serpentail.scenes import plan, plan_keys, simulate, simulate_keys
+from serpentail.scenes import plan, plan_keys, simulate_keys
+from serpentail.scenes.simulate import scenario_of
 from serpentail_codegen.scene.parse import parse_scene
 from serpentail_codegen.scene.problems import SceneError
 from serpentail_codegen.scene.scene import KEYS, NAMES
-from tests.scenes.conftest import SIMPLE
-from tests.support.models import folder_of
+from tests.support import zoo
 from tests.support.posed import posed
 
 Q = [0, 0, 0.3, 1, 0, 0, 0, 0.1, 0.1]
@@ -71,65 +69,50 @@ def places(table, keys):
 
 
 def changed(table, path, value):
-    """A copy of a table with a value at a path."""
+    """A copy of a table with a value at a path; missing tables are made."""
     part = table = copy.deepcopy(table)
     for key in path[:-1]:
-        part = part[key]
+        part = part.setdefault(key, {}) if isinstance(part, dict) else part[key]
     part[path[-1]] = value
     return table
 
 
 def anything(table, keys):
-    """Tables with any value at one or two places."""
-    places_of = some.sampled_from(places(table, keys))
-    return some.builds(changed, some.just(table), places_of, VALUES)
-
-
-def one_line(error):
-    """Refuse an error that says nothing, or too much."""
-    lines = str(error).splitlines()
-    assert lines and all(lines) and max(map(len, lines)) < 900
-
-
-@cache
-def simple():
-    """The model of the simple scene."""
-    return st.load(folder_of(parse_scene(tomllib.loads(SIMPLE), "simple")))
+    """A table with any value at one place."""
+    return some.builds(changed, some.just(table), some.sampled_from(places(table, keys)), VALUES)
 
 
 many = settings(
-    max_examples=300, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck)
+    max_examples=150, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck)
+)
+unusual = pytest.mark.filterwarnings(
+    "ignore::RuntimeWarning", "ignore::serpentail.errors.UnusualSize"
 )
 
 
+@unusual
 @many
-@given(anything(GENERATE, (*KEYS, *NAMES)))
-def test_the_generator_takes_or_refuses_any_table(table):
-    try:
-        parse_scene(table, "x")
-    except SceneError as error:
-        one_line(error)
+@given(
+    anything(GENERATE, (*KEYS, *NAMES)),
+    anything(SIMULATE, simulate_keys.SIMULATE.keys),
+    anything(PLAN, plan_keys.PLAN.keys),
+)
+def test_any_table_is_taken_or_refused(scene, motion, task):
+    if isinstance(motion.get("start"), dict):
+        motion["start"].pop("settle", None)  # which takes as long as it takes
 
-
-@many
-@given(anything(SIMULATE, simulate_keys.SIMULATE.keys))
-@pytest.mark.filterwarnings("ignore::RuntimeWarning", "ignore::serpentail.errors.UnusualSize")
-def test_the_runtime_takes_or_refuses_any_motion(table):
-    if isinstance(table.get("start"), dict):
-        table["start"].pop("settle", None)  # which takes as long as it takes
-    try:
-        simulate.scenario_of(simple(), table, Path())
-    except st.SerpentailError as error:
-        one_line(error)
-
-
-@many
-@pytest.mark.filterwarnings("ignore::serpentail.errors.UnusualSize")
-@given(anything(PLAN, plan_keys.PLAN.keys))
-def test_the_runtime_takes_or_refuses_any_plan(table):
-    try:
-        arguments = plan.plan_arguments(table)
-        settings = posed(simple(), **arguments)[1]
+    def planned():
+        settings = posed(zoo.model("feet_tail"), **plan.plan_arguments(task))[1]
         collocation_rule(settings.rule, settings.degree)
-    except st.PlanningError as error:
-        one_line(error)
+
+    works = [
+        (SceneError, lambda: parse_scene(scene, "x")),
+        (st.SerpentailError, lambda: scenario_of(zoo.model("feet_tail"), motion, Path())),
+        (st.PlanningError, planned),
+    ]
+    for refusal, work in works:
+        try:
+            work()
+        except refusal as error:
+            lines = str(error).splitlines()
+            assert lines and all(lines) and max(map(len, lines)) < 900

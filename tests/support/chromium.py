@@ -1,9 +1,8 @@
 """A real Chromium that opens pages, and records the requested addresses."""
 
 import json
-import os
 import shutil
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 from selenium import webdriver
@@ -73,19 +72,3 @@ def requests(driver) -> list[str]:
     entries = [json.loads(entry["message"])["message"] for entry in driver.get_log("performance")]
     sent = [e["params"] for e in entries if e["method"] == "Network.requestWillBeSent"]
     return [each["request"]["url"] for each in sent]
-
-
-def processor_seconds(driver) -> float:
-    """Processor time that the browser and all its processes have taken, s."""
-    parents, times = {}, {}
-    for stat in Path("/proc").glob("[0-9]*/stat"):
-        with suppress(OSError):  # it has ended
-            fields = stat.read_text().rpartition(")")[2].split()
-            process = int(stat.parent.name)
-            parents[process] = int(fields[1])
-            times[process] = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-    own, found = set(), {driver.service.process.pid}
-    while found:
-        own |= found
-        found = {process for process, parent in parents.items() if parent in own} - own
-    return sum(times.get(process, 0.0) for process in own)

@@ -8,7 +8,7 @@ from math import pi
 import numpy as np
 
 import serpentail as st
-from serpentail_codegen.functions.catalogue import CATALOGUE
+from serpentail_codegen.functions.catalogue import function_of
 from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.ir.dataflow import inlined
 from serpentail_codegen.ir.interpret import Numbers, Run
@@ -85,30 +85,41 @@ def derivative_model(segments, links, emission, **options):
 
 
 def states(model, kind, count=2):
-    """States of a kind: tuples of q, v, v_dot, tau, multiplier."""
+    """States of a kind: q, v, v_dot, tau, multiplier by name; folded arcs are bent by pi."""
     m, tails = model.segments, kind if kind in ("random", "straight", "folded") else "random"
     q, v, v_dot, tau = random_states(m, 23, count, tails)
-    if model.kind == "continuum" and kind == "folded":  # q_t of every segment: a bend of pi
+    if kind == "folded":
         bends = q[:, 7:].reshape(count, m, 2)
-        q[:, 7:] = (pi * bends / np.linalg.norm(bends, axis=2, keepdims=True)).reshape(count, 2 * m)
+        arcs = np.array(model.kinds) == "continuum"
+        bends[:, arcs] *= pi / np.linalg.norm(bends[:, arcs], axis=2, keepdims=True)
     q[:, 3:7] *= 3.7 if kind == "scaled" else 1
     v *= 0 if kind == "still" else 1
     multiplier = random_states(m, 29, count, "random")[1] / np.repeat([2, 20, 10], [3, 3, 2 * m])
+    own = slice(0 if model.nv > 2 * m else 6, None)  # without a torso, the tail's numbers alone
+    found = (q[:, own.start and 7 :], *(x[:, own] for x in (v, v_dot)), tau, multiplier[:, own])
     return [
         dict(zip(("q", "v", "v_dot", "tau", "multiplier"), x, strict=True))
-        for x in zip(q, v, v_dot, tau, multiplier, strict=True)
+        for x in zip(*found, strict=True)
     ]
 
 
-def tangent_of_q(q):
-    """Rates of q (nq, nv) when it moves with the unit velocities: of the quaternion, q * (0, omega)
-    / 2.
+def of_every_kind(model):
+    """All states of all kinds, each with its name."""
+    return [(f"{kind} {k}", x) for kind in KINDS for k, x in enumerate(states(model, kind))]
+
+
+def tangent_of_q(q, nv):
+    """Rates of q (..., nq, nv) when it moves with the unit velocities: of the quaternion, q * (0,
+    omega) / 2.
     """
-    w, x, y, z = q[3:7] / 2
-    T = np.zeros((len(q), len(q) - 1))
-    T[:3, :3] = np.eye(3)
-    T[3:7, 3:6] = [[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]]
-    T[7:, 6:] = np.eye(len(q) - 7)
+    T = np.zeros((*q.shape, nv))
+    if nv == q.shape[-1]:
+        return T + np.eye(nv)
+    w, x, y, z = np.moveaxis(q[..., 3:7], -1, 0) / 2
+    T[..., :3, :3], T[..., 7:, 6:] = np.eye(3), np.eye(nv - 6)
+    for row, entries in enumerate([(-x, -y, -z), (w, -z, y), (z, w, -x), (-y, x, w)]):
+        for column, entry in enumerate(entries):
+            T[..., 3 + row, 3 + column] = entry
     return T
 
 
@@ -116,7 +127,8 @@ def tangent_of_q(q):
 def nest_of(model, function):
     """Return the loop nest of a model's function, with called programs inlined."""
     scene = parse_scene(model.manifest["scene"], model.name)
-    return inlined(assemble(CATALOGUE[function], tail_of(scene)))
+    tail = tail_of(scene)
+    return inlined(assemble(function_of(function, tail), tail))
 
 
 def parameters_of(model):
@@ -128,8 +140,8 @@ def parameters_of(model):
 
 
 def complex_step(model, function, state, argument):
-    """Derivatives of the outputs of a function with respect to one argument: name -> (length,
-    directions).
+    """Derivatives of the outputs of a function with respect to one argument: name -> (states,
+    length, directions); the arguments in ``state`` are stacks of states.
     """
     nest, parameters = nest_of(model, function), parameters_of(model)
     vectors = parameters | {a.name: state[a.name] for a in nest.of_role("input")}
@@ -138,15 +150,17 @@ def complex_step(model, function, state, argument):
         directions = {name: np.array([next(unit) for _ in x]) for name, x in parameters.items()}
     else:
         x = state[argument]
-        directions = {argument: tangent_of_q(x) if argument == "q" else np.eye(len(x))}
-    count = next(iter(directions.values())).shape[1]
-    steps = {name: directions.get(name, np.zeros((len(x), count))) for name, x in vectors.items()}
-    scalars = {
-        name: list(np.asarray(x)[:, None] + 1j * STEP * steps[name]) for name, x in vectors.items()
-    }
+        tangents = tangent_of_q(x, model.nv) if argument == "q" else np.eye(x.shape[-1])
+        directions = {argument: tangents}
+    shape = (len(state["q"]), next(iter(directions.values())).shape[-1])
+    scalars = {}
+    for name, x in vectors.items():
+        steps = directions.get(name, np.zeros((x.shape[-1], shape[1])))
+        scalars[name] = [x[..., k, None] + 1j * STEP * steps[..., k, :] for k in range(x.shape[-1])]
     run = Run(nest, COMPLEX, scalars)
     return {
-        a.name: np.array([np.broadcast_to(x, count).imag for x in run.values[a.name]]) / STEP
+        a.name: np.stack([np.broadcast_to(x, shape).imag for x in run.values[a.name]], axis=1)
+        / STEP
         for a in nest.of_role("output")
     }
 

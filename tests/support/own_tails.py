@@ -2,37 +2,23 @@
 
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 
 from serpentail_codegen.scene.parse import parse_scene
-from tests.references.body_set import Animal, Arc, Link
+from tests.references.body_set import Animal, Arc, Link, exact
+from tests.support import zoo
 from tests.support.models import folder_of
 
-TILT = (0.3, -0.6, 0.9)
-TORSO = {"torso_mass": 0.11, "torso_inertia": [7e-5, 4e-5, 7.5e-5], "tail_mount": [0.002, -0.04, 0]}
-VALUES = {
-    "torso_mass": 0.11,
-    "torso_inertia": (7e-5, 4e-5, 7.5e-5),
-    "tail_mount": (0.002, -0.04, 0),
-}
+TILT = tuple(zoo.MOUNTED["mount_angles"])
+TORSO = zoo.TORSO | {"tail_mount": zoo.MOUNTED["tail_mount"]}
+VALUES = {name: tuple(x) if isinstance(x, list) else x for name, x in TORSO.items()}
 FUNCTIONS = [
     *("mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics"),
     *("energy", "momentum", "tail_points", "inverse_dynamics_derivatives"),
     *("inverse_dynamics_parameter_derivatives", "forward_dynamics_parameter_derivatives"),
 ]
-LINKS = [
-    {"links": 3, "length": 0.06, "mass": 1.5e-3, "link_inertia": [4e-8, 2e-9, 3e-8]},
-    {
-        "links": 2,
-        "link_lengths": "30, 25 mm",
-        "link_masses": [5e-4, 4e-4],
-        "link_centers": "14, 12 mm",
-        "link_inertias": [[3e-8, 2e-9, 4e-8], [2e-8, 1e-9, 1e-8]],
-    },
-    {"links": 2, "length": 0.02, "mass": "0.2 g", "link_inertia": "2, 1, 2 g mm^2"},
-]
-ARCS = [{"length": "60 mm", "mass": "1.5 g"}, {"length": 0.09, "mass": 0.0011}]
 LINK_BODIES = (
     [Link(5e-4, 0.02, 0.01, (4e-8, 2e-9, 3e-8))] * 3,
     [
@@ -42,25 +28,27 @@ LINK_BODIES = (
     [Link(1e-4, 0.01, 0.005, (2e-9, 1e-9, 2e-9))] * 2,
 )
 ARC_BODIES = (Arc(1.5e-3, 0.06, 3), Arc(1.1e-3, 0.09, 3))
-# links and arcs alternate, so that the numbers of each kind differ from those of segments
-BOTH = [
-    {"kind": "continuum", **ARCS[0]},
-    {"kind": "articulated", **LINKS[1]},
-    {"kind": "continuum", **ARCS[1]},
-    {"kind": "articulated", **LINKS[0]},
-]
 BOTH_BODIES = (ARC_BODIES[0], LINK_BODIES[1], ARC_BODIES[1], LINK_BODIES[0])
 TAILS: dict[str, tuple[dict[str, Any], tuple]] = {
-    "links": ({"kind": "articulated", "segments": LINKS}, LINK_BODIES),
-    "arcs": ({"kind": "continuum", "segments": ARCS, "samples": 3}, ARC_BODIES),
-    "both": ({"kind": "mixed", "segments": BOTH, "samples": 3}, BOTH_BODIES),
+    "links": ({"kind": "articulated", "segments": zoo.OWN_LINKS}, LINK_BODIES),
+    "arcs": ({"kind": "continuum", "segments": zoo.OWN_ARCS, "samples": 3}, ARC_BODIES),
+    "both": ({"kind": "mixed", "segments": zoo.MIXED, "samples": 3}, BOTH_BODIES),
 }
+IN_ZOO = {"own_links": "links", "own_arcs": "arcs", "mixed": "both"}
 
 
 def animal(tail: str, tilted: bool = False) -> Animal:
     """Return one of the tails as a set of bodies."""
     angles = TILT if tilted else (0.0, 0.0, 0.0)
     return Animal(segments=TAILS[tail][1], mount_angles=angles, **VALUES)
+
+
+def dynamics(bodies: Animal, q, v, v_dot) -> tuple[np.ndarray, ...]:
+    """Return H, H v_dot + C and C of a set of bodies, whose Jacobians are found once."""
+    jacobians = bodies._jacobians(exact(q))
+    with patch.object(Animal, "_jacobians", lambda *_: jacobians):
+        H, force = bodies.inertia(exact(q)), bodies.inverse_dynamics(q, v, v_dot)
+    return tuple(x.astype(float) for x in (H, force, force - H.dot(exact(v_dot))))
 
 
 def folder(tail: str, tilted: bool = False, **keys: Any) -> Path:

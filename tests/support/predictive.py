@@ -3,6 +3,8 @@
 It shares with the controller only the model's functions of CasADi.
 """
 
+from functools import cache
+
 import casadi as ca
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -22,6 +24,7 @@ def plan_of(seed: int = 0, **settings) -> st.Plan:
     return st.plan(model, start=start(model, seed), **(common | settings))
 
 
+@cache
 def airborne(model: st.Model):
     """Return the function (x, tau, h) -> (x_dot, omega); omega carries the part of h that the tail
     does not.
@@ -54,7 +57,7 @@ class Reference:
         self.begin, self.width = t, (end - t) / self.N
         horizon = min(settings.horizon, plan.duration)
         self.steps = int(np.ceil(horizon / self.N / settings.step - 1e-9))
-        d = ca.SX.sym("d", self.N * self.nt)
+        d = ca.MX.sym("d", self.N * self.nt)
         r = self._residuals(np.concatenate([q[3:7], q[7:], v[6:]]), d, end)
         self.of = ca.Function("residuals", [d], [r, ca.jacobian(r, d)])
 

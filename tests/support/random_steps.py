@@ -73,13 +73,12 @@ def random_step(seed, **options):
     return step, [e for _, e in chosen]
 
 
-def point(seed, exact=False):
+def point(seed):
     """Return a value for every symbol, and a weight or direction for everything that needs one."""
     rng = random.Random(1000 + seed)
 
     def number():
-        value = Fraction(rng.randint(-90, 90), rng.randint(7, 30))
-        return value if exact else mpmath.mpf(value.numerator) / value.denominator
+        return mpmath.mpf(rng.randint(-90, 90)) / rng.randint(7, 30)
 
     vectors = {name: [number() for _ in range(size)] for name, size in INPUTS}
     vectors |= {f"d_{name}": [number() for _ in range(size)] for name, size in INPUTS}

@@ -7,6 +7,7 @@ from scipy.integrate import solve_ivp
 
 import serpentail as st
 from serpentail_codegen.scene.signatures.table import EXACT_DERIVATIVES
+from tests.support import zoo
 from tests.support.models import model_folder
 
 EXACT = sorted(
@@ -24,14 +25,12 @@ AGAIN = {
 
 
 @cache
-def rat(segments: int = 1, links: int | None = 3, exact: bool = True) -> st.Model:
-    """Return a model; without its exact second derivatives, plans use its SX functions."""
-    functions = (
-        [*NODE, *FUNCTIONS]
-        if exact
-        else ["mass_matrix", "forward_dynamics", "inverse_dynamics", *FUNCTIONS[-4:]]
-    )
-    return st.load(model_folder(segments, links, functions=list(dict.fromkeys(functions))))
+def rat(segments: int = 1, links: int = 3) -> st.Model:
+    """Return a model of the zoo, or one of its own if the zoo has none of that size."""
+    name = f"m{segments}_n{links}"
+    if name in zoo.ZOO:
+        return zoo.model(name)
+    return st.load(model_folder(segments, links, functions=[*dict.fromkeys([*NODE, *FUNCTIONS])]))
 
 
 def start(model: st.Model, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:

@@ -21,6 +21,15 @@ from serpentail_codegen.scene.signatures.table import VALUES
 from tests.support import models
 
 GROUND = {"contacts": ["feet", "tail", "torso"]}
+FEW = [
+    "mass_matrix",
+    "forward_dynamics",
+    "energy",
+    "contact_dynamics",
+    "pfl",
+    "rollout",
+    "implicit",
+]
 # what differs from coordinate to coordinate shows an exchange of two of them
 ELASTIC = {
     "tail_stiffness": [0.004, 0.006, 0.005, 0.003],
@@ -114,6 +123,10 @@ ZOO: dict[str, dict[str, Any]] = {
     "single": _links(2, 2, real="float"),
     "single_ground": _links(1, 3, real="float", **GROUND),
     "baked": _links(1, 3, baked=True),
+    # the same bits everywhere; the second is small, for many compilers, emulators and watchers
+    "reproducible": _links(1, 3, profile="reproducible", **GROUND),
+    "small": _links(1, 1, real="float", profile="reproducible", emission="loops", functions=FEW)
+    | GROUND,
     # it lacks all that a test wants to miss
     "bare": _links(1, 1, functions=["forward_dynamics"]),
 }

@@ -1,11 +1,12 @@
-"""The model that sweeps run."""
+"""A worker that sweeps share: its process, which takes long to begin, goes on to the next one."""
+
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-import serpentail as st
-
 
 @pytest.fixture(scope="session")
-def model():
-    """A tail that rolls out, with exact derivatives for plans."""
-    return st.build(tail="articulated", segments=1, links=2)
+def worker():
+    """An executor with one process."""
+    with ThreadPoolExecutor(1) as executor:
+        yield executor

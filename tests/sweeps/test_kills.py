@@ -58,11 +58,14 @@ def wait_for(count, folder, process):
     assert process.poll() is None, process.communicate()
 
 
+def number_of(point):
+    """The number in the text of a point."""
+    return int(point.split(":")[1][:-1])
+
+
 def check_whole(folder):
     """Every point has one row; the outcomes are those of a closed form."""
-    found = {
-        int(point.split(":")[1][:-1]): (outcome, error) for point, outcome, error in rows(folder)
-    }
+    found = {number_of(point): (outcome, error) for point, outcome, error in rows(folder)}
     assert sorted(found) == list(range(swept.POINTS)) and len(rows(folder)) == swept.POINTS
     for number, (outcome, error) in found.items():
         assert (error is not None) == (number in FAILED), (number, error)
@@ -86,26 +89,6 @@ def finish(folder, executor):
     return Counter(map(int, log.split()))
 
 
-def test_a_driver_that_is_killed_goes_on(tmp_path):
-    kept = set()
-    for count in (8, 25):
-        process = driver(tmp_path, "processes:2")
-        wait_for(count, tmp_path, process)
-        process.kill()
-        process.communicate(timeout=PATIENCE)  # ends when its processes have, which hold its pipes
-        assert len(rows(tmp_path)) >= count
-        logged = Counter(map(int, (tmp_path / "log").read_text().split()))
-        kept |= {
-            (int(p.split(":")[1][:-1]), logged[int(p.split(":")[1][:-1])])
-            for p, *_ in rows(tmp_path)
-        }
-    counts = finish(tmp_path, "processes:2")
-    firsts = {}
-    for number, count in sorted(kept):
-        firsts.setdefault(number, count)
-    assert all(counts[number] == count for number, count in firsts.items())  # none is made again
-
-
 def full():
     """Let no file of this process grow beyond a few rows, as a full disk would."""
     resource.setrlimit(resource.RLIMIT_FSIZE, (36_000, 36_000))
@@ -120,18 +103,22 @@ def check_full(folder, executor):
     assert 0 < len(rows(folder)) < swept.POINTS
 
 
-def test_a_full_disk_ends_a_sweep_in_one_line_and_it_goes_on(tmp_path):
+@pytest.mark.slow
+def test_a_full_disk_kills_and_ctrl_c_keep_the_rows(tmp_path):
+    """On the same rows, one after the other: none is lost, and none that is there made again."""
     check_full(tmp_path, "processes:2")
-    finish(tmp_path, "processes:2")
-
-
-def test_ctrl_c_keeps_the_rows(tmp_path):
-    process = driver(tmp_path, "processes:2")
-    wait_for(5, tmp_path, process)
-    process.send_signal(signal.SIGINT)
-    process.communicate(timeout=PATIENCE)
-    assert process.returncode and 5 <= len(rows(tmp_path)) < swept.POINTS
-    finish(tmp_path, "processes:2")
+    kept = {}
+    for ending in (signal.SIGKILL, signal.SIGKILL, signal.SIGINT):
+        count = len(rows(tmp_path)) + 5
+        process = driver(tmp_path, "processes:2")
+        wait_for(count, tmp_path, process)
+        process.send_signal(ending)
+        process.communicate(timeout=PATIENCE)  # ends when its processes have, which hold its pipes
+        assert process.returncode and count <= len(rows(tmp_path)) < swept.POINTS
+        logged = Counter(map(int, (tmp_path / "log").read_text().split()))
+        kept = {number_of(p): logged[number_of(p)] for p, *_ in rows(tmp_path)} | kept
+    counts = finish(tmp_path, "processes:2")
+    assert all(counts[number] == count for number, count in kept.items())
 
 
 class Cluster:

@@ -13,12 +13,14 @@ from jsonschema import Draft7Validator
 
 import serpentail as st
 from serpentail import cli
+from tests.support.rows import row as named
 from tests.support.told import besides_progress
 
 SCENE = """
 kind = "articulated"
 segments = 1
-links = 2
+links = 1
+functions = ["forward_dynamics", "rollout", "energy", "momentum", "tail_points"]
 
 [simulate]
 duration = 0.1
@@ -89,7 +91,7 @@ def test_rows_are_saved_for_other_tools(study):
 
 
 def test_shapes_and_parameters_of_links_make_models_of_their_own(study):
-    axes = {("segments", "links"): st.grid([(1, 2), (2, 1)]), "start.height": st.grid([0.1, 0.2])}
+    axes = {("segments", "links"): st.grid([(1, 1), (2, 1)]), "start.height": st.grid([0.1, 0.2])}
     found = st.sweep(study, axes, outputs=["q_end"])
     assert [len(row["q_end"]) for row in found.rows()] == [9, 9, 11, 11]
     first = found[0]["q_end"][2]
@@ -100,51 +102,42 @@ def test_shapes_and_parameters_of_links_make_models_of_their_own(study):
     assert rows[0]["q_end"] != rows[1]["q_end"]
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ("points = 4", "", "points: no value"),
-        ("points = 4", "points = 0", "points: value 0"),
-        ("points = 4", "pionts = 4", "did you mean 'points'"),
-        ("seed = 2", 'run = "fly"', "sweep.run: value 'fly'"),
-        ("latin = [", "latin = [1, ", "needs two bounds"),
-        ("latin", "normal", "needs one of grid, random"),
-        ('"start.pitch"', '"start.pich"', "did you mean 'pitch'"),
-        ("tail_mass", "tail_mas", "did you mean 'tail_mass'"),
-        ('"3 g", 0.005', '"3 s", 0.005', "over: tail_mass: value '3 s': a time where a mass"),
-        ('"-30 deg", "30 deg"', '"-3 g", "3 g"', "over: start.pitch: value '-3 g': a mass where"),
-        ('outputs = ["tilt_end_deg", "q_end"]', 'run = "identify"', "no table .identify."),
-        ('{ grid = ["3 g", 0.005] }', "3", "needs a list of values"),
-        ('outputs = ["tilt_end_deg", "q_end"]', 'outputs = ["tilt"]', "outputs: value 'tilt'"),
-    ],
-)
-def test_slips_in_a_scene_are_told(study, capsys, old, new, words):
-    assert old in SCENE
-    study.write_text(SCENE.replace(old, new))
-    status, out, err = told(capsys, study)
-    assert status == 2 and out is None
-    assert re.search(words, err), err
+def test_slips_in_a_scene_are_told(study, capsys):
+    outputs = 'outputs = ["tilt_end_deg", "q_end"]'
+    for words, old, new in (
+        ("points: no value", "points = 4", ""),
+        ("points: value 0", "points = 4", "points = 0"),
+        ("'points'", "points = 4", "pionts = 4"),
+        ("sweep.run: value 'fly'", "seed = 2", 'run = "fly"'),
+        ("needs two bounds", "latin = [", "latin = [1, "),
+        ("needs one of grid, random", "latin", "normal"),
+        ("'pitch'", '"start.pitch"', '"start.pich"'),
+        ("'tail_mass'", "tail_mass", "tail_mas"),
+        ("over: tail_mass: value '3 s'", '"3 g", 0.005', '"3 s", 0.005'),
+        ("over: start.pitch: value '-3 g'", '"-30 deg", "30 deg"', '"-3 g", "3 g"'),
+        (r"no table \[identify\]", outputs, 'run = "identify"'),
+        ("needs a list of values", '{ grid = ["3 g", 0.005] }', "3"),
+        ("outputs: value 'tilt'", outputs, 'outputs = ["tilt"]'),
+        (r"no table \[sweep\]", SCENE[SCENE.index("[sweep]") :], ""),
+    ):
+        assert old in SCENE
+        study.write_text(SCENE.replace(old, new))
+        status, out, err = told(capsys, study)
+        with named(words):
+            assert status == 2 and out is None
+            assert re.search(words, err), err
 
 
-def test_a_scene_without_a_sweep_is_told_in_one_line(study, capsys):
-    study.write_text(SCENE[: SCENE.index("[sweep]")])
-    status, out, err = told(capsys, study)
-    assert status == 2 and out is None
-    assert "has no table [sweep]; add one, with a table [sweep.over]" in err
-
-
-@pytest.mark.parametrize("row", ["8", "-1"])
-def test_a_row_that_is_not_there_is_told_before_anything_runs(study, capsys, row):
-    status, out, err = told(capsys, study, "--row", row, "--view", study.with_name("page.html"))
-    assert status == 2 and out is None and f"row {row}: there are 8, 0 to 7" in err
+def test_a_row_that_is_not_there_is_told_before_anything_runs(study, capsys):
+    page = study.with_name("page.html")
+    for row in ("8", "-1"):
+        status, out, err = told(capsys, study, "--row", row, "--view", page)
+        assert status == 2 and out is None and f"row {row}: there are 8, 0 to 7" in err
     assert not study.with_suffix(".db").exists()
-
-
-@pytest.mark.parametrize("row", [99, -1, True, 0.0])
-def test_a_point_that_is_not_there_has_no_motion(study, row):
     found = st.sweep(study, {"tail_mass": st.grid([0.003])})
-    with pytest.raises(st.SweepError, match=f"row {row}: there are 1, 0 to 0"):
-        found.motion(row)
+    for row in (1, -1, True, 0.0):
+        with pytest.raises(st.SweepError, match=f"row {row}: there are 1, 0 to 0"):
+            found.motion(row)
 
 
 def test_a_misspelt_parameter_is_told_before_a_model_is_made(study, monkeypatch):
@@ -156,8 +149,7 @@ def test_a_misspelt_parameter_is_told_before_a_model_is_made(study, monkeypatch)
         st.sweep(study, {"tail_lenght": st.grid([0.1])})
 
 
-def test_the_schema_knows_sweeps(study, capsys):
-
+def test_the_schema_knows_sweeps(capsys):
     assert cli.main(["schema"]) == 0
     valid = Draft7Validator(json.loads(capsys.readouterr().out)).is_valid
     assert valid(tomllib.loads(SCENE))

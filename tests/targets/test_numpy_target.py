@@ -10,10 +10,12 @@ from serpentail_codegen import pipeline
 from serpentail_codegen.functions.catalogue import CATALOGUE
 from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.ir.interpret import Numbers, Run
+from serpentail_codegen.ir.program import STATEMENTS
 from serpentail_codegen.scene.parse import scene_for
 from tests.references.parameters import random_states
+from tests.support.rows import row
 from tests.targets.numpy_target import TARGET, NumpyPrinter
-from tests.targets.test_targets import STATEMENTS, printed_kinds
+from tests.targets.test_targets import printed_kinds
 
 VALUES = ["mass_matrix", "forward_dynamics", "energy", "tail_points"]
 DERIVATIVES = ["forward_dynamics_derivatives", "inverse_dynamics_hessian", "inverse_dynamics_vjp"]
@@ -27,16 +29,14 @@ SCENES = {
 }
 
 
-@pytest.fixture(scope="module", params=SCENES)
-def model(request, tmp_path_factory):
-    """A scene, and the names that its emitted module defines."""
-    scene, root = replace(SCENES[request.param], targets=("numpy",)), tmp_path_factory.mktemp("m")
+def emitted(scene, root):
+    """The manifest of a scene's model in NumPy alone, and the names that its module defines."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(pipeline.TARGETS, "numpy", TARGET)
-        pipeline.generate(scene, root)
+        pipeline.generate(replace(scene, targets=("numpy",)), root)
     folder, names = root / scene.name, {}
     exec((folder / f"{scene.name}_numpy.py").read_text(), names)
-    return scene, json.loads((folder / "manifest.json").read_text()), names
+    return json.loads((folder / "manifest.json").read_text()), names
 
 
 def arguments_of(scene, function, tail):
@@ -49,28 +49,26 @@ def arguments_of(scene, function, tail):
     }
 
 
-def test_emitted_module_computes_what_the_programs_mean(model):
-    scene, manifest, names = model
+@pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
+def test_emitted_module_computes_what_the_programs_mean(scene, tmp_path):
+    manifest, names = emitted(scene, tmp_path)
+    assert names["__doc__"].endswith(f"derivation {manifest['content_hash']}.")
+    assert manifest["scene"]["targets"] == ["numpy"] and "work" not in manifest
     tail = pipeline.tail_of(scene)
+    parameters = {key: np.ravel(value).tolist() for key, value in scene.parameters.items()}
     for name in manifest["functions"]:
         function = CATALOGUE[name].of(tail)
         program, arguments = assemble(function, tail), arguments_of(scene, function, tail)
-        parameters = {key: np.ravel(value).tolist() for key, value in scene.parameters.items()}
         arrays = (*program.of_role("parameters"), *program.of_role("input"))
         given = {a.name: (parameters | arguments)[a.name] for a in arrays}
         expected = Run(program, Numbers(), given).values
         found = names[name](parameters, **arguments)
-        assert list(found) == [a.name for a in function.outputs]
-        for key, values in found.items():
-            wanted = np.array(expected[key], float)
-            scale = np.max(np.abs(wanted))
-            np.testing.assert_allclose(values, wanted, rtol=0, atol=1e-10 * scale, err_msg=name)
-
-
-def test_manifest_names_the_hash_of_the_only_target(model):
-    _, manifest, names = model
-    assert names["__doc__"].endswith(f"derivation {manifest['content_hash']}.")
-    assert manifest["scene"]["targets"] == ["numpy"] and "work" not in manifest
+        with row(name):
+            assert list(found) == [a.name for a in function.outputs]
+            for key, values in found.items():
+                wanted = np.array(expected[key], float)
+                limit = 1e-10 * np.max(np.abs(wanted))
+                np.testing.assert_allclose(values, wanted, rtol=0, atol=limit, err_msg=key)
 
 
 def test_numpy_prints_every_statement():

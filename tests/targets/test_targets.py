@@ -14,13 +14,7 @@ from serpentail_codegen.targets.c.loops import LoopPrinter, in_loops
 from serpentail_codegen.targets.casadi.printer import PythonPrinter, step_view
 from serpentail_codegen.targets.target import UnprintableStatement
 from serpentail_codegen.targets.templating import render
-
-PARTS = {ir.Index, ir.Array, ir.Ref, ir.Program}  # of statements and of programs
-STATEMENTS = [
-    kind
-    for _, kind in inspect.getmembers(ir, inspect.isclass)
-    if kind.__module__ == ir.__name__ and kind not in PARTS
-]
+from tests.support.rows import row
 
 
 def printed_kinds(printer):
@@ -28,40 +22,29 @@ def printed_kinds(printer):
     return set(inspect.getattr_static(printer, "statement").dispatcher.registry) - {object}
 
 
-@pytest.mark.parametrize("name", TARGETS)
-@pytest.mark.parametrize("kind", STATEMENTS)
-def test_every_statement_has_a_method_in_every_printer(name, kind):
-    assert kind in printed_kinds(TARGETS[name].printer)
-
-
-@pytest.mark.parametrize("name", TARGETS)
-def test_printers_know_nothing_but_statements(name):
-    assert printed_kinds(TARGETS[name].printer) <= set(STATEMENTS)
-
-
-def test_a_scene_can_ask_for_every_target():
-    assert tuple(TARGETS) == NAMES
+def test_every_printer_has_a_method_for_each_statement_and_for_nothing_else():
+    assert tuple(TARGETS) == NAMES  # a scene can ask for each
+    for name, target in TARGETS.items():
+        assert printed_kinds(target.printer) == set(ir.STATEMENTS), name
 
 
 class Rotate:
     """A statement that no target knows."""
 
 
-@pytest.mark.parametrize("printer", [PythonPrinter, lambda p: LoopPrinter(p, "double", "x")])
-def test_an_unknown_statement_is_refused(printer):
-    made = printer(Builder("empty", "Empty.").finish())
-    with pytest.raises(UnprintableStatement, match="Printer has no method for Rotate: register"):
-        made.statement(Rotate())
+def test_an_unknown_statement_is_refused():
+    program = Builder("empty", "Empty.").finish()
+    for printer in (PythonPrinter(program), LoopPrinter(program, "double", "x")):
+        with pytest.raises(UnprintableStatement, match=f"{type(printer).__name__} .*Rotate"):
+            printer.statement(Rotate())
 
 
 # What CasADi's lists cannot hold.
 
 
-def refused_by_casadi(build):
-    """A program of one statement that the CasADi target refuses."""
-    b = Builder("refused", "Refused.")
-    build(b, b.array("x", 4, role="input"), b.array("y", 4, role="output"))
-    return b.finish()
+def arrays(b, x=4, y=4):
+    """An input and an output of so many scalars."""
+    return b.array("x", x, role="input"), b.array("y", y, role="output")
 
 
 def branch(b, x, y):
@@ -69,22 +52,19 @@ def branch(b, x, y):
         b.fill(y[0], 0)
 
 
-REFUSED = {
-    "When: a symbolic graph has no branches": branch,
-    "Guard: `where` of the module takes a single scalar": lambda b, x, y: b.guard(
-        x[0], "TOO_SMALL", y[0]
-    ),
-    "FactorPair: only functions that CasADi gets as compiled C": lambda b, x, y: b.emit(
-        ir.FactorPair(y, 2)
-    ),
-    "wide has lanes": lambda b, x, y: b.fill(b.wide("wide", 1, 8)[0], 0),
-}
-
-
-@pytest.mark.parametrize("message", REFUSED)
-def test_casadi_refuses_in_words_what_it_cannot_express(message):
-    with pytest.raises(UnprintableStatement, match=message):
-        PythonPrinter(refused_by_casadi(REFUSED[message])).lines()
+def test_casadi_refuses_what_it_cannot_express():
+    rows = {
+        "When": branch,
+        "Guard": lambda b, x, y: b.guard(x[0], "TOO_SMALL", y[0]),
+        "FactorPair": lambda b, x, y: b.factor_pair(y, 2),
+        "SolvePair": lambda b, x, y: b.solve_pair(y, x.part(0, 2)),
+        "wide has lanes": lambda b, x, y: b.fill(b.wide("wide", 1, 8)[0], 0),
+    }
+    for words, build in rows.items():
+        b = Builder("refused", "Refused.")
+        build(b, *arrays(b))
+        with row(words), pytest.raises(UnprintableStatement, match=words):
+            PythonPrinter(b.finish()).lines()
 
 
 def casadi_values(program, **arguments):
@@ -106,20 +86,16 @@ def casadi_values(program, **arguments):
     return names[program.name]({}, **arguments)
 
 
-def interpreted_values(program, **arguments):
-    """Run a program on numbers; return its outputs by name."""
-    values = Run(program, Numbers(), arguments).values
-    return {array.name: values[array.name] for array in program.of_role("output")}
-
-
-@pytest.mark.parametrize("stride", [1, 2])
-def test_casadi_adds_what_a_copy_adds(stride):
-    b = Builder("sums", "Sums.")
-    x, y = b.array("x", 6, role="input"), b.array("y", 6, role="output")
-    b.fill(y[0], 1, 2, 3, 4, 5, 6)
-    b.copy(y.part(0, 3, stride), x.part(1, 3), adds=True)
-    program, numbers = b.finish(), [10.0, 20.0, 30.0, 40.0, 50.0, 60.0]
-    assert casadi_values(program, x=numbers) == interpreted_values(program, x=numbers)
+def test_casadi_adds_what_a_copy_adds():
+    numbers = [10.0, 20.0, 30.0, 40.0, 50.0, 60.0]
+    for stride in (1, 2):
+        b = Builder("sums", "Sums.")
+        x, y = arrays(b, 6, 6)
+        b.fill(y[0], 1, 2, 3, 4, 5, 6)
+        b.copy(y.part(0, 3, stride), x.part(1, 3), adds=True)
+        program = b.finish()
+        expected = Run(program, Numbers(), {"x": numbers}).values["y"]
+        assert casadi_values(program, x=numbers) == {"y": expected}, stride
 
 
 # What C's helpers take only side by side.

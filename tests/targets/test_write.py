@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,7 @@ from serpentail_codegen.targets import exchange
 from serpentail_codegen.targets.write import write_folder
 from tests.support.file_faults import age, at, before_calls, fault
 from tests.support.models import model_folder
+from tests.support.rows import row
 
 ROOT = Path(__file__).parents[2]
 OLD = {"a.txt": "old", "src/b.c": "old", "src/same.c": "same", "gone/c.c": "old"}
@@ -93,32 +95,30 @@ def test_link_to_a_folder_stays_a_link(folder, tmp_path):
     assert os.listdir(link.parent) == ["link"] and os.listdir(folder.parent) == ["folder"]
 
 
-@pytest.mark.parametrize("without", ["exchange", "links"])
-def test_file_systems_that_know_less(folder, monkeypatch, without):
-    if without == "exchange":
-        monkeypatch.setattr(exchange, "_system_call", lambda: None)
-    else:
-        monkeypatch.setattr(os, "link", lambda *_, **__: fault(errno.EPERM)())
-    write_folder(folder, NEW, {"name": "new"})
-    assert is_whole(folder, NEW, "new") and os.listdir(folder.parent) == ["folder"]
+def test_file_systems_that_know_less(tmp_path, monkeypatch):
+    less = {"exchange": (exchange, "_system_call", lambda: None)}
+    less |= {"links": (os, "link", lambda *_, **__: fault(errno.EPERM)())}
+    for name, patch in less.items():
+        folder = furnished(tmp_path / name / "folder")
+        with monkeypatch.context() as patches, row(name):
+            patches.setattr(*patch)
+            write_folder(folder, NEW, {"name": "new"})
+            assert is_whole(folder, NEW, "new") and os.listdir(folder.parent) == ["folder"]
 
 
 # Kills
 
 
-@pytest.mark.parametrize(
-    "targets", [["casadi"], pytest.param(["c", "casadi"], marks=pytest.mark.slow)], ids=str
-)
-def test_a_generation_killed_at_any_call_leaves_a_model(tmp_path, targets):
-    options = {"name": "tail", "targets": targets}
-    old = model_folder(1, 1, functions=["mass_matrix"], **options)
-    new = model_folder(1, 2, functions=["mass_matrix", "energy"], **options)
+def test_a_generation_killed_at_any_call_leaves_a_model(tmp_path):
+    """Models of the fewest files, as each call that writes them is a kill."""
+    options = {"name": "tail", "targets": ["casadi"]}
+    sizes = [(1, ["mass_matrix"]), (2, ["mass_matrix", "energy"])]
+    models = [str(model_folder(1, n, functions=names, **options)) for n, names in sizes]
     program = [sys.executable, "-m", "tests.targets.killed_generations"]
-    command = [*program, str(tmp_path / "root" / "tail"), str(old), str(new)]
+    command = [*program, str(tmp_path / "root" / "tail"), *models]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
     found = json.loads(done.stdout)
-    print(found)
     assert found["moments"] > 50 and found["old"] > found["new"] > 5
 
 
@@ -137,34 +137,26 @@ def test_parts_of_the_living_stay(folder):
 # Faults
 
 
-@pytest.mark.parametrize(
-    "code",
-    [
-        errno.ENOSPC,
-        *(pytest.param(code, marks=pytest.mark.slow) for code in (errno.EFBIG, errno.EIO)),
-    ],
-    ids=errno.errorcode.get,
-)
-def test_fault_at_any_call_is_one_line_and_leaves_a_model(tmp_path, code, monkeypatch):
+def test_fault_at_any_call_is_one_line_and_leaves_a_model(tmp_path, monkeypatch):
     monkeypatch.setattr(os, "fsync", lambda _: None)  # it takes most of the time
-    refused = 0
+    refused, full = 0, fault(errno.ENOSPC)
     for moment in itertools.count():
         folder = furnished(tmp_path / str(moment) / "folder")
         came = []
-        with before_calls(at(moment, lambda: came.append(1) or fault(code)())):  # noqa: B023
-            try:
-                write_folder(folder, NEW, {"name": "new"})
-            except SceneError as error:
-                refused += 1
-                assert os.strerror(code) in str(error) and "\n" not in str(error), moment
-                assert str(error).startswith("generated folder: value '"), moment
-        assert is_whole(folder, OLD, "old") or is_whole(folder, NEW, "new"), moment
-        age(folder.parent)
-        write_folder(folder, NEW, {"name": "new"})
-        assert is_whole(folder, NEW, "new") and os.listdir(folder.parent) == ["folder"], moment
+        with row(moment):
+            with before_calls(at(moment, lambda: came.append(1) or full())):  # noqa: B023
+                try:
+                    write_folder(folder, NEW, {"name": "new"})
+                except SceneError as error:
+                    refused += 1
+                    assert os.strerror(errno.ENOSPC) in str(error) and "\n" not in str(error)
+                    assert str(error).startswith("generated folder: value '")
+            assert is_whole(folder, OLD, "old") or is_whole(folder, NEW, "new")
+            age(folder.parent)
+            write_folder(folder, NEW, {"name": "new"})
+            assert is_whole(folder, NEW, "new") and os.listdir(folder.parent) == ["folder"]
         if not came:
             break
-    print(f"{moment} calls, {refused} of them refused")
     assert moment > 60 and refused > 20
 
 
@@ -182,39 +174,31 @@ def test_command_line_says_it_in_one_line(tmp_path, capsys):
 
 
 def in_threads(work):
-    """Do some work in eight threads at once; return the errors."""
-    errors, together = [], threading.Barrier(THREADS)
+    """Do some work in eight threads at once; errors are raised."""
+    together = threading.Barrier(THREADS)
 
     def run(number):
         together.wait()
-        try:
-            for turn in range(5):
-                work(number + turn)
-        except BaseException as error:
-            errors.append(error)
+        for turn in range(5):
+            work(number + turn)
 
-    threads = [threading.Thread(target=run, args=(number,)) for number in range(THREADS)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    return errors
+    with ThreadPoolExecutor(THREADS) as pool:
+        assert [*pool.map(run, range(THREADS))] == [None] * THREADS
 
 
-@pytest.mark.parametrize("step", [None, "in steps"])
-def test_eight_threads_write_one_model(tmp_path, monkeypatch, step):
-    if step:
-        monkeypatch.setattr(exchange, "_system_call", lambda: None)
-    folder = tmp_path / "root" / "folder"
-    assert in_threads(lambda number: write_folder(folder, {**OLD, "n": str(number % 4)}, {})) == []
-    found = texts(folder)
-    assert {*found} == {*OLD, "n", "manifest.json"} and os.listdir(folder.parent) == ["folder"]
+def test_eight_threads_write_one_model(folder, tmp_path, monkeypatch):
+    for name in ("at once", "in steps"):
+        if name == "in steps":
+            monkeypatch.setattr(exchange, "_system_call", lambda: None)
+        place = tmp_path / name / "folder"
+        with row(name):
+            in_threads(lambda n, place=place: write_folder(place, {**OLD, "n": str(n % 4)}, {}))
+            assert {*texts(place)} == {*OLD, "n", "manifest.json"}
+            assert os.listdir(place.parent) == ["folder"]
+    monkeypatch.undo()
 
-
-def test_threads_that_write_different_models_leave_one(folder):
-    def work(number):
-        write_folder(folder, *((OLD, {"name": "old"}) if number % 2 else (NEW, {"name": "new"})))
-
-    assert in_threads(work) == []
+    # threads that write different models leave one
+    models = (NEW, {"name": "new"}), (OLD, {"name": "old"})
+    in_threads(lambda number: write_folder(folder, *models[number % 2]))
     assert is_whole(folder, OLD, "old") or is_whole(folder, NEW, "new")
     assert os.listdir(folder.parent) == ["folder"]

@@ -1,6 +1,7 @@
 """The 40-digit continuum obeys exact laws to the last bit, whatever digits and nodes it has."""
 
 from fractions import Fraction
+from itertools import product
 
 import mpmath
 import numpy as np
@@ -10,77 +11,59 @@ from scipy.spatial.transform import Rotation
 from tests.references.exact_continuum import ExactContinuum
 from tests.references.metrics import block_error, equilibrated_condition
 from tests.references.parameters import KINDS, TABLE_1
-from tests.support.exact_continuum_states import (
+from tests.support.exact_states import (
     BENDS,
     ROUNDING,
     UPRIGHT,
     assert_same_float64,
+    assert_same_quantities,
     at_rest,
     states_of,
     torso_rotation,
 )
+from tests.support.rows import row
 
 STEP = 1e-6
 
 
-def assert_same_quantities(continuum, other, state):
-    """Every quantity of two continuum tails is the same float64 at one state."""
-    q, v, v_dot, tau = state
-    assert_same_float64(continuum.mass_matrix(q), other.mass_matrix(q))
-    assert_same_float64(
-        continuum.inverse_dynamics(q, v, v_dot), other.inverse_dynamics(q, v, v_dot)
-    )
-    assert_same_float64(continuum.forward_dynamics(q, v, tau), other.forward_dynamics(q, v, tau))
-    assert_same_float64(continuum.energy(q, v), other.energy(q, v))
-    assert_same_float64(continuum.momentum(q, v), other.momentum(q, v))
-    assert_same_float64(continuum.tail_points(q, 3), other.tail_points(q, 3))
+def rows(sizes=(1, 2), count=2):
+    """Yield a name, the exact continuum of a size, and a state of a kind: all of these."""
+    for segments, kind in product(sizes, KINDS):
+        exact = ExactContinuum(TABLE_1, segments)
+        for state in states_of(segments, kind)[:count]:
+            yield row(segments, kind), exact, *state
 
 
-def test_inverse_dynamics_is_mass_times_acceleration_plus_bias(exact, states):
-    for q, v, v_dot, _ in states:
-        mass, bias = exact.mass_matrix(q), exact.bias_force(q, v)
-        error = np.abs(exact.inverse_dynamics(q, v, v_dot) - (mass @ v_dot + bias))
-        # no more than the rounding of H, C and of this sum in float64
-        assert np.all(error <= exact.nv * ROUNDING * (np.abs(mass) @ np.abs(v_dot) + np.abs(bias)))
+def test_laws_hold_but_for_the_rounding_of_float64():
+    total = float(Fraction(TABLE_1["torso_mass"]) + Fraction(TABLE_1["tail_mass"]))
+    for name, exact, q, v, v_dot, tau in rows():
+        with name:
+            mass, bias, axes = exact.mass_matrix(q), exact.bias_force(q, v), torso_rotation(q)
+            assert_same_float64(mass[:3, :3], total * np.eye(3))
+            # no more than the rounding of H, C and of these sums in float64
+            unit, sizes = exact.nv * ROUNDING, np.abs(mass)
+            force = exact.inverse_dynamics(q, v, v_dot)
+            error = np.abs(force - (mass @ v_dot + bias))
+            assert np.all(error <= unit * (sizes @ np.abs(v_dot) + np.abs(bias)))
+            kinetic = exact.energy(q, v)[0] - v @ mass @ v / 2
+            assert abs(kinetic) <= unit * (np.abs(v) @ sizes @ np.abs(v))
+            (linear, angular), momentum = exact.momentum(q, v), mass @ v
+            np.testing.assert_allclose(linear, momentum[:3], atol=1e-14)
+            # H_p,omega = -M (c - p)~ R_b
+            about_torso = angular - mass[:3, 3:6] @ axes.T @ linear / mass[0, 0]
+            np.testing.assert_allclose(axes @ momentum[3:6], about_torso, atol=1e-15)
+            found = exact.forward_dynamics(q, v, tau, force - at_rest(tau))
+            assert block_error(found, v_dot) <= 1e-14 * equilibrated_condition(mass)
 
 
-@pytest.mark.slow
-def test_forward_dynamics_inverts_inverse_dynamics(exact, states):
-    for q, v, v_dot, tau in states:
-        external = exact.inverse_dynamics(q, v, v_dot) - at_rest(tau)
-        limit = 1e-14 * equilibrated_condition(exact.mass_matrix(q))
-        assert block_error(exact.forward_dynamics(q, v, tau, external), v_dot) <= limit
-
-
-def test_kinetic_energy_is_the_mass_matrix_form(exact, states):
-    for q, v, *_ in states:
-        mass = exact.mass_matrix(q)
-        limit = exact.nv * ROUNDING * (np.abs(v) @ np.abs(mass) @ np.abs(v))
-        assert abs(exact.energy(q, v)[0] - v @ mass @ v / 2) <= limit
-
-
-def test_momentum_is_the_upper_rows_of_mass_times_velocity(exact, states):
-    for q, v, *_ in states:
-        mass, axes, (linear, angular) = (
-            exact.mass_matrix(q),
-            torso_rotation(q),
-            exact.momentum(q, v),
-        )
-        momentum = mass @ v
-        np.testing.assert_allclose(linear, momentum[:3], atol=1e-14)
-        # H_p,omega = -M (c - p)~ R_b
-        about_torso = angular - mass[:3, 3:6] @ axes.T @ linear / mass[0, 0]
-        np.testing.assert_allclose(axes @ momentum[3:6], about_torso, atol=1e-15)
-
-
-@pytest.mark.slow
-def test_power_is_the_rate_of_energy(exact, states):
-    for q, v, v_dot, _ in states:
-        after, before = (
-            sum(exact.energy(displaced(q, v, time), v + time * v_dot)) for time in (STEP, -STEP)
-        )
-        power = v * exact.inverse_dynamics(q, v, v_dot)
-        assert abs((after - before) / (2 * STEP) - sum(power)) <= 1e-8 * sum(abs(power))
+def test_power_is_the_rate_of_energy():
+    for name, exact, q, v, v_dot, _ in rows(count=1):
+        with name:
+            after, before = (
+                sum(exact.energy(displaced(q, v, time), v + time * v_dot)) for time in (STEP, -STEP)
+            )
+            power = v * exact.inverse_dynamics(q, v, v_dot)
+            assert abs((after - before) / (2 * STEP) - sum(power)) <= 1e-8 * sum(abs(power))
 
 
 def displaced(q, v, time):
@@ -91,59 +74,52 @@ def displaced(q, v, time):
     )
 
 
-def test_translational_mass_is_the_nearest_float64_of_the_total(exact, states):
-    total = float(Fraction(TABLE_1["torso_mass"]) + Fraction(TABLE_1["tail_mass"]))
-    assert_same_float64(exact.mass_matrix(states[0][0])[:3, :3], total * np.eye(3))
+def test_internal_dynamics_do_not_depend_on_the_pose_to_the_last_bit():
+    for name, exact, q, v, *_ in rows((1,), 1):
+        with name:
+            free = ExactContinuum({**TABLE_1, "gravity": 0.0}, exact.segments)
+            upright = np.concatenate([UPRIGHT, q[7:]])
+            internal = np.concatenate([np.zeros(3), v[3:]])
+            assert_same_float64(free.mass_matrix(q)[3:, 3:], free.mass_matrix(upright)[3:, 3:])
+            assert_same_float64(free.bias_force(q, v)[3:], free.bias_force(upright, internal)[3:])
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", KINDS)
-def test_more_digits_and_nodes_give_the_same_float64(kind):
-    few, many = ExactContinuum(TABLE_1, 3, 30, 24), ExactContinuum(TABLE_1, 3, 50, 32)
-    assert_same_quantities(few, many, states_of(3, kind)[1])
+@pytest.mark.parametrize("segments", [1, pytest.param(3, marks=pytest.mark.slow)])
+def test_more_digits_and_nodes_give_the_same_float64(segments):
+    few, many = (ExactContinuum(TABLE_1, segments, *size) for size in [(40, 24), (60, 32)])
+    states = {kind: states_of(segments, kind)[1] for kind in KINDS}
+    q, *others = states_of(segments, "random")[0]
+    turns = np.tile([0.6, -0.8], segments)
+    states |= {bend: (np.concatenate([q[:7], bend * turns]), *others) for bend in (0.0, *BENDS)}
+    for name, state in states.items():
+        with row(name):
+            assert_same_quantities(few, many, state)
+            assert_same_float64(few.tail_points(state[0], 3), many.tail_points(state[0], 3))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("bend", [0.0, *BENDS])
-def test_every_bend_is_the_same_float64_with_more_digits_and_nodes(bend):
-    q, v, v_dot, tau = states_of(1, "random")[0]
-    state = np.concatenate([q[:7], [0.6 * bend, -0.8 * bend]]), v, v_dot, tau
-    assert_same_quantities(
-        *(ExactContinuum(TABLE_1, 1, *size) for size in [(40, 24), (60, 32)]), state
-    )
+def test_nodes_integrate_polynomials():
+    for count in (1, 2, 15, 24):
+        continuum = ExactContinuum(TABLE_1, 1, nodes=count)
+        shares = continuum.masses[1:] / continuum.mp.mpf(TABLE_1["tail_mass"])
+        for power in range(2 * count):
+            with row(count, power):
+                assert abs(np.dot(shares, continuum.nodes**power) * (power + 1) - 1) <= 1e-37
 
 
-@pytest.mark.parametrize("count", [1, 2, 15, 24])
-def test_nodes_integrate_polynomials(count):
-    continuum = ExactContinuum(TABLE_1, 1, nodes=count)
-    shares = continuum.masses[1:] / continuum.mp.mpf(TABLE_1["tail_mass"])
-    for power in range(2 * count):
-        assert abs(np.dot(shares, continuum.nodes**power) * (power + 1) - 1) <= 1e-37
-
-
-@pytest.mark.slow
-def test_internal_dynamics_do_not_depend_on_the_pose_to_the_last_bit(exact, states):
-    continuum = ExactContinuum({**TABLE_1, "gravity": 0.0}, exact.segments)
-    q, v, *_ = states[0]
-    upright, internal = np.concatenate([UPRIGHT, q[7:]]), np.concatenate([np.zeros(3), v[3:]])
-    assert_same_float64(continuum.mass_matrix(q)[3:, 3:], continuum.mass_matrix(upright)[3:, 3:])
-    assert_same_float64(continuum.bias_force(q, v)[3:], continuum.bias_force(upright, internal)[3:])
-
-
-def test_digits_are_the_continuum_s_own(exact):
-    digits, (q, v, *_) = mpmath.mp.dps, states_of(exact.segments, "random")[0]
-    with mpmath.workdps(5):
-        continuum = ExactContinuum(TABLE_1, exact.segments)
-        np.testing.assert_array_equal(continuum.bias_force(q, v), exact.bias_force(q, v))
-    assert (mpmath.mp.dps, continuum.mp.dps) == (digits, 40)
-
-
-def test_quaternion_is_normalised_and_arguments_are_left_alone(exact, states):
-    q, v, v_dot, tau = states[0]
-    scaled = q.copy()
-    scaled[3:7] *= 2
-    given = [x.copy() for x in (scaled, v, v_dot, tau)]
-    np.testing.assert_array_equal(exact.bias_force(scaled, v), exact.bias_force(q, v))
-    exact.forward_dynamics(scaled, v, tau, exact.inverse_dynamics(scaled, v, v_dot))
-    for x, x_given in zip((scaled, v, v_dot, tau), given, strict=True):
-        np.testing.assert_array_equal(x, x_given)
+def test_digits_are_the_continuum_s_own_and_arguments_are_left_alone():
+    digits = mpmath.mp.dps
+    for name, exact, q, v, v_dot, tau in rows((1,), 1):
+        with name:
+            expected = exact.bias_force(q, v)
+            with mpmath.workdps(5):
+                other = ExactContinuum(TABLE_1, exact.segments)
+                np.testing.assert_array_equal(other.bias_force(q, v), expected)
+            assert other.mp.dps == 40
+            scaled = q.copy()
+            scaled[3:7] *= 2
+            given = [x.copy() for x in (scaled, v, v_dot, tau)]
+            np.testing.assert_array_equal(exact.bias_force(scaled, v), expected)
+            exact.forward_dynamics(scaled, v, tau, exact.inverse_dynamics(scaled, v, v_dot))
+            for x, x_given in zip((scaled, v, v_dot, tau), given, strict=True):
+                np.testing.assert_array_equal(x, x_given)
+    assert mpmath.mp.dps == digits

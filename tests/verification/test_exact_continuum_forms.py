@@ -1,18 +1,17 @@
 """The 40-digit continuum agrees with closed forms, chains of points and Lagrange's equations."""
 
 from fractions import Fraction
+from itertools import product
 
 import casadi as ca
 import mpmath
 import numpy as np
-import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.references.exact_chain import ExactChain
 from tests.references.exact_continuum import ExactContinuum
 from tests.references.metrics import block_error, mass_matrix_error
 from tests.references.parameters import KINDS, TABLE_1
-from tests.support.exact_continuum_states import (
+from tests.support.exact_states import (
     BENDS,
     ROUNDING,
     UPRIGHT,
@@ -21,6 +20,9 @@ from tests.support.exact_continuum_states import (
     states_of,
     torso_rotation,
 )
+from tests.support.rows import row
+
+SIZES = (1, 2)
 
 
 def test_straight_tail_is_rational_to_the_last_bit():
@@ -39,17 +41,17 @@ def test_straight_tail_is_rational_to_the_last_bit():
     assert_same_float64(bias[6:], [float(-mass * gravity * length / 6), 0])
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("gravity", [0.0, 9.8])
-@pytest.mark.parametrize("bend", BENDS)
-def test_planar_bend_is_the_closed_form_to_the_last_bit(bend, gravity):
-    parameters = {**TABLE_1, "gravity": gravity}
-    continuum, rates = ExactContinuum(parameters, 1), (3.0, -5.0)
-    mass, bias, potential = arc(parameters, bend, rates)
-    q, v = np.array([*UPRIGHT, bend, 0.0]), at_rest(rates)
-    assert_same_float64(continuum.mass_matrix(q)[6:, 6:], mass)
-    assert_same_float64(continuum.bias_force(q, v)[6:], bias)
-    assert continuum.energy(q, v)[1] == potential
+def test_planar_bend_is_the_closed_form_to_the_last_bit():
+    rates = (3.0, -5.0)
+    for gravity, bend in product([0.0, 9.8], BENDS):
+        with row(gravity, bend):
+            parameters = {**TABLE_1, "gravity": gravity}
+            continuum = ExactContinuum(parameters, 1)
+            mass, bias, potential = arc(parameters, bend, rates)
+            q, v = np.array([*UPRIGHT, bend, 0.0]), at_rest(rates)
+            assert_same_float64(continuum.mass_matrix(q)[6:, 6:], mass)
+            assert_same_float64(continuum.bias_force(q, v)[6:], bias)
+            assert continuum.energy(q, v)[1] == potential
 
 
 @mpmath.workdps(2000)
@@ -79,75 +81,42 @@ def arc(parameters, bend, rates):
     return inertia, np.array(bias, dtype=float), float(potential)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("bend", BENDS[:4])
-def test_small_bend_tends_to_the_straight_tail(exact, bend):
-    q, v, v_dot, _ = states_of(exact.segments, "random")[0]
-    straight, bent = (np.concatenate([q[:7], size * q[7:]]) for size in (0.0, bend))
-    assert (
-        mass_matrix_error(exact.mass_matrix(bent), exact.mass_matrix(straight)) <= ROUNDING + bend
-    )
-    force = exact.inverse_dynamics(straight, v, v_dot)
-    assert block_error(exact.inverse_dynamics(bent, v, v_dot), force) <= ROUNDING + 10 * bend
+def test_small_bend_tends_to_the_straight_tail():
+    exact, (q, v, v_dot, _) = ExactContinuum(TABLE_1, 1), states_of(1, "random")[0]
+    for bend in BENDS[:4]:
+        with row(bend):
+            straight, bent = (np.concatenate([q[:7], size * q[7:]]) for size in (0.0, bend))
+            H, H_bent = exact.mass_matrix(straight), exact.mass_matrix(bent)
+            assert mass_matrix_error(H_bent, H) <= ROUNDING + bend
+            force, other = (exact.inverse_dynamics(x, v, v_dot) for x in (straight, bent))
+            assert block_error(other, force) <= ROUNDING + 10 * bend
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", KINDS)
-def test_two_halves_are_one_segment(kind):
+def test_two_halves_are_one_segment():
     whole, halves = (ExactContinuum(TABLE_1, segments) for segments in (1, 2))
-    reduction = np.vstack([np.eye(8), np.eye(8)[6:]]) / np.r_[np.ones(6), 2 * np.ones(4)][:, None]
-    for q, v, v_dot, _ in states_of(1, kind):
-        q_halves = np.concatenate([q[:7], q[7:] / 2, q[7:] / 2])
-        mass = reduction.T @ halves.mass_matrix(q_halves) @ reduction
-        force = reduction.T @ halves.inverse_dynamics(q_halves, reduction @ v, reduction @ v_dot)
-        assert mass_matrix_error(mass, whole.mass_matrix(q)) <= 1e-15
-        assert block_error(force, whole.inverse_dynamics(q, v, v_dot)) <= 1e-15
-        assert_same_float64(halves.energy(q_halves, reduction @ v), whole.energy(q, v))
-        assert_same_float64(halves.tail_points(q_halves, 3), whole.tail_points(q, 6))
+    T = np.vstack([np.eye(8), np.eye(8)[6:]]) / np.r_[np.ones(6), 2 * np.ones(4)][:, None]
+    for kind in KINDS:
+        for q, v, v_dot, _ in states_of(1, kind):
+            with row(kind):
+                q_halves = np.concatenate([q[:7], q[7:] / 2, q[7:] / 2])
+                mass = T.T @ halves.mass_matrix(q_halves) @ T
+                force = T.T @ halves.inverse_dynamics(q_halves, T @ v, T @ v_dot)
+                assert mass_matrix_error(mass, whole.mass_matrix(q)) <= 1e-15
+                assert block_error(force, whole.inverse_dynamics(q, v, v_dot)) <= 1e-15
+                assert_same_float64(halves.energy(q_halves, T @ v), whole.energy(q, v))
+                assert_same_float64(halves.tail_points(q_halves, 3), whole.tail_points(q, 6))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("segments", "counts"), [(1, (16, 32, 64)), (2, (16, 32))])
-def test_chain_of_massive_points_converges_at_first_order(segments, counts):
-    q, v, v_dot, _ = states_of(segments, "random")[0]
-    continuum = ExactContinuum(TABLE_1, segments)
-    reference = [
-        continuum.mass_matrix(q),
-        continuum.inverse_dynamics(q, v, v_dot),
-        *continuum.momentum(q, v),
-    ]
-    errors = []
-    for links in counts:
-        values = chain_quantities(segments, links, (q, v, v_dot))
-        errors.append(
-            [np.linalg.norm(x - x_ref) for x, x_ref in zip(values, reference, strict=True)]
-        )
-    np.testing.assert_allclose(np.array(errors[:-1]) / errors[1:], 2.0, atol=0.1)
-
-
-def chain_quantities(segments, links, state):
-    """H, H v_dot + C and momenta of links without inertia of their own, each turned by 1/n of its
-    segment's bend.
-    """
-    chain = ExactChain({**TABLE_1, "link_inertia": (0.0, 0.0, 0.0)}, segments, links)
-    share = np.concatenate([np.ones(6), np.full(2 * segments, 1 / links)])
-    (q, v, v_dot), scale = state, np.concatenate([[1.0], share])
-    q, v, v_dot = scale * q, share * v, share * v_dot
-    mass = chain.mass_matrix(q) * np.outer(share, share)
-    return [mass, share * chain.inverse_dynamics(q, v, v_dot), *chain.momentum(q, v)]
-
-
-@pytest.fixture(scope="module")
-def lagrange(exact):
+def lagrange(segments):
     """H and C of Lagrange's equations at x = [p, xi, q_t] with xi = 0, by automatic
     differentiation.
     """
-    nv = exact.nv
+    nv = 6 + 2 * segments
     x, x_dot, axes = ca.SX.sym("x", nv), ca.SX.sym("x_dot", nv), ca.SX.sym("R", 3, 3)
     half = ca.skew(x[3:6] / 2)
     # R_b = R Exp(xi) up to xi^2, so omega = xi_dot and omega_dot = xi_ddot at xi = 0
     turn = ca.DM.eye(3) + 2 / (1 + ca.sumsqr(x[3:6]) / 4) * (half + half @ half)
-    points, masses = paper_slices(x, axes @ turn, exact.segments)
+    points, masses = paper_slices(x, axes @ turn, segments)
     turn_rate = ca.reshape(ca.jtimes(ca.vec(turn), x, x_dot), 3, 3)
     omega, inertia = ca.inv_skew(turn.T @ turn_rate), ca.diag(ca.DM(TABLE_1["torso_inertia"]))
     velocities = ca.jtimes(points, x, x_dot)
@@ -197,36 +166,39 @@ def about_y(angle):
     return ca.vertcat(ca.horzcat(c, 0, s), ca.horzcat(0, 1, 0), ca.horzcat(-s, 0, c))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["random", "folded"])
-def test_lagrange_s_equations_of_the_paper_s_polar_form_agree(exact, lagrange, kind):
-    for q, v, *_ in states_of(exact.segments, kind):
-        x = np.concatenate([q[:3], np.zeros(3), q[7:]])
-        mass, bias = (np.array(value) for value in lagrange(x, v, torso_rotation(q)))
-        assert mass_matrix_error(mass, exact.mass_matrix(q)) <= 1e-13
-        assert block_error(bias[:, 0], exact.bias_force(q, v)) <= 1e-13
+def test_lagrange_s_equations_of_the_paper_s_polar_form_agree():
+    for segments, kind in product(SIZES, ["random", "folded"]):
+        exact, equations = ExactContinuum(TABLE_1, segments), lagrange(segments)
+        for q, v, *_ in states_of(segments, kind):
+            with row(segments, kind):
+                x = np.concatenate([q[:3], np.zeros(3), q[7:]])
+                mass, bias = (np.array(value) for value in equations(x, v, torso_rotation(q)))
+                assert mass_matrix_error(mass, exact.mass_matrix(q)) <= 1e-13
+                assert block_error(bias[:, 0], exact.bias_force(q, v)) <= 1e-13
 
 
-@pytest.mark.parametrize("bend", [*BENDS, 300.0])
-def test_tip_of_a_planar_bend_is_the_arc_s_to_the_last_bit(bend):
-    mount, tip = ExactContinuum({**TABLE_1, "tail_mount": (0, 0, 0)}, 1).tail_points(
-        [*UPRIGHT, bend, 0.0], 1
-    )
-    with mpmath.workdps(700):
-        a, length = mpmath.mpf(bend), mpmath.mpf(TABLE_1["tail_length"])
-        expected = [0, -length * mpmath.sin(a) / a, -length * (1 - mpmath.cos(a)) / a]
-    np.testing.assert_array_equal(mount, np.zeros(3))
-    assert_same_float64(tip, np.array(expected, dtype=float))
+def test_tip_of_a_planar_bend_is_the_arc_s_to_the_last_bit():
+    continuum = ExactContinuum({**TABLE_1, "tail_mount": (0, 0, 0)}, 1)
+    for bend in (*BENDS, 300.0):
+        with row(bend):
+            mount, tip = continuum.tail_points([*UPRIGHT, bend, 0.0], 1)
+            with mpmath.workdps(700):
+                a, length = mpmath.mpf(bend), mpmath.mpf(TABLE_1["tail_length"])
+                expected = [0, -length * mpmath.sin(a) / a, -length * (1 - mpmath.cos(a)) / a]
+            np.testing.assert_array_equal(mount, np.zeros(3))
+            assert_same_float64(tip, np.array(expected, dtype=float))
 
 
-def test_tail_points_integrate_the_turning_tangent(exact, states):
-    for q, *_ in states:
-        points = exact.tail_points(q, 4)
-        assert points.shape == (4 * exact.segments + 1, 3)
-        np.testing.assert_allclose(
-            points, tangent_integrals(q, exact.segments, 4), rtol=0, atol=1e-14
-        )
-        np.testing.assert_array_equal(points, exact.tail_points(q, 8)[::2])
+def test_tail_points_integrate_the_turning_tangent():
+    for segments, kind in product(SIZES, KINDS):
+        exact = ExactContinuum(TABLE_1, segments)
+        for q, *_ in states_of(segments, kind):
+            with row(segments, kind):
+                points = exact.tail_points(q, 4)
+                assert points.shape == (4 * segments + 1, 3)
+                integrals = tangent_integrals(q, segments, 4)
+                np.testing.assert_allclose(points, integrals, rtol=0, atol=1e-14)
+                np.testing.assert_array_equal(points, exact.tail_points(q, 8)[::2])
 
 
 def tangent_integrals(q, segments, samples):

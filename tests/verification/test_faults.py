@@ -1,60 +1,91 @@
-"""Faults of one function: each breaks a law, and the one that is there for it."""
+"""Faults of one function: each breaks a law, and each law is broken by one that is there for it."""
 
 import copy
+from dataclasses import replace
 
 import numpy as np
-import pytest
 
 import serpentail as st
 from serpentail.verification import report as verify
 from serpentail.verification import states, value_laws
-from serpentail.verification.law import fastest
+from serpentail.verification.law import fastest, rid_of
 from serpentail_codegen.functions.catalogue import CATALOGUE
-from tests.support.elastic import FUNCTIONS, elastic_model
+from tests.support import zoo
 from tests.support.faults import (
     SLIGHT_FAULT,
     TAKING_MORE,
+    alone,
     broken,
     failed,
     laws_broken,
     not_a_number,
     times,
 )
-from tests.support.models import model_folder
+from tests.support.rows import row
 from tests.verification import verify_model
 
-# Faults of one function
+NAMED = {entry.name: entry for entry in verify.LAWS}
+FREE = [entry for entry in verify.LAWS if not entry.casadi]
 
 
-@pytest.mark.parametrize("name", CATALOGUE)
-def test_every_function_that_is_slightly_wrong_breaks_a_law(having, name):
-    assert laws_broken(broken(having(name), name, times(1 + SLIGHT_FAULT)))
+def sound(entry):
+    """A sound model that a law is about."""
+    name = {"passive": "elastic", "contact": "ground"}.get(entry.only, "m1_n3")
+    return rid_of(zoo.model(name), entry.without)
 
 
-@pytest.mark.parametrize("name", CATALOGUE)
-def test_every_function_that_loses_a_number_breaks_a_law(having, name):
-    assert laws_broken(broken(having(name), name, not_a_number), 1)
+def notices(entry, name, change, count=2):
+    """Tell if a law fails where a function's result is changed."""
+    model, kept = broken(sound(entry), name, change), replace(entry, without=())
+    return not verify.check(kept, model, list(states.states(model, count))).passed
 
 
-@pytest.mark.parametrize("name", [name for name in CATALOGUE if name not in TAKING_MORE])
-def test_every_function_that_is_slightly_wrong_is_not_what_its_program_means(model, name):
-    faulty = broken(model, name, times(1 + SLIGHT_FAULT))
-    cases = list(states.states(faulty, 1))
-    assert failed(
-        verify.check(e, faulty, cases) for e in verify_model.interpreter_laws(faulty)
-    ) == {f"interpreter: {name}"}
+def test_every_slight_fault_of_a_function_breaks_the_laws_that_need_it():
+    """Unless another fault is there for the law; H scales some laws alone, and runs need others."""
+    own, seen = {law for *_, law in FAULTS} | {*FLIGHTS, PASSIVE}, set()
+    for entry in FREE:
+        with row(entry.name):
+            needs = {*entry.needs} - {"rollout"}
+            found = {name for name in needs if notices(entry, name, times(1 + SLIGHT_FAULT))}
+            assert entry.name in own or found >= (needs - {"mass_matrix"} or needs) != set()
+            seen |= found
+    assert seen == {*CATALOGUE}
 
 
-@pytest.mark.parametrize(
-    "reference", verify_model.REFERENCES[:3], ids=lambda reference: reference.title
-)
-def test_every_quantity_that_is_slightly_wrong_disagrees_with_references(model, reference):
-    for name in reference.names:
-        faulty = broken(model, name, times(1 + SLIGHT_FAULT))
-        found = failed(
-            verify_model.reference_checks(reference, faulty, list(states.states(faulty, 1)))
-        )
-        assert f"{reference.title}: {name}" in found
+def test_every_function_that_loses_a_number_breaks_a_law():
+    for name in CATALOGUE:
+        with row(name):
+            assert any(name in e.needs and notices(e, name, not_a_number, 1) for e in FREE)
+
+
+def test_every_slight_fault_is_not_what_the_program_means():
+    model = zoo.model("m1_n1")
+    laws = {entry.name: entry for entry in verify_model.interpreter_laws(model)}
+    for name in CATALOGUE:
+        if name not in TAKING_MORE:
+            with row(name):
+                faulty = broken(model, name, times(1 + SLIGHT_FAULT))
+                cases = list(states.states(faulty, 1))
+                assert not verify.check(laws[f"interpreter: {name}"], faulty, cases).passed
+
+
+def test_every_slight_fault_disagrees_with_references():
+    """Those of all functions together, too: of another animal, which obeys the laws."""
+    model = alone("m1_n3")
+    inertia = [x * (1 + SLIGHT_FAULT) for x in model.parameters["torso_inertia"]]
+    other = model.with_parameters(torso_inertia=inertia)
+    other.parameters = model.parameters
+    assert laws_broken(other) == set()
+    cases = list(states.states(model, 1))
+    for reference in verify_model.REFERENCES[:3]:
+        for name in reference.names:
+            with row(reference.title, name):
+                faulty = broken(model, name, times(1 + SLIGHT_FAULT))
+                found = failed(verify_model.reference_checks(reference, faulty, cases))
+                assert f"{reference.title}: {name}" in found
+        found = failed(verify_model.reference_checks(reference, other, cases))
+        wanted = {f"{reference.title}: {name}" for name in ("mass_matrix", "forward_dynamics")}
+        assert wanted <= found, reference.title
 
 
 def asymmetric(H, _q):
@@ -66,12 +97,6 @@ def asymmetric(H, _q):
 def indefinite(H, _q):
     """A negative moment of inertia."""
     H[..., 7, 7] *= -1
-    return H
-
-
-def lighter(H, _q):
-    """Another mass, only in the first block."""
-    H[..., 0, 0] *= 1 + SLIGHT_FAULT
     return H
 
 
@@ -119,11 +144,6 @@ def refused(_result, *_):
     raise st.StateError("refused")
 
 
-def heavier_at_height(energy, *_):
-    """Potential energy alone is wrong."""
-    return energy[0], energy[1] * (1 + SLIGHT_FAULT)
-
-
 def slower(center, *_):
     """The velocity of the centre of mass alone is wrong."""
     position, velocity, J = center
@@ -153,141 +173,95 @@ def bent(joints, *_):
     return joints
 
 
-FAULTS = {
-    "asymmetric": ("mass_matrix", asymmetric, "mass matrix is symmetric"),
-    "indefinite": ("mass_matrix", indefinite, "mass matrix is positive definite"),
-    "lighter": ("mass_matrix", lighter, "translation carries the whole mass"),
-    "placed": ("bias_force", placed, "position and speed of the torso do not matter"),
-    "tilted": ("bias_force", tilted, "pose in the world turns all alike"),
-    "tilted motion": ("forward_dynamics", tilted, "pose in the world turns all alike"),
-    "folded only": ("mass_matrix", folded_only, "kinetic energy is half v H v"),
-    "attitude": ("mass_matrix", scaled_attitude, "quaternion has no norm and no sign"),
-    "batch only": ("mass_matrix", batch_only, "batches are singles"),
-    "drifting": ("bias_force", Drifting(), "calls repeat"),
-    "not a number": (
-        "inverse_dynamics",
-        not_a_number,
-        "inverse dynamics is mass times acceleration plus bias",
-    ),
-    "refused": ("momentum", refused, "momentum is mass times velocity"),
-    "heavy center": (
-        "center_of_mass",
-        times(1 + SLIGHT_FAULT),
-        "center of mass is that of the mass matrix",
-    ),
-    "slow center": ("center_of_mass", slower, "velocity of the center of mass is J v"),
-    "light center": (
-        "center_of_mass",
-        slower,
-        "momentum is mass times velocity of the center of mass",
-    ),
-    "power": (
-        "forward_dynamics",
-        times(1 + SLIGHT_FAULT),
-        "energy changes by the power of the torques",
-    ),
-    "torques": (
-        "forward_dynamics",
-        times(1 + SLIGHT_FAULT),
-        "forward dynamics needs the torques it was given",
-    ),
-    "height": ("energy", heavier_at_height, "energy changes by the power of the torques"),
-    "stretched": ("tail_points", stretched, "links have their length"),
-    "stretched columns": ("tail_points", stretched, "jacobians are the derivatives of the points"),
-    "swapped": ("tail_point_jacobians", swapped, "jacobians are the derivatives of the points"),
-    "loads": ("forward_dynamics_external", unloaded, "loads accelerate by their generalised force"),
-    "no load": ("forward_dynamics_external", times(1 + SLIGHT_FAULT), "no load is no change"),
-    "inverse": (
-        "forward_dynamics_external",
-        times(1 + SLIGHT_FAULT),
-        "forward dynamics inverts inverse dynamics",
-    ),
-    "world mass": ("mass_matrix_world", times(1 + SLIGHT_FAULT), "mass matrix in world axes"),
-    "feet": ("leg_points", times(1 + SLIGHT_FAULT), "legs end in their feet"),
-    "knees": ("leg_points", bent, "legs have their lengths"),
-    "world bias": ("bias_force_world", times(1 + SLIGHT_FAULT), "bias force in world axes"),
+def ajar(points, *_):
+    """The velocities of the points alone are wrong."""
+    return points[0], points[1] * (1 + SLIGHT_FAULT)
+
+
+def pulling(found, *_):
+    """A ground that holds back what leaves it."""
+    return *found[:2], found[2] - [0, 0, 1e-3]
+
+
+FAULTS = [
+    ("mass_matrix", asymmetric, "mass matrix is symmetric"),
+    ("mass_matrix", indefinite, "mass matrix is positive definite"),
+    ("bias_force", placed, "position and speed of the torso do not matter"),
+    ("bias_force", tilted, "pose in the world turns all alike"),
+    ("forward_dynamics", tilted, "pose in the world turns all alike"),
+    ("mass_matrix", folded_only, "kinetic energy is half v H v"),
+    ("mass_matrix", scaled_attitude, "quaternion has no norm and no sign"),
+    ("mass_matrix", batch_only, "batches are singles"),
+    ("bias_force", Drifting(), "calls repeat"),
+    ("momentum", refused, "momentum is mass times velocity"),
+    ("center_of_mass", slower, "velocity of the center of mass is J v"),
+    ("center_of_mass", slower, "momentum is mass times velocity of the center of mass"),
+    ("tail_points", stretched, "links have their length"),
+    ("tail_points", stretched, "jacobians are the derivatives of the points"),
+    ("tail_point_jacobians", swapped, "jacobians are the derivatives of the points"),
+    ("forward_dynamics_external", unloaded, "loads accelerate by their generalised force"),
+    ("leg_points", bent, "legs have their lengths"),
+    ("contact_points", ajar, "velocities are the rates of the points"),
+    ("contact_dynamics", pulling, "the ground never pulls nor holds by more than friction"),
+]
+
+
+def test_faults_break_the_law_that_is_there_for_them():
+    for name, change, law in FAULTS:
+        with row(law, name):
+            assert notices(NAMED[law], name, change)
+
+
+FLIGHTS = {
+    "energy is constant in flight": {"controller": st.Damping(1e-9)},
+    "momentum is constant in flight": {"gravity": 9.8 * (1 + 1e-8)},
+    "center of mass flies a parabola": {"gravity": 9.8 * (1 + 1e-8)},
 }
+PASSIVE = "passive tails change energy by their damping alone"
 
 
-@pytest.mark.parametrize("fault", FAULTS)
-def test_faults_break_the_law_that_is_there_for_them(having, fault):
-    name, change, expected = FAULTS[fault]
-    assert expected in laws_broken(broken(having(name), name, change))
+def test_faults_of_flight_break_the_laws_of_flight(monkeypatch):
+    for law, changes in FLIGHTS.items():
 
+        def flight(model, s, changes=changes):
+            flown = model.with_parameters(gravity=changes.get("gravity", 9.8))
+            v, controller = 10 / fastest(model, s.v) * s.v, changes.get("controller")
+            return st.simulate(flown, s.q, v, controller=controller, t_span=0.2)
 
-@pytest.mark.parametrize(
-    ("law", "changes"),
-    [
-        ("energy is constant in flight", {"controller": st.Damping(1e-9)}),
-        ("momentum is constant in flight", {"gravity": 9.8 * (1 + 1e-8)}),
-        ("center of mass flies a parabola", {"gravity": 9.8 * (1 + 1e-8)}),
-    ],
-    ids=["damped", "heavy momentum", "heavy fall"],
-)
-def test_faults_of_flight_break_the_laws_of_flight(model, monkeypatch, law, changes):
-    def flight(model, s):
-        flown = model.with_parameters(gravity=changes.get("gravity", 9.8))
-        v, controller = 10 / fastest(model, s.v) * s.v, changes.get("controller")
-        return st.simulate(flown, s.q, v, controller=controller, t_span=0.2)
-
-    monkeypatch.setattr("serpentail.verification.value_laws.flight", flight)
-    assert law in laws_broken(model)
+        monkeypatch.setattr("serpentail.verification.value_laws.flight", flight)
+        with row(law):
+            assert notices(NAMED[law], "energy", lambda result, *_: result)
 
 
 def test_faults_of_a_tail_with_stops_break_its_law_of_flight(monkeypatch):
     """Energy of springs and stops that is off by 1e-4, momentum, and a slightly heavier fall."""
-    sound = elastic_model(2, 3, functions=FUNCTIONS)
-    name = "passive tails change energy by their damping alone"
-    (law,) = (law for law in verify.LAWS if law.name == name)
-    cases = list(states.states(sound))[::4]
 
     def stored(result, *_):
         kinetic, potential = result
         return kinetic, potential * (1 + 1e-4)
 
-    for name, change in ((None, None), ("energy", stored), ("momentum", times(1 + 1e-4))):
-        model = broken(sound, name, change) if name else sound
-        assert verify.check(law, model, cases).passed == (name is None)
-
     def flight(model, s, **settings):
         return value_laws.flight(model.with_parameters(gravity=9.8 * (1 + 1e-4)), s, **settings)
 
+    for name, change in (("energy", stored), ("momentum", times(1 + 1e-4))):
+        with row(name):
+            assert notices(NAMED[PASSIVE], name, change)
     monkeypatch.setattr("serpentail.verification.passive_laws.flight", flight)
-    assert not verify.check(law, sound, cases).passed
+    assert notices(NAMED[PASSIVE], "energy", lambda result, *_: result)
 
 
-def test_casadi_functions_that_are_slightly_wrong_fail(model):
+def test_casadi_functions_that_are_slightly_wrong_fail():
+    model = alone("m1_n1")
     heavier = model.with_parameters(torso_mass=model.parameters["torso_mass"] * (1 + SLIGHT_FAULT))
     faulty = copy.copy(model)
     faulty.__dict__["casadi"] = heavier.casadi
-    assert failed(verify.laws(faulty)) == {
-        "casadi functions agree",
-        "casadi externals are the compiled code",
-    }
-
-
-# Faults that all functions share
-
-
-def test_another_animal_obeys_the_laws_and_only_references_notice(model):
-    other = model.with_parameters(
-        torso_inertia=[x * (1 + SLIGHT_FAULT) for x in model.parameters["torso_inertia"]]
-    )
-    other.parameters = model.parameters
-    assert laws_broken(other) == set()
-    for reference in verify_model.REFERENCES[:3]:
-        found = failed(
-            verify_model.reference_checks(reference, other, list(states.states(other, 1)))
-        )
-        assert f"{reference.title}: mass_matrix" in found
-        assert f"{reference.title}: forward_dynamics" in found
+    laws = {"casadi functions agree", "casadi externals are the compiled code"}
+    assert failed(verify.laws(faulty)) == laws == {e.name for e in verify.LAWS if e.casadi}
 
 
 def test_halves_of_segments_that_differ_from_wholes_fail(tmp_path):
-    whole = st.load(model_folder(1, 2))
+    whole = zoo.model("m2_n2")
     other = whole.with_parameters(tail_mass=whole.parameters["tail_mass"] * (1 + SLIGHT_FAULT))
-    check = verify_model.split_check(other, list(states.states(other, 1)), tmp_path)
-    assert check.status == "failed"
-    assert (
-        verify_model.split_check(whole, list(states.states(whole, 1)), tmp_path).status == "passed"
-    )
+    cases = list(states.states(whole, 1))
+    for model, status in ((other, "failed"), (whole, "passed")):
+        assert verify_model.split_check(model, cases, tmp_path / status).status == status

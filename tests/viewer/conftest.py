@@ -9,12 +9,11 @@ import pytest
 import serpentail as st
 from serpentail.scenes.simulate import scenario
 from serpentail_codegen.scene.parse import load_scene
-from tests.support import page
-from tests.support.models import folder_of, model_folder
+from tests.support import page, zoo
+from tests.support.models import folder_of
 from tests.support.scenes import SCENES
 
-MEASURES = ("kinetic", "potential", "linear_momentum", "angular_momentum")
-SHOWN = ["energy", "momentum", "rollout", "tail_points", "center_of_mass"]
+ARRAYS = ("t", "q", "v", "tau", "kinetic", "potential", "linear_momentum", "angular_momentum")
 
 
 @pytest.fixture(autouse=True)
@@ -45,11 +44,6 @@ def kick():
     return simulated("kick")
 
 
-@cache
-def model_of(segments, links, functions=(*SHOWN,)):
-    return st.load(model_folder(segments, links, functions=[*functions]))
-
-
 def flown(model, samples=41, spin=9.0):
     """A tumble of a model."""
     q = np.concatenate([[0, 0, 0.5, 1, 0, 0, 0], 0.3 * np.cos(np.arange(model.layout.nt))])
@@ -61,12 +55,24 @@ def flown(model, samples=41, spin=9.0):
 @pytest.fixture
 def flight():
     """41 samples of a flight of a continuum tail."""
-    return flown(model_of(2, None))
+    return flown(zoo.model("arcs2"))
+
+
+def silent():
+    """A motion of a model that lacks ``tail_points``."""
+    return dataclasses.replace(flown(zoo.model("m1_n1")), model=zoo.model("bare"))
+
+
+@cache
+def plan():
+    """A plan that straightens a tail while the torso turns as it likes."""
+    q = np.array([0, 0, 0, 1, 0, 0, 0, 0.4, 0])
+    goal = st.Goal(attitude=None, tail=(0.0, 0.0))
+    settings = {"duration": 0.2, "tolerance": None, "intervals": 4, "rounds": 0}
+    return st.plan(zoo.model("m1_n3"), start=(q, np.zeros(8)), goal=goal, **settings)
 
 
 @pytest.fixture
 def single(flight):
     """Its first sample alone."""
-    return dataclasses.replace(
-        flight, **{n: getattr(flight, n)[:1] for n in ("t", "q", "v", "tau", *MEASURES)}
-    )
+    return dataclasses.replace(flight, **{n: getattr(flight, n)[:1] for n in ARRAYS})

@@ -1,4 +1,6 @@
-"""The page in a real browser: it needs nothing else, seeks, switches, obeys keys, fits a phone."""
+"""The page in a real browser, also in a notebook: it needs nothing else, seeks, switches, obeys
+keys, fits a phone.
+"""
 
 import dataclasses
 import time
@@ -7,18 +9,21 @@ from io import BytesIO
 import numpy as np
 import pytest
 from PIL import Image
+
+import serpentail as st
+from tests.support.page import need
+
+from .conftest import simulated
+
+pytest.importorskip("selenium")
 from selenium.webdriver import ActionChains
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import WebDriverWait
 
-import serpentail as st
-from benchmarks.pages import FRAMES
 from tests.support import chromium
-from tests.support.chromium import opened, processor_seconds, requests
-from tests.support.page import need
+from tests.support.chromium import opened, requests
 
-from .conftest import flown, model_of, simulated
-
+pytestmark = pytest.mark.slow  # Chromium is no part of a newcomer's installation
 PHONE = (375, 740)
 SETTLED = 0.1  # s, for what is drawn when a frame comes
 
@@ -63,23 +68,20 @@ def value(driver):
     return float(driver.execute_script("return document.getElementById('time').value"))
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("size", [(1280, 800), PHONE])
-def test_it_needs_nothing_else_and_complains_of_nothing(browser, pages, size, scheme):
+def test_it_needs_nothing_else_and_complains_of_nothing(browser, pages):
     for page in pages.values():
-        driver = opened(browser, page, size, scheme)
-        seek(driver, 0.5)
-        picture(driver)
-        assert requests(driver) == [page.as_uri()]
-        assert driver.get_log("browser") == []
-        sizes = driver.execute_script(
-            "const e = document.documentElement; return [e.scrollWidth, e.clientWidth]"
-        )
-        assert sizes[0] <= sizes[1]
-
-
-def test_it_may_not_fetch(browser, pages):
-    driver = opened(browser, pages["kick"])
+        shades = set()
+        for size, scheme in (((1280, 800), "light"), ((1280, 800), "dark"), (PHONE, "dark")):
+            driver = opened(browser, page, size, scheme)
+            seek(driver, 0.5)
+            shades.add(picture(driver))
+            assert requests(driver) == [page.as_uri()]
+            assert driver.get_log("browser") == []
+            sizes = driver.execute_script(
+                "const e = document.documentElement; return [e.scrollWidth, e.clientWidth]"
+            )
+            assert sizes[0] <= sizes[1]
+        assert len(shades) == 3
     script = "fetch('data:,x').then(() => arguments[0]('got it'), () => arguments[0]('refused'))"
     assert driver.execute_async_script(script) == "refused"
 
@@ -95,15 +97,6 @@ def test_seeking_changes_picture_and_numbers(browser, pages):
     for t, end in ((-1, 0.0), (99, 1.2)):
         seek(driver, t)
         assert value(driver) == end
-
-
-def test_dark_is_another_picture(browser, pages):
-    shades = [picture(opened(browser, pages["kick"], scheme=s)) for s in ("light", "dark")]
-    assert shades[0] != shades[1]
-
-
-def test_a_click_on_a_plot_seeks(browser, pages):
-    driver = opened(browser, pages["kick"])
     plot = driver.find_element("css selector", ".u-over")
     quarter = plot.size["width"] // 4
     ActionChains(driver).move_to_element_with_offset(plot, quarter, 5).click().perform()
@@ -124,9 +117,8 @@ def test_runs_switch_on_and_off(browser, pages):
     press(driver, "1", "2")
     assert not any(box.is_selected() for box in boxes)
 
-
-def test_where_runs_are_in_one_place_the_first_is_seen(browser, pages):
-    driver = opened(browser, pages["two"])
+    # where runs are in one place, the first is seen
+    press(driver, "1", "2")
     seek(driver, 0.0)
     both = picture(driver)
     press(driver, "2")
@@ -136,6 +128,14 @@ def test_where_runs_are_in_one_place_the_first_is_seen(browser, pages):
     )
     other = np.abs(first - second).max(axis=2) > 40
     assert other.mean() < 0.005  # the path of the other's centre of mass
+    unnamed = """
+      const named = (each) => each.getAttribute("aria-label") || each.closest("label")
+        || each.textContent.trim();
+      const controls = document.querySelectorAll("button, select, input, canvas[tabindex]");
+      return [...controls].filter((each) => each.tabIndex < 0 || !named(each))
+        .map((each) => each.outerHTML);"""
+    assert driver.execute_script(unnamed) == []
+    assert "whole: tail: " in text(driver, "warnings")
 
 
 def test_keys(browser, pages, kick):
@@ -159,9 +159,8 @@ def test_keys(browser, pages, kick):
     press(driver, begin, Keys.ARROW_RIGHT, on="#time")
     assert value(driver) == pytest.approx(0.001, abs=1e-6)
 
-
-def test_space_plays_and_pauses(browser, pages):
-    driver = opened(browser, pages["kick"])
+    # space plays and pauses
+    press(driver, Keys.HOME)
     press(driver, " ")
     assert text(driver, "play") == "Pause"
     WebDriverWait(driver, 60).until(value)  # some time has passed
@@ -175,36 +174,13 @@ def test_space_plays_and_pauses(browser, pages):
     assert text(driver, "play") == "Pause"
 
 
-@pytest.mark.slow
-def test_two_cores_play_40_bodies_at_15_frames_a_second(browser, tmp_path):
-    """By processor time, which other work on the machine hardly changes."""
-    path = flown(model_of(4, 10), samples=600).view(tmp_path / "long.html")
-    driver = opened(browser, path)
-    begun = processor_seconds(driver)
-    frames = 3.0 * driver.execute_async_script(FRAMES, 3.0)
-    assert text(driver, "play") == "Pause" and 0 < value(driver) < 0.2
-    assert frames > 3 and (processor_seconds(driver) - begun) / frames < 2 / 15
-
-
-def test_controls_are_focusable_and_named(browser, pages):
-    driver = opened(browser, pages["two"])
-    unnamed = """
-      const named = (each) => each.getAttribute("aria-label") || each.closest("label")
-        || each.textContent.trim();
-      const controls = document.querySelectorAll("button, select, input, canvas[tabindex]");
-      return [...controls].filter((each) => each.tabIndex < 0 || !named(each))
-        .map((each) => each.outerHTML);"""
-    assert driver.execute_script(unnamed) == []
-
-
-@pytest.mark.parametrize("kind", ["continuum", "single"])
-def test_other_motions_open(browser, tmp_path, kind, flight, single):
-    page = (single if kind == "single" else flight).view(tmp_path / "run.html")
-    driver = opened(browser, page)
-    seek(driver, 0.1)
-    press(driver, " ", "n", "f", "r", "+", "-")
-    assert driver.get_log("browser") == []
-    assert text(driver, "play") == ("Play" if kind == "single" else "Pause")
+def test_other_motions_open(browser, tmp_path, flight, single):
+    for motion, end in ((flight, "Pause"), (single, "Play")):
+        driver = opened(browser, motion.view(tmp_path / "run.html"))
+        seek(driver, 0.1)
+        press(driver, " ", "n", "f", "r", "+", "-")
+        assert driver.get_log("browser") == []
+        assert text(driver, "play") == end
 
 
 def test_without_webgl_all_but_the_animal_is_there(pages):
@@ -217,19 +193,14 @@ def test_without_webgl_all_but_the_animal_is_there(pages):
         assert value(driver) == pytest.approx(1.2) and text(driver, "plots") != before
 
 
-def test_warnings_open_by_a_click_and_leave_plots_in_sight(browser, pages, kick):
+def test_warnings_open_by_a_click_and_licences_are_there(browser, pages, kick):
     driver = opened(browser, pages["kick"], (1280, 800))
     box = driver.find_element("id", "warnings")
     assert box.text == "5 warnings"
     assert driver.find_element("css selector", ".u-over").rect["y"] < 800 - 100
     box.find_element("css selector", "summary").click()
     assert all(each in box.text for each in kick.warnings)
-    opened(browser, pages["two"])
-    assert "whole: tail: " in text(browser, "warnings")
-
-
-def test_the_licences_are_in_it(browser, pages):
-    said = text(opened(browser, pages["kick"]), "panel")
+    said = text(driver, "panel")
     assert said.count("MIT License") == 2 and "three.js authors" in said and "Leon Sorokin" in said
 
 
@@ -269,3 +240,27 @@ def test_the_axes_of_a_motion_at_rest_do_not_show_rounding(browser, tmp_path):
     height, tilt = (sorted(map(float, each)) for each in drawn[:2])
     assert len(height) > 1 and 0.4e-3 < np.ptp(height) < 3e-3 and height[0] < 0.109 < height[-1]
     assert len(tilt) > 1 and 0.04 < np.ptp(tilt) < 0.3
+
+
+def test_an_output_of_a_notebook_runs_and_fetches_nothing(browser, kick, tmp_path):
+    """A page with two outputs, as a notebook has them."""
+    notebook = tmp_path / "notebook.html"
+    body = f"<p>A motion</p>{kick._repr_html_()}<p>again</p>{kick._repr_html_()}"
+    text = f'<!doctype html><meta charset="utf-8"><body>{body}</body>'
+    notebook.write_text(text, encoding="utf-8")
+    done = "return window.serpentail && (serpentail.ready || serpentail.error)"
+    driver = browser
+    driver.get_log("performance")
+    driver.get(notebook.as_uri())
+    for frame in driver.find_elements("css selector", "iframe"):
+        driver.switch_to.frame(frame)
+        WebDriverWait(driver, 60).until(lambda browser: browser.execute_script(done))
+        assert driver.execute_script("return serpentail.error") is None
+        driver.execute_script("serpentail.seek(0.6)")
+        time = driver.execute_script("return Number(document.getElementById('time').value)")
+        assert time == pytest.approx(0.6, abs=0.003)
+        assert driver.execute_script("return origin") == "null"
+        driver.switch_to.default_content()
+    assert driver.get_log("browser") == []
+    ours = (notebook.as_uri(), "about:srcdoc")
+    assert [each for each in requests(driver) if each not in ours] == []

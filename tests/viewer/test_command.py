@@ -41,15 +41,16 @@ def test_a_simulation_that_fails_has_a_page_up_to_there(run):
     status, out, err = run("simulate", KICK, "--view", "kick.html", *few)
     assert (status, out) == (2, "") and "t = " in err
     data = data_of(Path("kick.html"))
-    assert data["notes"][0] == f"the run failed, and ends here: {err.strip()}"
+    assert data["notes"][0].endswith(err.strip())
     assert 1 < data["runs"][0]["rows"] < 1201
 
 
-@pytest.mark.parametrize("verb, scene", [("simulate", KICK), ("plan", "righting_m1_n3.toml")])
-def test_a_wrong_name_is_refused_before_the_work(run, verb, scene):
-    status, out, err = run(verb, str(SCENES / scene), "--view", "kick.htm", "--save", "kick.npz")
-    assert (status, out) == (2, "") and "needs a file whose name ends in .html" in err
-    assert not list(Path().iterdir())
+def test_a_wrong_name_is_refused_before_the_work(run):
+    for verb, scene in (("simulate", "kick"), ("plan", "righting_m1_n3")):
+        words = (verb, str(SCENES / f"{scene}.toml"), "--view", "kick.htm", "--save", "kick.npz")
+        status, out, err = run(*words)
+        assert (status, out) == (2, "") and "kick.htm" in err and ".html" in err
+        assert not list(Path().iterdir())
 
 
 def test_saved_motions_find_their_model(run):
@@ -70,8 +71,8 @@ def test_saved_motions_whose_model_is_elsewhere(run, tmp_path, monkeypatch):
     assert run("simulate", KICK, "--save", "kick.npz", *arguments)[0] == 0
     monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path / "cache"))
     status, out, err = run("view", "kick.npz")
-    assert (status, out) == (2, "")
-    assert "of 'kick' is neither in the cache nor in generated/kick: give its" in err
+    assert (status, out) == (2, "") and "generated/kick" in err
+    assert "'kick'" in err and "--folder" in err
     assert run("view", "kick.npz", "--folder", str(made))[0] == 0
     monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path / "empty"))
     Path("generated").mkdir()
@@ -85,8 +86,8 @@ def test_saved_motions_whose_model_is_elsewhere(run, tmp_path, monkeypatch):
     assert run("view", "kick.npz")[0] == 2
 
 
-@pytest.mark.parametrize("name, words", [("none.npz", "no trajectory"), ("bad.npz", "damaged")])
-def test_files_that_are_no_motions(run, name, words):
+def test_files_that_are_no_motions(run):
     Path("bad.npz").write_text("bad")
-    status, out, err = run("view", name)
-    assert (status, out) == (2, "") and f"file: value {name!r}" in err and words in err
+    for name, words in (("none.npz", "no trajectory"), ("bad.npz", "damaged")):
+        status, out, err = run("view", name)
+        assert (status, out) == (2, "") and f"file: value {name!r}" in err and words in err

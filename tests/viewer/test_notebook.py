@@ -5,17 +5,13 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from selenium.webdriver.support.ui import WebDriverWait
 
 import serpentail as st
 from serpentail.viewer import view as viewer
-from tests.support import chromium
-from tests.support.chromium import requests
-from tests.support.page import data_of, need
+from tests.support import zoo
+from tests.support.page import data_of
 
-from .conftest import flown, model_of
-
-PLANNED = ["energy", "momentum", "rollout", "tail_points", "mass_matrix", "inverse_dynamics"]
+from .conftest import flown, plan, silent
 
 
 class Output(HTMLParser):
@@ -45,30 +41,21 @@ def shown(thing, tmp_path):
 
 
 def test_a_motion_is_shown_with_its_text(kick, tmp_path):
+    """Up to 601 samples whole, such as 0.6 s at 1 kHz; of more every second one."""
     data, words = shown(kick, tmp_path)
     assert words == repr(kick)
     (run,) = data["runs"]
-    assert run["rows"] == 601  # every second of 1201
-    assert run["arrays"]["pose"][-1] == pytest.approx(kick.q[-1, :7], rel=1e-6)
-    assert any("one of 2 samples is shown" in note for note in data["notes"])
-
-
-def test_a_motion_of_601_samples_is_shown_whole(tmp_path):
-    """0.6 s at 1 kHz; of one sample more, every second one is shown."""
-    model = model_of(1, 2)
-    (run,) = shown(flown(model, samples=601), tmp_path)[0]["runs"]
     assert run["rows"] == 601
-    (run,) = shown(flown(model, samples=602), tmp_path)[0]["runs"]
-    assert run["rows"] == 302
+    assert run["arrays"]["pose"][-1] == pytest.approx(kick.q[-1, :7], rel=1e-6)
+    assert any("one of 2 samples" in note for note in data["notes"])
+    for samples, rows in ((601, 601), (602, 302)):
+        (run,) = shown(flown(zoo.model("m1_n3"), samples), tmp_path)[0]["runs"]
+        assert run["rows"] == rows
 
 
-def test_the_frame_is_the_page_itself(flight, tmp_path):
-    page = flight.view(tmp_path / "run.html").read_text(encoding="utf-8")
-    assert Output(flight._repr_html_()).frame["srcdoc"] == page
-
-
-def test_the_frame_may_run_scripts_and_nothing_else(flight):
+def test_the_frame_is_the_page_itself_and_may_run_scripts_and_nothing_else(flight, tmp_path):
     frame = Output(flight._repr_html_()).frame
+    assert frame["srcdoc"] == flight.view(tmp_path / "run.html").read_text(encoding="utf-8")
     assert frame["sandbox"] == "allow-scripts" and int(frame["height"]) > 400 and frame["title"]
 
 
@@ -80,7 +67,7 @@ def test_many_runs_show_the_first_that_began(tmp_path):
 
     q = np.tile([0, 0, 0.5, 1, 0, 0, 0, 0.1, 0, 0, 0], (6, 1))
     q[1, 2] = 2
-    runs = st.simulate(model_of(2, None), q, np.zeros(10), controller=tired, t_span=0.02)
+    runs = st.simulate(zoo.model("arcs2"), q, np.zeros(10), controller=tired, t_span=0.02)
     data, words = shown(runs, tmp_path)
     assert words == repr(runs) and "1 failed, the first run 1" in words
     assert [run["name"] for run in data["runs"]] == ["run 0", "run 1", "run 2"]
@@ -89,15 +76,12 @@ def test_many_runs_show_the_first_that_began(tmp_path):
 
 
 def test_a_plan_shows_what_it_does_in_truth(tmp_path):
-    model = model_of(1, 3, (*PLANNED,))
-    start = np.array([0, 0, 0, 1, 0.1, 0, 0, 0, 0]), np.zeros(8)
-    free = st.Goal(attitude=None, torso_rate=None)
-    plan = st.plan(model, start=start, goal=free, duration=0.1, tolerance=None, intervals=4)
-    data, words = shown(plan, tmp_path)
-    assert words == repr(plan)
+    data, words = shown(plan(), tmp_path)
+    assert words == repr(plan())
     assert [run["name"] for run in data["runs"]] == ["planned", "true", "passive"]
-    without = dataclasses.replace(plan, trajectory=dataclasses.replace(plan.trajectory, model=None))
-    assert "which has no model" in Output(without._repr_html_()).words
+    lost = dataclasses.replace(plan().trajectory, model=None)
+    without = dataclasses.replace(plan(), trajectory=lost)
+    assert "no model" in Output(without._repr_html_()).words
 
 
 def test_several_motions_are_shown_without_a_file(flight, kick, tmp_path, monkeypatch):
@@ -108,52 +92,19 @@ def test_several_motions_are_shown_without_a_file(flight, kick, tmp_path, monkey
     page = st.view([flight, flight], "both.html", names=["one", "other"])
     assert output.frame["srcdoc"] == page.read_text(encoding="utf-8")
     assert output.frame["sandbox"] == "allow-scripts"
-    short = tmp_path / "short.html"
-    short.write_text(Output(st.view(kick, None)._repr_html_()).frame["srcdoc"], encoding="utf-8")
-    assert [run["rows"] for run in data_of(short)["runs"]] == [601]  # every second of 1201
+    assert shown(st.view(kick, None), tmp_path)[0]["runs"][0]["rows"] == 601
     with pytest.raises(st.ViewError, match="names"):
         st.view([flight, flight], None, names=["one"])
 
 
 def test_without_a_page_a_line_says_why(flight, monkeypatch, tmp_path):
     loaded = st.Trajectory.load(flight.save(tmp_path / "flight.npz"))
-    silent = flown(model_of(1, 2, ("energy", "momentum", "rollout")))
-    for motion, words in [
-        (loaded, "which has no model"),
-        (silent, "without &#x27;tail_points&#x27;"),
-    ]:
+    for motion, words in ((loaded, "has no model"), (silent(), "without &#x27;tail_points&#x27;")):
         html = motion._repr_html_()
         assert Output(html).frame is None and words in html
         assert Output(html).words.startswith(repr(motion))
+    for info in ({"events": 3, "warnings": {"a": 1}}, {"method": None}, {}):
+        motion = dataclasses.replace(flight, info=info, model=None)
+        assert Output(motion._repr_html_()).words.startswith("<Trajectory of a tail")
     monkeypatch.setattr(viewer, "PAGE", tmp_path / "none.html")
-    assert "the page was not built" in Output(flight._repr_html_()).words
-
-
-@pytest.mark.parametrize("info", [{"events": 3, "warnings": {"a": 1}}, {"method": None}, {}])
-def test_whatever_a_motion_says_of_itself(flight, info):
-    motion = dataclasses.replace(flight, info=info, model=None)
-    assert Output(motion._repr_html_()).words.startswith("<Trajectory of a tail")
-
-
-def test_it_runs_in_a_browser_and_fetches_nothing(kick, tmp_path):
-    """A page with two outputs, as a notebook has them."""
-    need(chromium.need_chromium)
-    notebook = tmp_path / "notebook.html"
-    body = f"<p>A motion</p>{kick._repr_html_()}<p>again</p>{kick._repr_html_()}"
-    text = f'<!doctype html><meta charset="utf-8"><body>{body}</body>'
-    notebook.write_text(text, encoding="utf-8")
-    done = "return window.serpentail && (serpentail.ready || serpentail.error)"
-    with chromium.chromium() as driver:
-        driver.get(notebook.as_uri())
-        for frame in driver.find_elements("css selector", "iframe"):
-            driver.switch_to.frame(frame)
-            WebDriverWait(driver, 60).until(lambda browser: browser.execute_script(done))
-            assert driver.execute_script("return serpentail.error") is None
-            driver.execute_script("serpentail.seek(0.6)")
-            time = driver.execute_script("return Number(document.getElementById('time').value)")
-            assert time == pytest.approx(0.6, abs=0.003)
-            assert driver.execute_script("return origin") == "null"
-            driver.switch_to.default_content()
-        assert driver.get_log("browser") == []
-        ours = (notebook.as_uri(), "about:srcdoc")
-        assert [each for each in requests(driver) if each not in ours] == []
+    assert "not built" in Output(flight._repr_html_()).words

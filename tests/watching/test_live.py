@@ -2,28 +2,17 @@
 
 import socket
 import sys
-from functools import cache
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from selenium.webdriver.support.ui import WebDriverWait
 
 import serpentail as st
 from serpentail.watching.poses import from_z, rods
-from tests.support import chromium
-from tests.support.models import model_folder
-from tests.support.page import need
-from tests.support.tumbling import planned
+from tests.support import zoo
 
-WANTED = ["energy", "momentum", "rollout", "implicit", "tail_points", "leg_points"]
 LEGS = st.Legs.fixed(3.6, -0.3)
 START = [0, 0, 0.06, 1, 0, 0, 0, 0.1, 0]
-
-
-@cache
-def rat():
-    return st.load(model_folder(1, 3, contacts=["feet"], functions=WANTED))
 
 
 def free_port():
@@ -32,14 +21,21 @@ def free_port():
         return listener.getsockname()[1]
 
 
+def served(name):
+    pytest.importorskip("viser")
+    return st.live(zoo.model(name), port=free_port())
+
+
 @pytest.fixture
 def view():
-    with st.live(rat(), port=free_port()) as opened:
+    with served("feet") as opened:
         yield opened
 
 
 def dropped(**settings):
-    return st.simulate(rat(), START, np.zeros(8), legs=LEGS, t_span=0.1, rtol=1e-6, **settings)
+    return st.simulate(
+        zoo.model("feet"), START, np.zeros(8), legs=LEGS, t_span=0.1, rtol=1e-6, **settings
+    )
 
 
 def ends(node):
@@ -55,11 +51,11 @@ def assert_at(view, q, legs):
     np.testing.assert_allclose(view.nodes["back"].batched_positions[0], q[:3], **close)
     np.testing.assert_allclose(view.nodes["back"].batched_wxyzs[0], q[3:7], **close)
     begins, tips = ends(view.nodes["tail"])
-    points = rat().tail_points(q)
+    points = zoo.model("feet").tail_points(q)
     np.testing.assert_allclose(begins, points[:-1], **close)
     np.testing.assert_allclose(tips, points[1:], **close)
     begins, tips = ends(view.nodes["legs"])
-    joints = rat().leg_points(q, legs)
+    joints = zoo.model("feet").leg_points(q, legs)
     np.testing.assert_allclose(begins.reshape(2, 5, 3), joints[:, :-1], **close)
     np.testing.assert_allclose(tips.reshape(2, 5, 3), joints[:, 1:], **close)
 
@@ -89,7 +85,7 @@ def test_it_moves_and_keeps_its_nodes(view):
 
 def test_head_and_belly_tell_the_sides_apart(view):
     q = np.array([0, 0, 1, 0, 1.0, 0, 0, 0, 0])  # upside down: half a turn about x
-    still = st.simulate(rat(), q, np.zeros(8), legs=LEGS, t_span=1e-4, method="rk4")
+    still = st.simulate(zoo.model("feet"), q, np.zeros(8), legs=LEGS, t_span=1e-4, method="rk4")
     view(still.resample(still.t[:1]))
     back, belly, head = (
         view.nodes[name].batched_positions[0] for name in ("back", "belly", "head")
@@ -97,17 +93,22 @@ def test_head_and_belly_tell_the_sides_apart(view):
     assert belly[2] > back[2] and head[1] < back[1] - 0.5 * view.nodes["back"].batched_scales[0, 1]
 
 
-def test_a_plan_is_shown_at_nine_moments():
-    plan = planned()
-    with st.live(plan.trajectory.model, port=free_port()) as view:
-        view(plan)
-        assert "Plan of" in view.text.content and "legs" not in view.nodes
-        places = view.nodes["back"].batched_positions
+def test_a_plan_is_shown_at_nine_moments_without_legs_or_ground(view):
+    q, v = np.r_[0, 0, 0.3, 1, 0.2, [0] * 4], np.r_[0, 0, 1, 1, [0] * 4]
+    rough = {"intervals": 4, "tolerance": None, "solver": "fatrop", "track": False}
+    limits = {"duration": 0.2, "bounds": st.Bounds(angle=1.0)}
+    plan = st.plan(zoo.model("m1_n3"), start=(q, v), **limits, **rough)
+    with served("m1_n3") as alone:
+        alone(plan)
+        assert "Plan of" in alone.text.content and "legs" not in alone.nodes
+        places = alone.nodes["back"].batched_positions
         rows = np.linspace(0, len(plan.trajectory.t) - 1, 9).round().astype(int)
         np.testing.assert_allclose(places, plan.trajectory.q[rows, :3], atol=1e-6)
-        assert len(view.nodes["tail"].batched_positions) == 9 * 3
-        view(plan.trajectory)  # other copies of the same parts
-        assert len(view.nodes["tail"].batched_positions) == 3
+        assert len(alone.nodes["tail"].batched_positions) == 9 * 3
+        alone(plan.trajectory)  # other copies of the same parts
+        assert len(alone.nodes["tail"].batched_positions) == 3
+        grounds = [each.server.scene.get_handle_by_name("/ground") for each in (alone, view)]
+        assert grounds[0] is None and grounds[1] is not None
 
 
 def test_rods_lie_between_their_points():
@@ -123,34 +124,30 @@ def test_rods_lie_between_their_points():
     assert from_z(np.array([[0, 0, -1.0]])).tolist() == [[0, 1, 0, 0]]
 
 
-def test_it_says_where_it_is(view):
+def test_what_is_no_motion_of_the_model_is_refused(view):
+    other = st.simulate(zoo.model("m2_n2"), [0, 0, 0, 1, *[0] * 7], np.zeros(10), t_span=0.01)
+    for news in (3, None, "run", other):
+        with pytest.raises(st.ViewError, match=r"news: value .*Trajectory or a Plan.* q has 9"):
+            view(news)
+    assert repr(view) == f"<serpentail live view of feet at {view.url}>"
     assert view.url.startswith("http://127.0.0.1:")
-    assert repr(view) == f"<serpentail live view of {rat().name} at {view.url}>"
-
-
-@pytest.mark.parametrize("news", [3, None, "run"])
-def test_what_is_no_motion_is_refused(view, news):
-    with pytest.raises(st.ViewError, match=r"news: value .*: needs a Trajectory or a Plan"):
-        view(news)
-
-
-def test_a_motion_of_another_tail_is_refused(view):
-    other = st.load(model_folder(2, 1, functions=["energy", "momentum", "rollout"]))
-    motion = st.simulate(other, [0, 0, 0, 1, *[0] * 7], np.zeros(10), t_span=0.01)
-    with pytest.raises(st.ViewError, match="whose q has 9"):
-        view(motion)
 
 
 def test_what_is_missing_is_named_before_anything_is_served(monkeypatch):
-    silent = st.load(model_folder(1, 1, functions=["energy"]))
     with pytest.raises(st.ModelError, match="without 'tail_points'"):
-        st.live(silent)
+        st.live(zoo.model("bare"))
     monkeypatch.setitem(sys.modules, "viser", None)
     with pytest.raises(st.ExtraMissing, match=r'pip install "serpentail\[live\]"'):
-        st.live(rat())
+        st.live(zoo.model("feet"))
 
 
 def test_a_browser_sees_it_and_the_terminal_does_not_tell_of_it(view, capfd):
+    pytest.importorskip("selenium")
+    from selenium.webdriver.support.ui import WebDriverWait
+
+    from tests.support import chromium
+    from tests.support.page import need
+
     need(chromium.need_chromium)
     with chromium.chromium() as driver:
         driver.get(view.url)
@@ -159,12 +156,5 @@ def test_a_browser_sees_it_and_the_terminal_does_not_tell_of_it(view, capfd):
         seen = WebDriverWait(driver, 60).until(
             lambda browser: "t = 0.1000 s" in browser.execute_script(words)
         )
-        assert seen and rat().name in driver.execute_script(words)
+        assert seen and "feet" in driver.execute_script(words)
     assert "Connection" not in "".join(capfd.readouterr())
-
-
-def test_a_model_that_can_touch_the_ground_stands_on_it(view):
-    assert view.server.scene.get_handle_by_name("/ground") is not None
-    flier = st.load(model_folder(1, 2, functions=["tail_points"]))
-    with st.live(flier, port=free_port()) as alone:
-        assert alone.server.scene.get_handle_by_name("/ground") is None

@@ -1,30 +1,10 @@
-"""Models that touch the ground, and states of them in which all points press, some, or none."""
-
-from functools import cache
+"""States on the ground in which all points press, some, or none."""
 
 import numpy as np
 
-import serpentail as st
-
-from ...support.models import model_folder
-from .tails import GROUND
-
-ARGUMENTS = {
-    "contact_points": ("q", "v", "legs"),
-    "leg_points": ("q", "angles"),
-    "contact_dynamics": ("q", "v", "tau", "bristles", "legs"),
-}
 CONTACTS = ["feet", "tail", "torso"]
 UPRIGHT, LEGS = [1, 0, 0, 0], [3.66, -0.26, 3.66, -0.26, 0, 0, 0, 0]
 TOUCHING = ("all", "some", "none")
-
-
-@cache
-def model(kind="articulated", segments=2, links=2, profile="fast", **options):
-    """A model with all functions of contact that have batches."""
-    options = {"contacts": CONTACTS, "functions": list(GROUND)} | options
-    folder = model_folder(segments, links, name=f"{kind}_ground", **options)
-    return st.load(folder, profile=profile)
 
 
 def states(model, touching, seed=0):
@@ -52,5 +32,6 @@ def states(model, touching, seed=0):
 
 def pressing(model, values, k):
     """How many points of a state press on the ground."""
-    state = [values[name][k] for name in ARGUMENTS["contact_dynamics"]]
-    return np.count_nonzero(model.contact_dynamics(*state)[2][:, 2])
+    names = ("q", "v", "tau", "bristles", *(["legs"] if "feet" in model.contacts else []))
+    forces = model.contact_dynamics(*(values[name][k] for name in names))[2]
+    return np.count_nonzero(forces[:, 2])

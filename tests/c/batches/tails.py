@@ -1,15 +1,10 @@
-"""Batches: states side by side give what each of them gives alone, in any number, from any thread,
-errors included.
-"""
-
-from functools import cache
+"""States of the functions that have batches, and what each of them gives alone."""
 
 import numpy as np
+import pytest
 
-import serpentail as st
+from serpentail.model.kernel import Kernel
 from serpentail_codegen.targets.c.batch import BATCHED, PARTS
-
-from ...support.models import model_folder
 
 GROUND = PARTS["batch_contact"]
 FREE = [name for name in BATCHED if name not in GROUND]  # of models without contacts
@@ -28,29 +23,31 @@ ARGUMENTS = {
     "airborne_rates": ("x", "tau", "angular"),
     "airborne_rates_derivatives": ("x", "tau", "angular"),
     "airborne_rates_hessian": ("x", "tau", "angular", "weights"),
+    "contact_points": ("q", "v", "legs"),
+    "leg_points": ("q", "angles"),
+    "contact_dynamics": ("q", "v", "tau", "bristles", "legs"),
 }
 
 
-@cache
-def model(kind="articulated", segments=2, links=2, profile="fast", **options):
-    """A model with all functions that have batches."""
-    folder = model_folder(segments, links, name=f"{kind}_batch", functions=FREE, **options)
-    return st.load(folder, profile=profile)
+def in_lanes(monkeypatch):
+    """From here on any batch is large, and it fails if states are evaluated one by one."""
+    monkeypatch.setattr("serpentail.model.batch.MIN_BATCH", 1)
+    monkeypatch.setattr(Kernel, "_each", lambda *_: pytest.fail("one by one"))
 
 
 def states(model, count, seed=0):
     """Random states, one argument a name."""
-    rng = np.random.default_rng(seed)
-    sizes = {"q": model.nq, "v": model.nv, "v_dot": model.nv, "tau": model.nv - 6}
-    sizes |= {"multiplier": model.nv, "dq": model.nv, "dv": model.nv, "dtau": model.nv - 6}
-    tail = model.nv - 6
+    rng, tail = np.random.default_rng(seed), model.layout.nt
+    sizes = {"q": model.nq, "v": model.nv, "v_dot": model.nv, "tau": tail}
+    sizes |= {"multiplier": model.nv, "dq": model.nv, "dv": model.nv, "dtau": tail}
     sizes |= {"x": 4 + 2 * tail, "angular": 3, "weights": 7 + 2 * tail}
     return {name: rng.normal(size=(count, size)) for name, size in sizes.items()}
 
 
-def given(arguments, name):
-    """The arguments of one function."""
-    return [arguments[a] for a in ARGUMENTS[name]]
+def given(model, values, name, *index):
+    """The arguments of one function, of all states or of some; of legs only where there are."""
+    inputs = [a["name"] for a in model.manifest["functions"][name]["inputs"]]
+    return [values[argument][index] for argument in ARGUMENTS[name] if argument in inputs]
 
 
 def evaluated(model, name, values):
@@ -61,7 +58,13 @@ def evaluated(model, name, values):
     return np.concatenate([np.reshape(o, (*lead, -1)) for o in outputs], axis=-1)
 
 
-def alone(model, name, arguments):
+def alone(model, name, values):
     """Every state by a call of its own."""
-    states = zip(*given(arguments, name), strict=True)
-    return np.array([evaluated(model, name, state) for state in states])
+    count = len(next(iter(values.values())))
+    rows = [evaluated(model, name, given(model, values, name, k)) for k in range(count)]
+    return np.array(rows)
+
+
+def batched(model):
+    """Names of a model's functions that have batches."""
+    return [name for name in BATCHED if name in model.manifest["batch"]["work"]]

@@ -7,8 +7,9 @@ import pytest
 
 from serpentail.model.compiler import compile_library
 from serpentail.model.library import NOT_FINITE
+from tests.support import zoo
 
-from .tails import alone, evaluated, given, model, states
+from .tails import alone, evaluated, given, states
 
 # nodes (K, x and torques, then three numbers of the kernel's own) at one angular momentum
 KERNEL = """
@@ -90,10 +91,10 @@ def task_of(found, count, seed=0):
     return Task(count, x, tau, y, J, H, *addresses), arrays, arguments
 
 
-@pytest.mark.parametrize("tail", [("articulated", 2, 2), ("continuum", 2, None)])
+@pytest.mark.parametrize("name", ["m1_n1", pytest.param("arcs2_loops", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("count", [1, 8, 21])
-def test_a_kernel_evaluates_nodes_that_lie_apart(kernel, tail, count):
-    found = model(*tail, emission="loops")
+def test_a_kernel_evaluates_nodes_that_lie_apart(kernel, name, count):
+    found = zoo.model(name)
     task, arrays, arguments = task_of(found, count)
     work = np.zeros(found.batch_library.work[NAME])
     address = ctypes.c_void_p(found.batch_library.address(NAME))
@@ -106,7 +107,7 @@ def test_a_kernel_evaluates_nodes_that_lie_apart(kernel, tail, count):
 
 
 def test_a_kernel_evaluates_node_after_node(kernel):
-    found = model(emission="loops")
+    found = zoo.model("m1_n1")
     task, arrays, arguments = task_of(found, 5)
     work = np.zeros(found.manifest["work"][NAME])
     function = found.library[f"{found.manifest['prefix']}_{NAME}"]
@@ -116,7 +117,7 @@ def test_a_kernel_evaluates_node_after_node(kernel):
 
 
 def test_a_node_that_is_not_finite_is_among_those_that_are_named(kernel):
-    found = model(emission="loops")
+    found = zoo.model("m1_n1")
     task, arrays, arguments = task_of(found, 21)
     arrays[0][13, 5] = np.nan
     work, failed = np.zeros(found.batch_library.work[NAME]), ctypes.c_size_t()
@@ -124,11 +125,11 @@ def test_a_node_that_is_not_finite_is_among_those_that_are_named(kernel):
     place = ctypes.c_void_p(work.ctypes.data)
     status = kernel.together(address, ctypes.byref(task), place, ctypes.byref(failed))
     assert status == NOT_FINITE and failed.value == 8
-    first = evaluated(found, NAME, [a[:8] for a in given(arguments, NAME)])
+    first = evaluated(found, NAME, given(found, arguments, NAME, slice(8)))
     np.testing.assert_allclose(arrays[3][:8], first, rtol=1e-9, atol=1e-9)
     assert not arrays[3][8:].any()
 
 
 def test_a_function_without_batches_has_no_address():
     with pytest.raises(KeyError):
-        model().batch_library.address("momentum")
+        zoo.model("m1_n1").batch_library.address("momentum")

@@ -1,6 +1,4 @@
-"""Batches: states side by side give what each of them gives alone, in any number, from any thread,
-errors included.
-"""
+"""Programs over lanes of states mean what they mean of each state, in loops and written out."""
 
 import json
 from dataclasses import replace
@@ -16,19 +14,23 @@ from serpentail_codegen.passes.batch import batched as widened
 from serpentail_codegen.passes.batch import unrolled_step
 from serpentail_codegen.passes.directions import directions_in_turn, places_lanes
 from serpentail_codegen.targets.c.batch import BATCHED
+from tests.support import zoo
+from tests.support.models import folder_of
+from tests.support.rows import row
 
-from ...support.models import model_folder
 from .tails import GROUND
 
 TAILS = {"articulated": Tail(2, 2), "continuum": Tail(2, 4, "continuum")}
+every_tail = pytest.mark.parametrize(
+    "tail", ["articulated", pytest.param("continuum", marks=pytest.mark.slow)]
+)
 
 
-def tail_of(kind, name):
-    """A tail, with points that can touch the ground for the functions of contact."""
-    return replace(TAILS[kind], contacts=("feet", "tail", "torso") if name in GROUND else ())
-
-
-# Programs.
+def programs(kind):
+    """Yield the functions that have batches, with contacts for those of the ground."""
+    for name in BATCHED:
+        contacts = ("feet", "tail", "torso") if name in GROUND else ()
+        yield name, assemble(CATALOGUE[name], replace(TAILS[kind], contacts=contacts))
 
 
 def numbers(program, rng):
@@ -41,38 +43,40 @@ def numbers(program, rng):
     }
 
 
-@pytest.mark.parametrize("tail", TAILS)
-@pytest.mark.parametrize("name", BATCHED)
-def test_a_program_of_many_states_means_each_of_them(tail, name):
-    single, rng = assemble(CATALOGUE[name], tail_of(tail, name)), np.random.default_rng(1)
-    states = [numbers(single, rng) for _ in range(3)]
-    for state in states[1:]:
-        state.update({a.name: states[0][a.name] for a in single.of_role("parameters")})
-    many = dict(states[0])
-    for a in single.of_role("input"):
-        many[a.name] = list(np.array([state[a.name] for state in states]).T)
-    found = Run(widened(directions_in_turn(single), 3), Numbers(np), many).values
-    for k, state in enumerate(states):
-        alone = Run(single, Numbers(np), state).values
-        for a in single.of_role("output"):
-            assert [np.broadcast_to(x, 3)[k] for x in found[a.name]] == alone[a.name]
+@every_tail
+def test_a_program_of_many_states_means_each_of_them(tail):
+    for name, single in programs(tail):
+        rng = np.random.default_rng(1)
+        states = [numbers(single, rng) for _ in range(3)]
+        for state in states[1:]:
+            state.update({a.name: states[0][a.name] for a in single.of_role("parameters")})
+        many = dict(states[0])
+        for a in single.of_role("input"):
+            many[a.name] = list(np.array([state[a.name] for state in states]).T)
+        found = Run(widened(directions_in_turn(single), 3), Numbers(np), many).values
+        for k, state in enumerate(states):
+            alone = Run(single, Numbers(np), state).values
+            for a in single.of_role("output"):
+                with row(name, a.name):
+                    assert [np.broadcast_to(x, 3)[k] for x in found[a.name]] == alone[a.name]
 
 
-@pytest.mark.parametrize("tail", TAILS)
-@pytest.mark.parametrize("name", BATCHED)
-def test_a_program_written_out_means_the_same_and_guards_the_same(tail, name):
-    single = assemble(CATALOGUE[name], tail_of(tail, name))
-    values = numbers(single, np.random.default_rng(2))
-    line = unrolled_step(directions_in_turn(single) if places_lanes(single) else single)
-    expected, found = (Run(p, Numbers(np), values) for p in (single, line))
-    for a in single.of_role("output"):
-        np.testing.assert_allclose(
-            np.float64(found.values[a.name]), np.float64(expected.values[a.name]), rtol=1e-12
-        )
-    pairs = [sorted((status, float(x)) for status, x in run.guards) for run in (found, expected)]
-    assert len(pairs[0]) == len(pairs[1])
-    for (status, x), (other, y) in zip(*pairs, strict=True):
-        assert status == other and x == pytest.approx(y, rel=1e-9)
+@every_tail
+def test_a_program_written_out_means_the_same_and_guards_the_same(tail):
+    for name, single in programs(tail):
+        values = numbers(single, np.random.default_rng(2))
+        line = unrolled_step(directions_in_turn(single) if places_lanes(single) else single)
+        expected, found = (Run(p, Numbers(np), values) for p in (single, line))
+        guards = [
+            sorted((status, float(x)) for status, x in run.guards) for run in (expected, found)
+        ]
+        with row(name):
+            for a in single.of_role("output"):
+                pair = (np.float64(run.values[a.name]) for run in (found, expected))
+                np.testing.assert_allclose(*pair, rtol=1e-12)
+            statuses, sizes = ([[guard[k] for guard in some] for some in guards] for k in (0, 1))
+            assert statuses[0] == statuses[1]
+            np.testing.assert_allclose(*sizes, rtol=1e-9)
 
 
 def test_what_depends_on_parameters_alone_stays_narrow():
@@ -84,17 +88,19 @@ def test_what_depends_on_parameters_alone_stays_narrow():
     assert arrays["link"] == arrays["tail_mass"] == 0
 
 
-@pytest.mark.parametrize(("segments", "links", "straight"), [(3, 4, True), (8, 16, False)])
-def test_batches_stay_straight_for_longer_tails_than_single_states(segments, links, straight):
-    folder = model_folder(segments, links, functions=["forward_dynamics"])
-    manifest = json.loads((folder / "manifest.json").read_text())
-    assert manifest["functions"]["forward_dynamics"]["emission"] in ("lanes", "segments")
-    assert ("written_out" in (folder / "src" / f"{folder.name}_batch.c").read_text()) == straight
-
-
-@pytest.mark.parametrize(("segments", "links", "straight"), [(1, 3, True), (3, 4, False)])
-def test_batches_of_derivatives_are_straight_for_short_tails_alone(segments, links, straight):
-    folder = model_folder(segments, links, functions=["forward_dynamics_derivatives"])
-    source = (folder / "src" / f"{folder.name}_batch_derivatives.c").read_text()
-    assert ("written_out" in source) == straight
-    assert ("for (int d = 0;" in source) != straight
+def test_batches_stay_straight_for_longer_tails_than_single_states():
+    """Sizes are the point: batches of derivatives are straight for short tails alone."""
+    sizes = [("forward_dynamics", "batch", (3, 4), (8, 16))]
+    sizes += [("forward_dynamics_derivatives", "batch_derivatives", (1, 3), (3, 4))]
+    for name, part, *both in sizes:
+        for straight, (segments, links) in zip((True, False), both, strict=True):
+            changes = {"segments": segments, "links": links, "functions": [name]}
+            folder = folder_of(zoo.scene("bare", **changes))
+            manifest = json.loads((folder / "manifest.json").read_text())
+            source = (folder / "src" / f"bare_{part}.c").read_text()
+            with row(name, segments, links):
+                assert ("written_out" in source) == straight
+                if name == "forward_dynamics":
+                    assert manifest["functions"][name]["emission"] in ("lanes", "segments")
+                else:
+                    assert ("for (int d = 0;" in source) != straight

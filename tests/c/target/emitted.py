@@ -1,14 +1,13 @@
-"""The C text: it compiles without a warning, means what its program means bit for bit, and keeps to
-itself.
-"""
+"""Generated folders and what C compilers, linkers and ctypes make of them."""
 
 import ctypes
 import json
 import shlex
 import shutil
 import subprocess
-from functools import cached_property
-from types import SimpleNamespace
+from functools import cache, cached_property
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -19,99 +18,54 @@ from serpentail_codegen.pipeline import tail_of
 from serpentail_codegen.scene.parse import parse_scene
 from serpentail_codegen.scene.signatures.table import ALL, DEFAULT, VALUES
 from serpentail_codegen.targets.c.form import in_form
-
-from ...references.parameters import random_states
-from ...support.compile_once import compile_once
-from ...support.models import model_folder
+from tests.references.parameters import random_states
+from tests.support import zoo
+from tests.support.compile_once import compile_once
+from tests.support.models import folder_of
 
 NAMES = tuple(name for name in ALL if name in (*DEFAULT, *VALUES))
 STRICT = (
-    "-pedantic",
-    "-Wall",
-    "-Wextra",
-    "-Wconversion",
-    "-Wdouble-promotion",
-    "-Wshadow",
+    *("-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Wshadow"),
     "-Werror",
 )
 C99 = ("-std=c99", *STRICT)
-CONTACT = ("_batch_contact", "_ground")  # sources of models that touch the ground
 PLAIN = ("-std=c99", "-fno-stack-protector", "-fno-pic")
-TAILS = {"m1_n1": (1, 1), "m2_n2": (2, 2), "arcs2": (2, None)}
-FORMS = [
-    (tail, real, emission)
-    for tail in TAILS
-    for real in ("double", "float")
-    for emission in ("straight", "loops")
-]
-MODELS = {
-    **{
-        f"{tail}_{real}_{emission}": {"real": real, "emission": emission}
-        for tail, real, emission in FORMS
-    },
-    "m1_n1_baked_straight": {"baked": True, "emission": "straight"},
-    "m2_n2_baked_loops": {"baked": True, "emission": "loops"},
-    "m2_n2_baked_float": {"baked": True, "emission": "loops", "real": "float"},
-    "m2_n2_double_segments": {"emission": "segments"},
-    "m2_n2_float_segments": {"real": "float", "emission": "segments"},
-    "m1_n1_double_reproducible": {"profile": "reproducible", "emission": "straight"},
-    "m2_n2_float_reproducible": {"profile": "reproducible", "emission": "loops", "real": "float"},
-}
-REPRODUCIBLE = [name for name in MODELS if name.endswith("_reproducible")]
-del MODELS["arcs2_float_straight"]  # its text is long, and what it shows others show
-FEW = {
-    "m1_n1_double_straight",
-    "m1_n1_float_loops",
-    "m1_n1_baked_straight",
-    "m2_n2_double_segments",
-    "arcs2_double_loops",
-    *REPRODUCIBLE,
-}  # of every tail, form, real type and option one
 
 
-def slow_but(*names):
-    """Every model, all but the named ones in the slow suite."""
-    marked = [
-        name if name in names else pytest.param(name, marks=pytest.mark.slow) for name in MODELS
-    ]
-    return pytest.mark.parametrize("name", marked)
-
-
-every_model = slow_but(*FEW)
-
-
-class Model(SimpleNamespace):
+class Model:
     """A generated folder: its scene, its paths, its manifest."""
 
-    def __init__(self, name, segments, links, **options):
-        self.name, self.folder = name, model_folder(segments, links, name=name, **options)
-        self.manifest = json.loads((self.folder / "manifest.json").read_text())
-        self.scene = parse_scene(self.manifest["scene"], name)
-        self.include, self.header = self.folder / "include", self.folder / "include" / f"{name}.h"
-        self.source, self.host, self.batch, self.simulation, self.flights, *self.contact = (
-            self.folder / "src" / f"{name}{part}.c"
-            for part in ("", "_host", "_batch", "_simulation", "_flights", *CONTACT)
+    def __init__(self, folder):
+        self.folder, self.name = folder, folder.name
+        self.manifest = json.loads((folder / "manifest.json").read_text())
+        self.scene = parse_scene(self.manifest["scene"], self.name)
+        self.include, self.header = folder / "include", folder / "include" / f"{self.name}.h"
+        self.source, self.host, self.simulation = (
+            folder / "src" / f"{self.name}{part}.c" for part in ("", "_host", "_simulation")
         )
-        self.example = self.folder / "example" / "main.c"
+        self.example = folder / "example" / "main.c"
 
     @property
     def sources(self):
-        """The model, its host entries and, where it has them, its batches, its simulation, its
-        flights and its batches of contact.
-        """
-        parts = (self.source, self.host, self.batch, self.simulation, self.flights, *self.contact)
-        return [path for path in parts if path.is_file()]
-
-    @property
-    def text(self):
-        """The text of the model."""
-        return self.source.read_text()
+        """All files of C, but the example."""
+        return sorted((self.folder / "src").glob("*.c"))
 
     @cached_property
     def objects(self):
-        """Plain object files of the model, its host entries, its batches and its simulation."""
+        """Plain object files of all sources by the end of their names."""
         command = ("gcc", *PLAIN, "-c")
-        return [compile_once(f"{s.stem}.o", command, [s], self.include) for s in self.sources]
+        return {
+            source.stem.removeprefix(self.name): compile_once(
+                f"{source.stem}.o", command, [source], self.include
+            )
+            for source in self.sources
+        }
+
+
+@cache
+def model_of(name, **changes):
+    """Return a model of the zoo, or one of other functions, form or numbers."""
+    return Model(folder_of(zoo.scene(name, **changes)) if changes else zoo.folder(name))
 
 
 def run(*command, cwd=None, env=None):
@@ -126,10 +80,8 @@ def run(*command, cwd=None, env=None):
 def compiled(tmp_path, source, *flags, compiler="gcc"):
     """Return the object file of a source; its compilation says nothing."""
     target = tmp_path / f"{source.stem}{len(list(tmp_path.iterdir()))}.o"
-    assert (
-        run(compiler, *flags, "-I", source.parent.parent / "include", "-c", source, "-o", target)
-        == ""
-    )
+    places = ("-I", source.parent.parent / "include")
+    assert run(compiler, *flags, *places, "-c", source, "-o", target) == ""
     return target
 
 
@@ -144,14 +96,6 @@ def symbols(path, *options):
     return [(kind, symbol) for symbol, kind, *_ in lines]
 
 
-# Numbers.
-
-
-def float_of(real):
-    """The NumPy and ctypes types of a C real."""
-    return (np.float32, ctypes.c_float) if real == "float" else (np.float64, ctypes.c_double)
-
-
 def parameter_values(model):
     """Scalars of the scene's parameters by name."""
     return {name: np.ravel(value).tolist() for name, value in model.scene.parameters.items()}
@@ -164,15 +108,14 @@ def interpreted(model, name, arguments, arithmetic):
     )
     known = parameter_values(model) | arguments
     arrays = (*p.of_role("parameters"), *p.of_role("input"))
-    values = Run(
-        p, arithmetic, {a.name: [arithmetic.convert(x) for x in known[a.name]] for a in arrays}
-    ).values
+    given = {a.name: [arithmetic.convert(x) for x in known[a.name]] for a in arrays}
+    values = Run(p, arithmetic, given).values
     return {a.name: np.array(values[a.name]) for a in p.of_role("output")}
 
 
-WRAPPER = """#include "../src/@.c"
-void @_wrapped_sincos(const @_real *x, @_real *both);
-void @_wrapped_sincos(const @_real *x, @_real *both)
+WRAPPER = """
+void wrapped_sincos(const @_real *x, @_real *both);
+void wrapped_sincos(const @_real *x, @_real *both)
 {
   @_sincos(*x, both, both + 1);
 }
@@ -183,25 +126,17 @@ class Library:
     """The functions of a compiled model, called through ctypes, and its sine and cosine."""
 
     def __init__(self, model, *flags):
-        self.model, path = model, model.folder / f"{'_'.join(['model', *flags])}.so"
-        self.number, self.c_type = float_of(model.manifest["real"])
-        if not path.exists():
-            wrapper = model.folder / "example" / "wrapper.c"
-            include, definition = WRAPPER.replace("@", model.name).split("\n", 1)
-            wrapper.write_text(f"{include}\n{definition if '_sincos(' in model.text else ''}")
-            run(
-                "gcc",
-                "-std=c99",
-                *flags,
-                "-fPIC",
-                "-shared",
-                "-I",
-                model.include,
-                wrapper,
-                "-o",
-                path,
-                "-lm",
-            )
+        self.model, single = model, model.manifest["real"] == "float"
+        self.number, self.c_type = (
+            (np.float32, ctypes.c_float) if single else (np.float64, ctypes.c_double)
+        )
+        text = model.source.read_text()
+        with TemporaryDirectory() as temporary:
+            wrapper = Path(temporary) / "wrapper.c"
+            own = WRAPPER.replace("@", model.name) if "_sincos(" in text else ""
+            wrapper.write_text(f'#include "{model.source}"\n{own}')
+            command = ("gcc", "-std=c99", *flags, "-fPIC", "-shared")
+            path = compile_once("model.so", command, [wrapper], model.include)
         self.library = ctypes.CDLL(str(path))
         sizes = [p["size"] for p in model.manifest["parameters"] if p["in_struct"]]
         self.parameters = np.full(sum(sizes), np.nan, self.number)
@@ -210,7 +145,7 @@ class Library:
     def sincos(self, x):
         """Sine and cosine as the model computes them."""
         x, both = np.array([x], self.number), np.zeros(2, self.number)
-        self.library[f"{self.model.name}_wrapped_sincos"](self._pointer(x), self._pointer(both))
+        self.library["wrapped_sincos"](self._pointer(x), self._pointer(both))
         return both
 
     def _pointer(self, array):
@@ -235,6 +170,12 @@ class Library:
         return {a["name"]: values for a, values in zip(entry["outputs"], outputs, strict=True)}
 
 
+@cache
+def library_of(model, *flags):
+    """Return the library of a model, compiled with these flags."""
+    return Library(model, *flags)
+
+
 def states_of(model, count=2):
     """Arguments by name of a few random states."""
     total, rng = model.manifest["dimensions"]["total"], np.random.default_rng(2)
@@ -244,6 +185,13 @@ def states_of(model, count=2):
         {"q": q, "v": v, "v_dot": v_dot, "tau": tau, "f_ext": f}
         for (q, v, v_dot, tau), f in zip(rows, f_ext, strict=True)
     ]
+
+
+def known_functions(model):
+    """Names of a model's functions that such a state has all arguments of."""
+    known = {"q", "v", "v_dot", "tau", "f_ext"}
+    entries = model.manifest["functions"].items()
+    return [name for name, e in entries if {a["name"] for a in e["inputs"]} <= known]
 
 
 def bits(outputs):

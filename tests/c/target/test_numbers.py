@@ -1,8 +1,8 @@
-"""The C text: it compiles without a warning, means what its program means bit for bit, and keeps to
-itself.
-"""
+"""The C means what its program means, bit for bit, and its sine and cosine are exact enough."""
 
+import ctypes
 import platform
+import re
 from types import SimpleNamespace
 
 import mpmath
@@ -10,30 +10,35 @@ import numpy as np
 import pytest
 
 from serpentail_codegen.ir.interpret import Numbers
+from serpentail_codegen.ir.step import Step
+from serpentail_codegen.targets.c.routine import Routine, routine_lines
+from tests.support.rows import row
 
 from .emitted import (
-    REPRODUCIBLE,
-    Library,
+    NAMES,
     bits,
     compiled,
-    every_model,
-    float_of,
     interpreted,
+    known_functions,
+    library_of,
+    model_of,
     needs,
     parameter_values,
     run,
-    slow_but,
     states_of,
     symbols,
 )
 
-HARDEST = {
+# of every form, real type, tail and option one
+QUICK = ("m1_n1", "small", "segments", "arcs1", "baked")
+SLOW = ("reproducible", "straight", "loops", "lanes", "single", "arcs2_loops", "polar", "mixed")
+every_model = pytest.mark.parametrize(
+    "models", [QUICK, pytest.param(SLOW, marks=pytest.mark.slow)], ids=["quick", "others"]
+)
+HARDEST = {  # nearest to a multiple of pi/2
     "double": 6381956970095103.0 * 2.0**797,
     "float": 16367173.0 * 2.0**72,
-}  # nearest to a multiple of pi/2
-few_of_the_reproducible = pytest.mark.parametrize(
-    "name", [REPRODUCIBLE[0], *(pytest.param(n, marks=pytest.mark.slow) for n in REPRODUCIBLE[1:])]
-)
+}
 
 
 class Arithmetic(Numbers):
@@ -48,11 +53,9 @@ class Arithmetic(Numbers):
 
     def each(self, x, k):
         """Sine or cosine of a number, or of each lane of a row."""
-        return (
-            np.array([self.library.sincos(lane)[k] for lane in x])
-            if np.ndim(x)
-            else self.library.sincos(x)[k]
-        )
+        if np.ndim(x):
+            return np.array([self.library.sincos(lane)[k] for lane in x])
+        return self.library.sincos(x)[k]
 
     def const(self, value):
         """The nearest number of the C type, zero where that type has no normal number so small."""
@@ -60,134 +63,142 @@ class Arithmetic(Numbers):
         return nearest if abs(nearest) >= np.finfo(self.convert).tiny else self.convert(0)
 
 
-def same(some, others):
-    """Tell if two sets of outputs are equal, every entry but for the sign of a zero."""
-    return some.keys() == others.keys() and all(
-        np.array_equal(some[name], others[name]) for name in some
-    )
+def assert_means_the_program(library, function, state):
+    """A function gives what its program gives in the model's arithmetic, but for signs of zeros."""
+    model, found = library.model, library.call(function, state)
+    expected = interpreted(model, function, state, Arithmetic(library))
+    assert found.keys() == expected.keys()
+    for key, values in expected.items():
+        if model.scene.baked and model.scene.real == "float":  # parameters are folded in double
+            most = 1e-3 * np.abs(values).max()
+            np.testing.assert_allclose(found[key], values, rtol=1e-3, atol=most)
+        else:
+            np.testing.assert_array_equal(found[key], values)
 
 
-def assert_means_the_program(model, *flags):
-    """Every function gives what its program gives in the model's arithmetic."""
-    library = Library(model, *flags)
-    for state in states_of(model):
-        for function in model.manifest["functions"]:
-            found, expected = (
-                library.call(function, state),
-                interpreted(model, function, state, Arithmetic(library)),
-            )
-            if model.scene.baked and model.scene.real == "float":  # parameters are folded in double
-                for key, values in expected.items():
-                    np.testing.assert_allclose(
-                        found[key], values, rtol=1e-3, atol=1e-3 * np.abs(values).max()
-                    )
-            else:
-                assert same(found, expected), function
-
-
-@every_model
-def test_c_computes_what_the_program_means_bit_for_bit(models, name):
-    assert_means_the_program(models(name))
-
-
-@slow_but("m1_n1_double_straight", "m1_n1_float_loops")
-def test_optimised_c_computes_the_same_bits(models, name):
-    assert_means_the_program(models(name), "-O2")
-
-
-@every_model
-def test_result_depends_on_nothing_but_the_input(models, name):
+def assert_depends_on_its_input_alone(library, function, first, second):
     """Same bits from dirty workspace and outputs, whatever ran before; inputs are left alone."""
-    model = models(name)
-    library = Library(model)
-    first, second = states_of(model)
-    for function in model.manifest["functions"]:
-        clean = library.call(function, first, dirt=0.0)
-        library.call(function, second)
-        for dirt in (np.nan, np.inf, -1e30):
-            assert bits(library.call(function, first, dirt)) == bits(clean), function
+    clean = library.call(function, first, dirt=0.0)
+    library.call(function, second)
+    for dirt in (np.nan, np.inf, -1e30):
+        assert bits(library.call(function, first, dirt)) == bits(clean)
+    assert bits(library.call(function, first, spare=False)) == bits(clean)
 
 
 @every_model
-def test_default_parameters_are_the_scene_s_to_the_last_bit(models, name):
-    model = models(name)
-    library = Library(model)
-    fields = [p["name"] for p in model.manifest["parameters"] if p["in_struct"]]
-    expected = [x for field in fields for x in parameter_values(model)[field]]
-    assert library.parameters.tolist() == [library.number(x) for x in expected]
+def test_c_computes_what_the_program_means_bit_for_bit(models):
+    for name in models:
+        model = model_of(name)
+        library = library_of(model)
+        fields = [p["name"] for p in model.manifest["parameters"] if p["in_struct"]]
+        expected = [x for field in fields for x in parameter_values(model)[field]]
+        assert library.parameters.tolist() == [library.number(x) for x in expected], name
+        first, second = states_of(model)
+        for function in known_functions(model):
+            with row(name, function):
+                assert_depends_on_its_input_alone(library, function, first, second)
+                for state in (first, second) if function in NAMES else ():
+                    assert_means_the_program(library, function, state)
+        first["q"][7] = np.nan
+        library.call("forward_dynamics", first, status=2)
+
+
+@pytest.mark.parametrize(
+    "name", ["small", *(pytest.param(n, marks=pytest.mark.slow) for n in ("m1_n1", "segments"))]
+)
+def test_optimised_c_computes_the_same_bits(name):
+    library = library_of(model_of(name), "-O2")
+    for function in [name for name in NAMES if name in known_functions(library.model)]:
+        with row(function):
+            assert_means_the_program(library, function, states_of(library.model)[0])
 
 
 def ulps(found, expected):
     """Distance in units of the last place of the expected number."""
-    return abs(mpmath.mpf(float(found)) - expected) / mpmath.mpf(
-        float(np.spacing(found.dtype.type(abs(expected))))
-    )
+    unit = np.spacing(found.dtype.type(abs(expected)))
+    return abs(mpmath.mpf(float(found)) - expected) / mpmath.mpf(float(unit))
+
+
+def sines():
+    """Models whose sine and cosine differ: of each profile in each real type."""
+    return [model_of(name) for name in ("m1_n1", "single", "reproducible", "small")]
+
+
+def test_sine_and_cosine_at_the_edges():
+    for model in sines():
+        with row(model.name):
+            library = library_of(model)
+            assert library.sincos(0.0).tolist() == [0, 1]
+            assert library.sincos(-0.5).tolist() == (library.sincos(0.5) * [-1, 1]).tolist()
+            assert all(np.isnan(library.sincos(x)).all() for x in (np.nan, np.inf, -np.inf))
 
 
 @mpmath.workdps(60)
-@pytest.mark.parametrize("name", ["m1_n1_double_straight", "m1_n1_float_loops", *REPRODUCIBLE])
-def test_sine_and_cosine_are_good_to_the_last_digit(models, name):
-    library, rng = Library(models(name)), np.random.default_rng(1)
-    angles = [
-        *rng.uniform(-4, 4, 300),
-        *rng.uniform(-1e5, 1e5, 300),
-        *10.0 ** rng.uniform(-300, 8, 100),
-    ]
-    angles += [k * np.pi / 4 for k in range(-40, 41)] + [
-        k * np.pi / 2 for k in (1001, 44444, 63661, 63662, 63663)
-    ]
-    angles += [
-        0.0,
-        *(s * x for s in (1, -1) for end in (1e4, 1e5) for x in (end, np.nextafter(end, 0))),
-    ]
-    angles = np.array(angles).astype(library.number)
-    for x in (
-        angles
-        if name not in REPRODUCIBLE
-        else angles[abs(angles) < (1e4 if "float" in name else 1e5)]
-    ):
-        exact = mpmath.cos_sin(mpmath.mpf(float(x)))[::-1]
-        assert all(
-            ulps(y, value) <= 1.5 for y, value in zip(library.sincos(x), exact, strict=True)
-        ), x
+def test_sine_and_cosine_are_good_to_the_last_digit():
+    rng = np.random.default_rng(1)
+    angles = [*rng.uniform(-4, 4, 200), *rng.uniform(-1e5, 1e5, 200)]
+    angles += [*10.0 ** rng.uniform(-300, 8, 100), *(k * np.pi / 4 for k in range(-40, 41))]
+    angles += [k * np.pi / 2 for k in (1001, 44444, 63661, 63662, 63663)]
+    ends = [s * x for s in (1, -1) for end in (1e4, 1e5) for x in (end, np.nextafter(end, 0))]
+    for model in sines():
+        library = library_of(model)
+        most = np.inf
+        if model.scene.profile == "reproducible":
+            most = 1e4 if model.scene.real == "float" else 1e5
+        for x in np.array([*angles, 0.0, *ends]).astype(library.number):
+            if abs(x) < most:
+                exact = mpmath.cos_sin(mpmath.mpf(float(x)))[::-1]
+                found = library.sincos(x)
+                off = max(ulps(y, value) for y, value in zip(found, exact, strict=True))
+                assert off <= 1.5, (model.name, x)
 
 
 @mpmath.workdps(1000)
-@few_of_the_reproducible
-def test_reproducible_sine_and_cosine_reduce_any_angle(models, name):
+@pytest.mark.parametrize("name", ["small", pytest.param("reproducible", marks=pytest.mark.slow)])
+def test_reproducible_sine_and_cosine_reduce_any_angle(name):
     """Within 3 units of the last place as far as numbers go, without libm, and optimised or not to
     the same bits.
     """
-    model, rng = models(name), np.random.default_rng(3)
-    library, optimised, largest = (
-        Library(model),
-        Library(model, "-O2"),
-        np.finfo(float_of(model.scene.real)[0]).max,
-    )
-    angles = 10.0 ** rng.uniform(3.9, np.log10(largest), 2000)
-    angles = np.array([*angles, largest, 1e4, 1e5, HARDEST[model.scene.real]]).astype(
-        library.number
-    )
-    angles = np.concatenate([angles, [k * np.pi / 2 for k in rng.integers(1e5, 1e9, 200)]]).astype(
-        library.number
-    )
+    model, rng = model_of(name), np.random.default_rng(3)
+    library, optimised = library_of(model), library_of(model, "-O2")
+    largest, hardest = np.finfo(library.number).max, HARDEST[model.scene.real]
+    angles = [*10.0 ** rng.uniform(3.9, np.log10(largest), 1000), largest, 1e4, 1e5, hardest]
+    angles += [k * np.pi / 2 for k in rng.integers(1e5, 1e9, 200)]
+    angles = np.array(angles).astype(library.number)
     for x in np.concatenate([angles, -angles[::9]]):
         exact = mpmath.cos_sin(mpmath.mpf(float(x)))[::-1]
         found = library.sincos(x)
         assert all(ulps(y, value) <= 3 for y, value in zip(found, exact, strict=True)), x
         assert found.tobytes() == optimised.sincos(x).tobytes()
-    assert not {"sin", "cos", "sinf", "cosf"} & {
-        symbol for _, symbol in symbols(model.objects[0], "-u")
-    }
+    wanted = {symbol for _, symbol in symbols(model.objects[""], "-u")}
+    assert not {"sin", "cos", "sinf", "cosf"} & wanted
 
 
 @needs("objdump")
-@pytest.mark.skipif(platform.machine() != "x86_64", reason="looks for x86's fused instructions")
-@few_of_the_reproducible
-def test_reproducible_models_fuse_nothing_even_where_the_compiler_would(models, tmp_path, name):
-    """The control is a model of the fast profile, compiled alike."""
-    fused = []
-    for source in (models(name).source, models("m1_n1_double_straight").source):
-        target = compiled(tmp_path, source, "-std=gnu11", "-O2", "-mfma")
-        fused.append("vfmadd" in run("objdump", "-d", target))
-    assert fused == [False, True]
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="looks for x86's instructions")
+def test_reproducible_models_fuse_nothing_and_float_ones_have_no_double_arithmetic(tmp_path):
+    """The control is a model of the fast profile in double, compiled alike."""
+    double = re.compile(r"\bv?(?:cvtss2sd|cvtsd2ss|(?:add|sub|mul|div|sqrt)[sp]d)\b")
+    flags, found = ("-std=gnu11", "-O2", "-mfma", "-fno-stack-protector", "-fno-pic"), []
+    for model in map(model_of, ("small", "bare")):
+        sources = [model.source, model.host, model.simulation][: 1 if model.name == "bare" else 3]
+        codes = [
+            run("objdump", "-d", "--no-show-raw-insn", compiled(tmp_path, source, *flags))
+            for source in sources
+        ]
+        code = "".join(codes)
+        found.append(("vfmadd" in code, bool(double.search(code))))
+    assert found == [(False, False), (True, True)]
+
+
+def test_outputs_of_a_step_may_overwrite_its_inputs(tmp_path):
+    values = (("input", 0), ("input", 1), ("neg", 0))
+    swap = Step("swap", "Exchange.", (("x", 3),), (("x", 3),), values, (1, 2, 0))
+    lines = "\n".join(routine_lines(Routine(swap), "double", "x"))
+    source, path = tmp_path / "swap.c", tmp_path / "swap.so"
+    text = f"void swap(const real *x, real *x_out)\n{{\n{lines}\n}}\n"
+    source.write_text(f"#define real double\n{text}")
+    run("gcc", "-std=c99", "-shared", "-fPIC", source, "-o", path)
+    x = (ctypes.c_double * 3)(1, 2, 3)
+    ctypes.CDLL(str(path)).swap(x, x)
+    assert list(x) == [2, -1, 1]

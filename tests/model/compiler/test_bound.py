@@ -3,22 +3,19 @@
 import ctypes
 import json
 import os
-import pickle
-import shutil
 import time
 
-import numpy as np
 import pytest
 
 import serpentail as st
 from serpentail import cli
 from serpentail.model import bound, compiler
 from tests.support.file_faults import HOUR, age
-from tests.support.models import model_folder
 
-from .sources import TWICE, call_twice
+from ...support.rows import row
+from .conftest import TWICE, call_twice
 
-Q = [0, 0, 0, 1, 0, 0, 0, 0.3, -0.2]
+STATE = [0, 0, 0, 1, 0, 0, 0, 0.3, -0.2], [0.5] * 8, [0.1, 0.2]
 
 
 def built(model, number):
@@ -58,21 +55,6 @@ def test_what_is_in_use_stays(model, monkeypatch):
     assert built(model, 4).exists() and not any(library.exists() for library in libraries)
 
 
-def test_a_loaded_model_outlives_its_entries(cache, tmp_path):
-    """On POSIX a library that is mapped stays; what comes late is made again."""
-    options = {"functions": ["mass_matrix", "forward_dynamics"], "name": "tail"}
-    model = st.load(model_folder(1, 1, **options))
-    expected = model.mass_matrix(Q)
-    shutil.rmtree(cache)
-    np.testing.assert_array_equal(model.mass_matrix(Q), expected)
-    batch = np.tile(Q, (2000, 1))
-    np.testing.assert_allclose(model.mass_matrix(batch)[7], expected, rtol=1e-9, atol=1e-15)
-    external = model.casadi.external("mass_matrix", folded=True)
-    np.testing.assert_allclose(external(Q), expected, rtol=1e-12)
-    shutil.rmtree(cache)
-    np.testing.assert_array_equal(pickle.loads(pickle.dumps(model)).mass_matrix(Q), expected)
-
-
 def test_parts_of_killed_builds_go(model, cache):
     built(model, 0)
     lost, mine = cache / "parts" / ("0" * 24), cache / "parts" / "mine"
@@ -86,19 +68,14 @@ def test_parts_of_killed_builds_go(model, cache):
     assert not lost.exists() and mine.exists()
 
 
-@pytest.mark.parametrize("text", ["much", "-1", "1.5G", "1 G B", "\u0663"])
-def test_size_that_is_none_is_refused(model, monkeypatch, text):
-    monkeypatch.setenv("SERPENTAIL_CACHE_SIZE", text)
-    with pytest.raises(st.SerpentailError, match=r"SERPENTAIL_CACHE_SIZE: value .*such as 500M"):
-        built(model, 0)
-
-
-@pytest.mark.parametrize(
-    ("text", "size"), [("", 2**30), ("17", 17), ("500M", 500 * 2**20), ("2g", 2**31)]
-)
-def test_sizes(monkeypatch, text, size):
-    monkeypatch.setenv("SERPENTAIL_CACHE_SIZE", text)
-    assert bound.limit() == size
+def test_sizes_and_what_is_none(model, monkeypatch):
+    for text, size in {"": 2**30, "17": 17, "500M": 500 * 2**20, "2g": 2**31}.items():
+        monkeypatch.setenv("SERPENTAIL_CACHE_SIZE", text)
+        assert bound.limit() == size, text
+    for text in ("much", "-1", "1.5G", "1 G B", "\u0663"):
+        monkeypatch.setenv("SERPENTAIL_CACHE_SIZE", text)
+        with row(text), pytest.raises(st.SerpentailError, match=r"SERPENTAIL_CACHE_SIZE: value"):
+            built(model, 0)
 
 
 # The command
@@ -124,10 +101,3 @@ def test_command_tells_and_empties(model, cache, capsys):
     assert left == {*folders, "mine.txt", "libraries/mine"}
     loaded.twice.restype, loaded.twice.argtypes = ctypes.c_double, [ctypes.c_double]
     assert loaded.twice(21.0) == 42.0
-
-
-def test_command_where_there_is_no_cache(cache, capsys):
-    for arguments in (["cache"], ["cache", "--clean"]):
-        assert cli.main(arguments) == 0
-        assert capsys.readouterr().out.splitlines()[0].split() == ["folder", str(cache)]
-    assert not cache.exists()

@@ -1,30 +1,21 @@
-"""The compiler cache: one text gives one working library, and whatever goes wrong is named."""
+"""One text gives one library for a compiler and a machine, and all that matters is in its key."""
 
-from __future__ import annotations
-
+import os
 import shutil
-import time
-
-import pytest
 
 from serpentail.model import compiler
 
-from .sources import TWICE, call_twice, forbid_processes, libraries
+from ...support.rows import row
+from .conftest import TWICE, call_twice, forbid_processes, libraries
 
 
-@pytest.mark.parametrize("profile", ["fast", "reproducible"])
-def test_library_works(model, profile, cache):
-    library = compiler.compile_library(*model, profile=profile)
-    assert call_twice(library) == 42.0
-    assert libraries(cache) == [library]
-
-
-def test_second_call_starts_no_process(model, monkeypatch):
-    first = compiler.compile_library(*model)
+def test_a_library_works_and_is_found_again_without_a_process(model, cache, monkeypatch):
+    built = {p: compiler.compile_library(*model, profile=p) for p in ("fast", "reproducible")}
+    assert [call_twice(library) for library in built.values()] == [42.0, 42.0]
+    assert sorted(libraries(cache)) == sorted(built.values())
     forbid_processes(monkeypatch)
-    started = time.perf_counter()
-    assert compiler.compile_library(*model) == first
-    assert time.perf_counter() - started < 0.1
+    for profile, library in built.items():
+        assert compiler.compile_library(*model, profile=profile) == library
 
 
 def test_text_compiles_once_wherever_it_lies(model, tmp_path, script):
@@ -36,11 +27,9 @@ def test_text_compiles_once_wherever_it_lies(model, tmp_path, script):
     assert calls.read_text().count("twice.c") == 1
 
 
-def test_every_input_reaches_the_key(model, tmp_path):
+def test_every_input_reaches_the_key(model):
     (source,), include = model
-    built = [
-        compiler.compile_library(*model, profile=profile) for profile in ("fast", "reproducible")
-    ]
+    built = [compiler.compile_library(*model, profile=p) for p in ("fast", "reproducible")]
     (source.parent / "private.h").write_text("#define PRIVATE 1\n")
     built.append(compiler.compile_library(*model))
     (include / "scale.h").write_text("#define SCALE 3.0\n")
@@ -49,8 +38,9 @@ def test_every_input_reaches_the_key(model, tmp_path):
     built.append(compiler.compile_library(*model))
     renamed = source.rename(source.with_name("renamed.c"))
     built.append(compiler.compile_library([renamed], include))
+    built.append(compiler.compile_library([renamed], include, flags=("-DMORE",)))
     assert len({library.parent for library in built}) == len(built)
-    assert [call_twice(library) for library in built] == [42.0, 42.0, 42.0, 63.0, 64.0, 64.0]
+    assert [call_twice(library) for library in built] == [42.0] * 3 + [63.0] + [64.0] * 3
 
 
 def test_arguments_of_cc_reach_the_key_and_the_compiler(model, monkeypatch):
@@ -63,21 +53,44 @@ def test_arguments_of_cc_reach_the_key_and_the_compiler(model, monkeypatch):
     assert built == [63.0, 84.0]
 
 
+def test_surroundings_that_matter_reach_the_key_and_no_others(model, cache, monkeypatch):
+    """Those that matter reach the key of what is known about the compiler, too."""
+    first, known = compiler.compile_library(*model), 1
+    for name in ("MACOSX_DEPLOYMENT_TARGET", "LD_LIBRARY_PATH", "CCACHE_DIR", "NIX_CFLAGS"):
+        with monkeypatch.context() as changed, row(name):
+            changed.setenv(name, "/elsewhere")
+            assert compiler.compile_library(*model).parent != first.parent
+            known += 1
+            assert len(list((cache / "compilers").iterdir())) == known
+    for name in ("CPATH", "C_INCLUDE_PATH", "LIBRARY_PATH", "TMPDIR", "LANG"):
+        with monkeypatch.context() as changed, row(name):
+            changed.setenv(name, "/tmp")
+            assert compiler.compile_library(*model) == first
+
+
+def test_c_library_reaches_the_key(model, monkeypatch):
+    first, asked = compiler.compile_library(*model), []
+    for version in ("glibc 2.17", "glibc 2.99"):
+        monkeypatch.setattr(os, "confstr", lambda name, v=version: asked.append(name) or v)
+        another = compiler.compile_library(*model)
+        assert another.parent != first.parent
+        first = another
+    assert set(asked) == {"CS_GNU_LIBC_VERSION"}
+
+
 def test_another_processor_gets_another_library(model, monkeypatch, script, tmp_path):
     script(f'case "$*" in *help=target*) cat {tmp_path}/processor; exit 0;; esac')
     built = []
     for processor in ("zen", "lake"):
         (tmp_path / "processor").write_text(f"-march= {processor}\n")
-        monkeypatch.setattr(
-            "serpentail.model.toolchain._processor", lambda processor=processor: processor
-        )
+        monkeypatch.setattr("serpentail.model.toolchain._processor", lambda p=processor: p)
         built.append(compiler.compile_library(*model))
     assert built[0].parent != built[1].parent
     forbid_processes(monkeypatch)
     assert compiler.compile_library(*model) == built[1]
 
 
-def test_upgrade_behind_a_wrapper_reaches_the_next_key(model, monkeypatch, script, tmp_path):
+def test_upgrade_behind_a_wrapper_reaches_the_next_key(model, script, tmp_path):
     script(f'case "$*" in *--version*) cat {tmp_path}/version; exit 0;; esac')
     (tmp_path / "version").write_text("mycc 1\n")
     old = compiler.compile_library(*model)
@@ -98,17 +111,10 @@ def test_native_flag_falls_back(model, script):
     assert call_twice(compiler.compile_library(*model)) == 42.0
 
 
-def test_profiles_differ_in_contraction():
-    fast, exact = (
-        compiler.describe_compiler(profile)["flags"] for profile in ("fast", "reproducible")
-    )
-    assert "-ffp-contract=fast" in fast and "-ffp-contract=off" in exact
-    assert not [flag for flag in exact if "native" in flag]
-    assert "-ffast-math" not in fast + exact
-
-
-def test_description_tells_no_folder(monkeypatch):
+def test_description_tells_flags_and_no_folder(monkeypatch):
     monkeypatch.setenv("CC", f"{shutil.which('cc')} -pipe")
-    described = compiler.describe_compiler()
-    assert described["command"] == "cc -pipe"
-    assert described["version"]
+    fast, exact = map(compiler.describe_compiler, ("fast", "reproducible"))
+    assert fast["command"] == "cc -pipe" and fast["version"]
+    assert "-ffp-contract=fast" in fast["flags"] and "-ffp-contract=off" in exact["flags"]
+    assert not [flag for flag in exact["flags"] if "native" in flag]
+    assert "-ffast-math" not in fast["flags"] + exact["flags"]

@@ -1,21 +1,11 @@
-"""Models: every function takes any array of numbers, alone or in batches, and refuses the rest by
-name.
-"""
+"""A model with every function, whose batches nobody else has compiled in this process."""
 
 import pytest
 
 import serpentail as st
-
-from ...support.models import model_folder
-from .calls import folder
+from tests.support import zoo
 
 
 @pytest.fixture(scope="module")
 def model():
-    return st.load(folder())
-
-
-@pytest.fixture(scope="module")
-def small():
-    """A model with one function."""
-    return st.load(model_folder(1, 2, name="small", functions=["mass_matrix"]))
+    return st.load(zoo.folder("m2_n2"))

@@ -1,1 +1,0 @@
-"""Rates of airborne motion, and their derivatives."""

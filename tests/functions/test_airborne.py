@@ -1,0 +1,178 @@
+"""Rates of airborne states are those of the full animal; their derivatives are those of a complex
+step.
+"""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from serpentail import StateError
+from serpentail.attitude import quaternion_rate
+from serpentail_codegen.ir.interpret import Run
+from tests.references.metrics import block_error, equilibrated_condition
+from tests.support import zoo
+from tests.support.derivative_models import COMPLEX, STEP, nest_of, of_every_kind, parameters_of
+from tests.support.rows import row
+
+from .compared import model_of
+
+QUICK = ["m1_n3", "loops", "arcs2_loops", "elastic", "mixed"]
+SLOW = ["m3_n4", "straight", "arcs3", "own_links", "own_arcs", "elastic_arcs", "weightless"]
+ROUNDING = 2e-13  # of a derivative, relative to its row; for each unit of the condition number
+every_model = pytest.mark.parametrize(
+    "name", [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)]
+)
+
+
+def calls(model):
+    """Names, full states and arguments of calls: B at the origin and at rest, and weights of the
+    order of one over each rate's size.
+    """
+    nt = model.nv - 6
+    sizes = np.repeat([1, 10, 500, 20], [4, nt, nt, 3])
+    for name, state in of_every_kind(model):
+        q, v = state["q"].copy(), state["v"].copy()
+        q[:3], v[:3] = 0, 0
+        given = {"x": np.concatenate([q[3:], v[6:]]), "tau": state["tau"]}
+        given["angular"] = model.momentum(q, v)[1]
+        weights = np.random.default_rng(41).normal(size=len(sizes)) / sizes
+        yield name, (q, v, state["tau"]), given | {"weights": weights}
+
+
+def all_three(model, arguments):
+    """The outputs of all three functions: y; y, J; y, J, H."""
+    rates = [arguments[name] for name in ("x", "tau", "angular")]
+    y = model.airborne_rates(*rates)
+    J = model.airborne_rates_derivatives(*rates)
+    return (y,), J, model.airborne_rates_hessian(*rates, arguments["weights"])
+
+
+def condition(model, q):
+    """Condition number of H."""
+    return equilibrated_condition(model.mass_matrix(q))
+
+
+def blocks(*sizes):
+    """Slices of a vector with one unit each."""
+    return [slice(a, b) for a, b in pairwise(np.cumsum([0, *sizes]))]
+
+
+def worst(found, expected, rows, columns):
+    """Largest error over blocks, relative to the block's largest entry."""
+    errors = [0.0]
+    for r in rows:
+        floor = 1e-9 * np.abs(expected[r]).max()
+        for c in columns:
+            scale = max(np.abs(expected[r, c]).max(), floor)
+            errors.append(np.abs(found[r, c] - expected[r, c]).max() / scale if scale else 0.0)
+    return max(errors)
+
+
+def along(model, name, arguments):
+    """Complex steps along every number of x and tau: output -> (length, directions)."""
+    nest = nest_of(model, name)
+    x, tau = arguments["x"], arguments["tau"]
+    unit = np.eye(len(x) + len(tau))
+    steps = {"x": unit[: len(x)], "tau": unit[len(x) :]}
+    scalars = {}
+    for array in (*nest.of_role("parameters"), *nest.of_role("input")):
+        values = {**parameters_of(model), **arguments}[array.name]
+        step = steps.get(array.name, np.zeros((len(values), len(unit))))
+        scalars[array.name] = list(np.asarray(values)[:, None] + 1j * STEP * step)
+    # every direction is a run of its own: wide arrays have lanes of their own
+    found = {a.name: np.zeros((a.length, len(unit))) for a in nest.of_role("output")}
+    for k in range(len(unit)):
+        run = Run(nest, COMPLEX, {n: [s[k] for s in rows] for n, rows in scalars.items()})
+        for output, values in found.items():
+            values[:, k] = np.array([np.imag(s) for s in run.values[output]]) / STEP
+    return found
+
+
+@every_model
+def test_rates_are_those_of_full_dynamics_at_that_momentum(name):
+    model, rows = model_of(name), []
+    for at, (q, v, tau), arguments in calls(model):
+        (y,), (first, J), (second, same, H) = all_three(model, arguments)
+        rows.append((arguments, (y, J, H)))
+        quaternion, rate, acceleration, omega = np.split(y, np.cumsum([4, len(tau), len(tau)]))
+        most = condition(model, q)
+        with row(at):
+            assert np.abs(omega - v[3:6]).max() <= 2e-14 * most * max(np.abs(v).max(), 1e-300)
+            expected = model.forward_dynamics(q, v, tau)[6:]
+            assert block_error(acceleration, expected) <= 1e-13 * most
+            np.testing.assert_array_equal(rate, v[6:])
+            turning = np.array(quaternion_rate(q[3:7], omega))
+            np.testing.assert_allclose(quaternion, turning, atol=1e-15 * np.abs(turning).max())
+            for found, values in ((first, y), (second, y), (same, J)):
+                scale = np.abs(values).max(axis=-1, keepdims=True)
+                assert (np.abs(found - values) <= 1e-11 * scale + 1e-300).all()
+    stack = {key: np.array([arguments[key] for arguments, _ in rows]) for key in arguments}
+    for found, alone in zip(
+        all_three(model, stack)[2], zip(*(each for _, each in rows), strict=True), strict=True
+    ):
+        assert np.abs(found - np.array(alone)).max() <= 1e-11 * np.abs(alone).max()
+
+
+@every_model
+def test_derivatives_are_those_of_a_complex_step(name):
+    model = model_of(name)
+    nt = model.nv - 6
+    by, of = blocks(4, nt, nt, nt), blocks(4, nt, nt, 3)
+    for at, (q, _, _), arguments in [*calls(model)][::2]:
+        y, J, H = all_three(model, arguments)[2]
+        limit = ROUNDING * condition(model, q)
+        steps = along(model, "airborne_rates_derivatives", arguments)["J"]
+        expected = np.einsum("r,rck->ck", arguments["weights"], steps.reshape(len(y), *H.shape))
+        with row(at):
+            assert worst(J, along(model, "airborne_rates", arguments)["y"], of, by) <= limit
+            assert worst(H, expected, by, by) <= limit
+            np.testing.assert_array_equal(H, H.T)
+            # torques enter with coordinates alone
+            assert not np.delete(H[-nt:], np.r_[4 : 4 + nt], axis=1).any()
+            twice = all_three(model, arguments | {"weights": 2 * arguments["weights"]})[2][2]
+            np.testing.assert_array_equal(twice, 2 * H)
+
+
+def one_call(model):
+    """Arguments of one call, free to be changed."""
+    return next({key: x.copy() for key, x in given.items()} for _, _, given in calls(model))
+
+
+def test_attitudes_that_do_not_matter():
+    """The norm of a quaternion is a factor of its rate alone; a turn of state and momentum changes
+    nothing in torso axes.
+    """
+    model = zoo.model("loops")
+    arguments = one_call(model)
+    w, x, y, z = arguments["x"][:4]
+    a, b, c = arguments["angular"]
+    expected = all_three(model, arguments)[0][0]
+    arguments["x"][:4] *= -3.7
+    found = all_three(model, arguments)[0][0]
+    np.testing.assert_allclose(found[:4], -3.7 * expected[:4], rtol=1e-13)
+    np.testing.assert_allclose(found[4:], expected[4:], rtol=1e-12)
+    arguments["x"][:4] = np.sqrt(0.5) * np.array([w - x, x + w, y - z, z + y])  # about x
+    arguments["angular"] = np.array([a, -c, b])
+    found = all_three(model, arguments)[0][0]
+    np.testing.assert_allclose(found[4:], expected[4:], rtol=1e-11, atol=1e-12)
+
+
+def test_wrong_states_are_refused():
+    model = zoo.model("loops")
+    for value in (np.nan, np.inf):
+        for name in ("x", "tau", "angular", "weights"):
+            arguments = one_call(model)
+            arguments[name][-1] = value
+            with row(name, value), pytest.raises(StateError, match=f"hessian: {name}"):
+                model.airborne_rates_hessian(*arguments.values())
+    for scale in (0.0, 1e-200, 1e200):
+        arguments = one_call(model)
+        arguments["x"][:4] *= scale
+        with row(scale), pytest.raises(StateError, match="quaternion"):
+            all_three(model, arguments)
+    arcs = zoo.model("arcs2_loops")
+    arguments = one_call(arcs)
+    arguments["x"][6:8] = 6, 6
+    with pytest.raises(StateError, match=r"segment 2 .*8\.48528"):
+        all_three(arcs, arguments)

@@ -1,1 +1,0 @@
-"""Tests of models whose folders are generated again."""

@@ -1,0 +1,173 @@
+"""Calls through the extension give what calls through ctypes give, and leave nothing behind."""
+
+import copy
+import gc
+import os
+import subprocess
+import sys
+import sysconfig
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import serpentail as st
+from serpentail.model import calls, kernel
+from serpentail.model.toolchain import candidates
+from tests.support import zoo
+
+from ...support.rows import row
+from .calls import ARGUMENTS, CALLS, FORMS, assert_same, call, state, states
+
+HEADERS = Path(sysconfig.get_path("include"))
+WARNINGS = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
+
+
+def by_ctypes(model):
+    """The model with the extension left out."""
+    plain = copy.copy(model)
+    for each in plain.kernels.values():
+        each.fast = calls.declined
+    return plain
+
+
+def answer(model, name, arguments):
+    """What a call comes to: outputs with their types, or the words of the error."""
+    try:
+        outputs = call(model, name, arguments)
+    except Exception as error:
+        return type(error), str(error)
+    return [(type(o), o.dtype, o.shape, o.flags.writeable, o.tobytes()) for o in outputs]
+
+
+def test_both_ways_give_the_same_bits_and_words(model):
+    for each, givens in (
+        (model, (state(), states(1), states(3))),
+        (st.load(zoo.folder("single")), (state(), {k: np.float32(a) for k, a in state().items()})),
+    ):
+        plain = by_ctypes(each)
+        for name in CALLS:
+            for given in givens:
+                for form, change in FORMS.items():
+                    changed = {key: change(array) for key, array in given.items()}
+                    tried = [changed]
+                    if given["q"].ndim == 1:
+                        tried += [given | {one: changed[one]} for one in ARGUMENTS[name]]
+                    for arguments in tried:
+                        with row(each, name, given["q"].shape, form):
+                            assert answer(each, name, arguments) == answer(plain, name, arguments)
+
+
+def test_neither_results_nor_arguments_are_held(model):
+    given = state()
+    counts = [sys.getrefcount(array) for array in given.values()]
+    for name in CALLS:
+        for _ in range(100):
+            outputs = call(model, name, given)
+        assert all(not np.ndim(o) or o.base is None for o in outputs), name
+    assert [sys.getrefcount(array) for array in given.values()] == counts
+
+
+def test_calls_leave_nothing_in_memory(model):
+    """Not those that pass, are declined or fail, nor those of models that come and go."""
+    s, other = state(), state()["q"].astype("datetime64[s]")
+
+    def work(times):
+        """Do so much, and return the bytes and pages that are in use then."""
+        for _ in range(times):
+            model.forward_dynamics(s["q"], s["v"], s["tau"])
+            model.energy(s["q"], s["v"])
+            model.momentum(s["q"], FORMS["strided"](s["v"]))
+        for _ in range(times // 100):
+            with pytest.raises(st.StateError):
+                model.energy(other, s["v"])
+            with pytest.raises(st.StateError):
+                model.mass_matrix(0 * s["q"])
+        gc.collect()
+        return np.array([tracemalloc.get_traced_memory()[0], pages()])
+
+    tracemalloc.start()
+    try:
+        work(1000)
+        grown = -work(1000) + work(15_000)
+    finally:
+        tracemalloc.stop()
+    assert grown[0] < 15_000  # bytes: of each call less than one
+    before = pages()
+    for _ in range(300):
+        copy.copy(model).energy(s["q"], s["v"])
+    gc.collect()
+    assert (grown[1] + pages() - before) * os.sysconf("SC_PAGE_SIZE") < 1_000_000
+
+
+def pages():
+    """How many pages of memory this process has."""
+    return int(Path("/proc/self/statm").read_text().split()[1])
+
+
+def test_a_call_keeps_what_it_works_on(model):
+    """Threads that make a kernel's first call at once each make what calls; one of them stays."""
+    s = state()
+    expected = model.energy(s["q"], s["v"])
+    function = copy.copy(model).kernel("energy")
+    first, second = function._prepared(), function._prepared()
+    assert first is not second and function.fast is second
+    del function
+    gc.collect()
+    filler = [np.full(size, np.nan) for size in range(1, 40) for _ in range(200)]
+    assert first(s["q"], s["v"]) == second(s["q"], s["v"]) == expected and filler
+
+
+def test_a_call_within_a_call(model):
+    """Garbage that is collected while outputs are copied may run a call of the same function."""
+    a, b = state(1), state(2)
+    expected = {k: model.energy(s["q"], s["v"]) for k, s in enumerate((a, b))}
+    found, within = [], []
+
+    def collected(phase, _):
+        if phase == "start" and not within:
+            within.append(True)
+            found.append(model.energy(b["q"], b["v"]))
+            within.clear()
+
+    thresholds = gc.get_threshold()
+    gc.callbacks.append(collected)
+    gc.set_threshold(1)
+    try:
+        outer = [model.energy(a["q"], a["v"]) for _ in range(200)]
+    finally:
+        gc.set_threshold(*thresholds)
+        gc.callbacks.remove(collected)
+    assert found and set(found) == {expected[1]} and set(outer) == {expected[0]}
+
+
+def test_where_it_cannot_be_had_or_calls_are_long_ctypes_serves(model, monkeypatch, tmp_path):
+    assert (calls.extension() is not None) == (HEADERS / "Python.h").is_file()
+    monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path))
+    for change in (
+        lambda changed: changed.setattr(sysconfig, "get_path", lambda _: str(tmp_path)),
+        lambda changed: changed.setattr(sysconfig, "get_config_var", lambda _: 1),
+        lambda changed: changed.setenv("CC", "false"),
+    ):
+        with monkeypatch.context() as changed:
+            change(changed)
+            assert calls.extension.__wrapped__() is None
+    for owner, name, lack in ((calls, "extension", lambda: None), (kernel, "MOST_HELD", 0)):
+        with monkeypatch.context() as changed:
+            changed.setattr(owner, name, lack)
+            other = copy.copy(model)
+            for function in CALLS:
+                with row(name, function):
+                    found = call(other, function, state())
+                    call(other, function, state(2))
+                    assert_same(found, call(model, function, state()))
+                    assert other.kernels[function].fast in (calls.declined, None)
+
+
+def test_it_compiles_without_warnings(tmp_path):
+    made = str(tmp_path / "calls.o")
+    headers = ("-isystem", str(HEADERS))
+    command = (*next(iter(candidates())), *WARNINGS, *headers, "-c", str(calls.SOURCE), "-o", made)
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")

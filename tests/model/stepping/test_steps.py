@@ -1,0 +1,221 @@
+"""Steps of many runs: in lanes as singly, in place as elsewhere, in any number of threads, each run
+under its own torques and parameters, in flight and on the ground, whichever points touch there.
+"""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as drawn
+
+import serpentail as st
+from serpentail.model.library import NOT_POSITIVE_DEFINITE, STEP_TOO_LONG
+from serpentail.model.stepping.singly import SingleSteps
+from tests.support import zoo
+from tests.support.models import folder_of
+
+from ...c.batches.ground import TOUCHING, states
+from ...support.rows import row
+
+H = 2e-4  # s
+RUNS = 19  # two groups of lanes, and some left over
+AIR, GROUND = "m2_n2", "ground_m2_n2"
+
+
+def runs_of(model, count=RUNS, seed=5, touching=TOUCHING):
+    """Arguments of steps by name, all runs different; on the ground legs move at 2 rad/s or so."""
+    if model.contacts:
+        values = states(model, (list(touching) * count)[:count], seed)
+        values.pop("angles")
+        values["legs"][:, 4:] *= 20
+        if "feet" not in model.contacts:
+            values.pop("legs")
+    else:
+        rng, nt = np.random.default_rng(seed), model.layout.nt
+        q, v = 0.1 * rng.normal(size=(count, 7 + nt)), rng.normal(size=(count, 6 + nt))
+        q[:, 3] += 1
+        values = {"q": q, "v": v, "tau": 1e-4 * rng.normal(size=(count, nt))}
+    values["q"][:, 3:7] /= np.linalg.norm(values["q"][:, 3:7], axis=1, keepdims=True)
+    return {name: array.astype(model.parameter_vector.dtype) for name, array in values.items()}
+
+
+def moving(values):
+    """The arrays that steps advance."""
+    return [values[name] for name in ("q", "v", "bristles") if name in values]
+
+
+def stepped(model, values, h=H, **settings):
+    """All numbers of the runs after some steps."""
+    arguments = dict(values)
+    state = [arguments.pop(name) for name in ("q", "v", "tau")]
+    return np.hstack(model.step(*state, h, **arguments, **settings))
+
+
+def alone(model, values, parameters=None, **settings):
+    """The same by a call for each run."""
+    rows = []
+    for k in range(len(values["q"])):
+        one = {name: array[k : k + 1] for name, array in values.items()}
+        own = {name: value[k : k + 1] for name, value in (parameters or {}).items()}
+        rows.append(stepped(model, one, parameters=own, **settings)[0])
+    return np.array(rows)
+
+
+def assert_alike(model, found, expected):
+    """Within rounding, which ill-conditioned contacts enlarge."""
+    digits = np.finfo(model.parameter_vector.dtype).eps
+    scale = np.maximum(np.abs(expected).max(axis=0), 1e-3)
+    assert (np.abs(found - expected) <= 1e6 * digits * scale).all()
+
+
+@pytest.fixture(params=[AIR, GROUND])
+def model(request):
+    return zoo.model(request.param)
+
+
+def test_steps_of_one_call_are_those_of_many(model):
+    """In place, into other arrays, of one state, which has no batch axis, and in threads."""
+    many = runs_of(model)
+    for values in (many, {name: array[4] for name, array in many.items()}):
+        expected, own = stepped(model, values, steps=3), dict(values)
+        for _ in range(3):
+            into = [np.zeros_like(array) for array in moving(own)]
+            stepped(model, own, out=into)
+            own |= zip(("q", "v", "bristles"), into, strict=False)
+            if "legs" in own:
+                angles, rates = np.split(own["legs"], 2, axis=-1)
+                own["legs"] = np.concatenate([angles + H * rates, rates], axis=-1)
+        np.testing.assert_allclose(np.hstack(into), expected, rtol=1e-8, atol=1e-11)
+        held = {name: array.copy() for name, array in values.items()}
+        found = stepped(model, held, steps=3, out=moving(held))
+        assert np.array_equal(found, expected) and np.array_equal(np.hstack(moving(held)), found)
+    values = runs_of(model, 780 if not model.contacts else 80)
+    one, three = (stepped(model, values, steps=4, threads=n) for n in (1, 3))
+    assert np.array_equal(one, three)
+
+
+def test_single_rows_are_repeated(model):
+    values = runs_of(model)
+    one = {name: array[2] for name, array in values.items() if name not in ("v", "bristles")}
+    tiled = {name: np.tile(array, (RUNS, 1)) for name, array in one.items()}
+    assert np.array_equal(stepped(model, values | one), stepped(model, values | tiled))
+
+
+def test_runs_have_parameters_of_their_own(model):
+    for count in (3, RUNS):
+        values = runs_of(model, count)
+        changes = {
+            "tail_mass": np.linspace(0.008, 0.02, count),
+            "gravity": np.linspace(0, 9, count),
+        }
+        for each in (changes, model.parameters_of_runs(changes, count)):
+            found = stepped(model, values, parameters=each)
+            for k in range(count):
+                own = model.with_parameters(**{name: x[k] for name, x in changes.items()})
+                with row(count, type(each), k):
+                    one = {name: array[k] for name, array in values.items()}
+                    assert_alike(model, found[k], stepped(own, one))
+
+
+def test_a_run_that_fails_leaves_its_neighbours(model):
+    for count in (4, RUNS):
+        values, statuses = runs_of(model, count), np.full(count, -1, np.intc)
+        expected = alone(model, values)
+        if model.contacts:
+            values["v"][2, 3:6] = 3 / H  # rad/s: farther than the search for contacts allows
+        else:
+            values["v"][2, 6:] = 1e200
+        with pytest.raises(st.SimulationError, match=r"step of run 2: [^(]*too long[^(]*$"):
+            stepped(model, values)
+        values["v"][1] = values["v"][2]
+        with pytest.raises(st.SimulationError, match=rf"run 1: .*\(2 of {count} runs failed\)"):
+            stepped(model, values)
+        values["tau"][1] = np.nan  # a status where statuses are asked for
+        found = stepped(model, values, statuses=statuses)
+        assert list(statuses.nonzero()[0]) == [1, 2]
+        assert_alike(model, np.delete(found, [1, 2], 0), np.delete(expected, [1, 2], 0))
+        if model.contacts:
+            assert statuses[2] == STEP_TOO_LONG != NOT_POSITIVE_DEFINITE
+            kept = np.hstack([values["q"], values["v"]])[2]
+            np.testing.assert_allclose(found[2, : kept.size], kept, rtol=1e-12, atol=1e-15)
+
+
+def test_floats_and_baked_parameters_serve():
+    values = runs_of(zoo.model(AIR))
+    found = stepped(zoo.model("single"), {n: a.astype(np.float32) for n, a in values.items()})
+    expected = stepped(zoo.model(AIR), values)
+    assert (
+        found.dtype == np.float32 and (np.abs(found - expected) < 2e-4 * (1 + abs(expected))).all()
+    )
+    values = runs_of(zoo.model("m1_n3"))
+    found, expected = (stepped(zoo.model(name), values) for name in ("baked", "m1_n3"))
+    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
+
+
+# In lanes, on the ground
+
+
+@pytest.fixture
+def in_lanes(monkeypatch):
+    """Fails if a call of several runs makes some of them singly."""
+    make = SingleSteps.make
+
+    def made(self, held, first, last):
+        assert held.runs == 1, "made singly"
+        make(self, held, first, last)
+
+    monkeypatch.setattr(SingleSteps, "make", made)
+
+
+def test_mixed_contacts_give_what_each_run_gives_alone(in_lanes):
+    names = ["contact_points", "contact_dynamics", "rollout", "implicit"]
+    options = {"contacts": ["tail", "torso"], "functions": names, "baked": True}
+    footless = st.load(folder_of(zoo.scene("m1_n1", **options)))  # the zoo has none
+    others = ("ground_arcs", "ground", "single_ground", "paper", "elastic_ground")
+    for model in (*map(zoo.model, (AIR, GROUND, *others)), footless):
+        values = runs_of(model)
+        for steps in (1, 4):
+            with row(model.name, steps):
+                found = stepped(model, values, steps=steps)
+                assert_alike(model, found, alone(model, values, steps=steps))
+
+
+@settings(deadline=None, max_examples=20)
+@given(
+    touching=drawn.lists(drawn.sampled_from(TOUCHING), min_size=8, max_size=17),
+    seed=drawn.integers(0, 2**32 - 1),
+    friction=drawn.floats(0.1, 1.5),
+)
+def test_any_mixture_of_contacts_and_parameters(touching, seed, friction):
+    model, count = zoo.model(GROUND), len(touching)
+    values, mass = runs_of(model, count, seed, touching), np.linspace(0.09, 0.12, count)
+    parameters = {"mu": np.linspace(0.1, friction, count), "torso_mass": mass}
+    together = stepped(model, values, parameters=parameters, steps=2)
+    assert_alike(model, together, alone(model, values, parameters, steps=2))
+
+
+def test_friction_that_jams_in_some_lanes_is_held_there(in_lanes):
+    """The matrix of a run whose friction jams is not positive definite with a bound that moves."""
+    model, h, jams = zoo.model(GROUND), 1e-3, []
+    values = runs_of(model, 24, 3, ("all", "some", "none", "all"))
+    values["v"][:, :2] *= 10
+    for k in range(24):
+        q, v, bristles, legs = (values[name][k] for name in ("q", "v", "bristles", "legs"))
+        factor = model.kernel("implicit_factor")
+        try:
+            factor(q, v, np.zeros(4), np.zeros(2), np.array([h, 1.0]), bristles, legs)
+        except st.StateError:
+            jams.append(k)
+    assert 0 < len(jams) < 18
+    together, single = (step(model, values, h=h) for step in (stepped, alone))
+    for k in range(24):
+        assert_alike(model, together[k : k + 1], single[k : k + 1])
+
+
+def test_arcs_bent_out_of_range_fail_where_they_do_alone():
+    model = zoo.model("ground_arcs")
+    values, limit = runs_of(model, 9), model.manifest["scene"]["bend_range"]
+    values["q"][4, 7:9], values["v"][4, 6:8] = [0.999 * limit, 0], [0.01 * limit / H, 0]
+    lanes, single = (np.zeros(count, np.intc) for count in (9, 1))
+    stepped(model, values, statuses=lanes)
+    stepped(model, {name: array[4:5] for name, array in values.items()}, statuses=single)
+    assert single[0] != 0 and lanes[4] == single[0] and not np.delete(lanes, 4).any()

@@ -1,0 +1,211 @@
+"""The model that was checked is the model that runs, whatever becomes of its folder: it is compiled
+from a private copy in the cache.
+"""
+
+import copy
+import json
+import os
+import pickle
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import serpentail as st
+from serpentail.model import manifest
+from serpentail.model.reading import Held
+from serpentail.simulation import parallel_runs
+from serpentail_codegen.targets.write import write_folder
+from tests.support import zoo
+from tests.support.models import model_folder
+
+from ..support.rows import row
+
+Q, V, TAU = [0, 0, 0, 1, 0, 0, 0, 0.3, -0.2], [0.5] * 8, [0.1, 0.2]
+
+
+FUNCTIONS = ["mass_matrix", "forward_dynamics", "energy", "momentum", "rollout"]
+
+
+def of_links(links):
+    """What the generator writes of a model called tail, as the zoo has none: texts, manifest."""
+    folder = model_folder(1, links, name="tail", functions=FUNCTIONS)
+    content = json.loads((folder / "manifest.json").read_text())
+    return {name: (folder / name).read_text() for name in content["files"]}, content
+
+
+def put(folder, made):
+    """Write such a model to a folder, as the generator does."""
+    write_folder(folder, *made)
+    return folder
+
+
+def agree(model):
+    """Check that CasADi and C are of one model."""
+    found = model.casadi.mass_matrix(Q).full()
+    np.testing.assert_allclose(found, model.mass_matrix(Q), rtol=1e-12, atol=1e-18)
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    """An empty cache."""
+    monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Where models called tail come and go."""
+    return tmp_path / "tail"
+
+
+# What is compiled or built later
+
+
+def test_late_code_is_of_the_model_and_needs_nothing_of_the_cache(folder, cache, monkeypatch):
+    """Batches, runs side by side and CasADi functions; what was deleted there is written again."""
+    monkeypatch.setattr(parallel_runs, "worth_batching", lambda *_: True)
+    rng = np.random.default_rng(4)
+    q, v = rng.normal(size=(1000, 9)), rng.normal(size=(1000, 8))
+    model = st.load(put(folder, of_links(1)))
+    put(folder, of_links(2))
+    shutil.rmtree(cache)
+    expected = [model.forward_dynamics(*state, TAU) for state in zip(q[:9], v[:9], strict=True)]
+    found = model.forward_dynamics(q, v, TAU)[:9]
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
+    shutil.rmtree(folder)
+    shutil.rmtree(cache)
+    settings = {"t_span": 0.01, "method": "rk4", "step": 1e-3}
+    runs = st.simulate(model, np.tile(Q, (9, 1)), 0.1 * v[:9], **settings)
+    assert runs.info["abreast"] == 8
+    alone = st.simulate(model, Q, 0.1 * v[8], **settings)
+    np.testing.assert_allclose(runs.q[8], alone.q, rtol=0, atol=1e-9)
+    for each in (model, model.with_parameters(tail_mass=0.005), copy.deepcopy(model)):
+        agree(each)
+
+
+def test_module_is_executed_from_the_text_that_was_checked(folder):
+    model = st.load(put(folder, of_links(1)))
+    (folder / "tail_casadi.py").write_text("raise KeyError('edited')\n")
+    agree(model)
+
+
+# Pickles
+
+UNPICKLE = (
+    "import pathlib, pickle, sys; model = pickle.loads(pathlib.Path(sys.argv[1]).read_bytes()); "
+    f"print(model.mass_matrix({Q}).tobytes().hex())"
+)
+
+
+def test_pickle_is_of_the_model_that_was_pickled(folder, cache, tmp_path, monkeypatch):
+    """Elsewhere, too, although it was loaded by a relative path."""
+    monkeypatch.chdir(tmp_path)
+    put(folder, of_links(1))
+    model = st.load("tail", {"tail_mass": 0.005}, profile="reproducible", threads=3)
+    (tmp_path / "pickled").write_bytes(pickle.dumps(model))
+    put(folder, of_links(2))
+    twin = pickle.loads((tmp_path / "pickled").read_bytes())
+    np.testing.assert_array_equal(twin.mass_matrix(Q), model.mass_matrix(Q))
+    assert (twin.folder, twin.profile, twin.batch_library.threads) == (folder, "reproducible", 3)
+    assert twin.parameters == model.parameters
+    command = [sys.executable, "-c", UNPICKLE, str(tmp_path / "pickled")]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd="/")
+    assert done.stdout.strip() == model.mass_matrix(Q).tobytes().hex()
+
+
+def test_pickle_without_its_snapshot_takes_the_same_folder_and_no_other(folder, cache):
+    model = st.load(put(folder, of_links(1)))
+    pickled = pickle.dumps(model)
+    (snapshot,) = (cache / "models").iterdir()
+    (snapshot / "src" / "tail.c").write_text("int other;\n")
+    assert pickle.loads(pickled).checked.files == model.checked.files
+    put(snapshot, of_links(2))
+    assert pickle.loads(pickled).checked.files == model.checked.files
+    shutil.rmtree(cache / "models")
+    np.testing.assert_array_equal(pickle.loads(pickled).mass_matrix(Q), model.mass_matrix(Q))
+    shutil.rmtree(cache)
+    put(folder, of_links(2))
+    with pytest.raises(st.ModelError, match="generated again since the model was pickled"):
+        pickle.loads(pickled)
+    shutil.rmtree(folder)
+    with pytest.raises(st.ModelError, match="is not a generated folder"):
+        pickle.loads(pickled)
+
+
+def test_models_without_c_need_no_cache(monkeypatch, tmp_path):
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path / "file" / "cache"))
+    model = st.load(zoo.folder("bare"), compiled=False)
+    found, expected = (
+        each.casadi.forward_dynamics(Q, V, TAU).full()
+        for each in (pickle.loads(pickle.dumps(model)), model)
+    )
+    np.testing.assert_array_equal(found, expected)
+
+
+# Snapshots
+
+
+def test_snapshots_are_for_the_user_alone_and_see_no_planted_header(cache, tmp_path):
+    folder = shutil.copytree(zoo.folder("bare"), tmp_path / "bare")
+    for place in ("include", "src"):
+        (folder / place / "math.h").write_text("#error planted\n")
+    before = os.umask(0)
+    try:
+        st.load(folder)
+    finally:
+        os.umask(before)
+    assert not list(cache.rglob("math.h"))
+    (snapshot,) = (cache / "models").iterdir()
+    assert snapshot.stat().st_mode & 0o777 == 0o700
+
+
+DAMAGES = [  # of the whole, of a file, and beside it
+    *(("", lambda path: path.write_text("")), ("", os.mkfifo)),
+    *(("src/bare.c", lambda path: path.write_text("int other;\n")), ("src/bare.c", os.mkfifo)),
+    *(("src/bare.c", lambda _: None), ("include/math.h", lambda path: path.write_text("#error"))),
+]
+
+
+def test_damaged_snapshot_is_replaced(cache):
+    model, expected = st.load(zoo.folder("bare")), zoo.model("bare").forward_dynamics(Q, V, TAU)
+    (snapshot,) = (cache / "models").iterdir()
+    for k, (name, put_in_place) in enumerate(DAMAGES):
+        with row(k, name):
+            shutil.rmtree(cache / "libraries")
+            path = snapshot / name
+            shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
+            put_in_place(path)
+            found = st.load(zoo.folder("bare")).forward_dynamics(Q, V, TAU)
+            np.testing.assert_array_equal(found, expected)
+            files = {p.relative_to(snapshot).as_posix() for p in snapshot.rglob("*") if p.is_file()}
+            assert files == {*model.checked.files, "manifest.json"}
+            assert not list((cache / "parts").iterdir())
+
+
+# Loads while the folder is generated again
+
+
+def test_a_folder_that_is_exchanged_while_it_is_read(folder, monkeypatch):
+    """No mixture of two models, and no charge that somebody changed the files."""
+    read, exchanges = Held.read, []
+
+    def exchanging(self, name):
+        if name != "manifest.json" and len(exchanges) < most:
+            exchanges.append(name)
+            put(folder, of_links(1 + len(exchanges) % 2))
+        return read(self, name)
+
+    monkeypatch.setattr(Held, "read", exchanging)
+    for most in (1, 4):
+        exchanges.clear()
+        model = st.load(put(folder, of_links(1)), compiled=False)
+        assert model.links == 1 + most % 2 and len(exchanges) == most
+        assert model.checked.files["src/tail.c"] == (folder / "src" / "tail.c").read_bytes()
+    most = 1000
+    monkeypatch.setattr(manifest, "MOST_READS", 3)
+    with pytest.raises(st.ModelError, match="keeps changing"):
+        st.load(folder, compiled=False)

@@ -1,0 +1,219 @@
+"""Planning again, which derives nothing anew; guesses, multipliers; and being told to stop."""
+
+import signal
+import threading
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import serpentail as st
+from serpentail.attitude import from_angles
+from serpentail.planning import rounds, ways
+from serpentail.planning.condensed import fatrop
+from serpentail.planning.nlp import interrupt, solver, transcription
+from serpentail.planning.nlp.blas_threads import _blas, one_thread
+from serpentail.planning.nlp.equations import equations_of_motion
+from serpentail.planning.nlp.multipliers import carried
+from serpentail.planning.nlp.transcription import transcription_of
+from serpentail.planning.result import report as result_report
+from tests.support.tumbling import AGAIN, planned, rat, start
+
+ENDLESS = {
+    "ipopt": {"ipopt.tol": 1e-300, "ipopt.acceptable_iter": 0, "ipopt.max_iter": 10**6},
+    "fatrop": {"fatrop.tolerance": 1e-300, "fatrop.max_iter": 10**6, "fatrop.print_level": 0},
+}
+
+
+def again(model=None, **settings) -> st.Plan:
+    """A plan of one round."""
+    return st.plan(model or rat(), **AGAIN | {"start": start(rat())} | settings)
+
+
+def test_planning_again_from_a_plan_takes_fewer_iterations():
+    fresh = planned(tolerance=None)
+    same = planned(tolerance=None, guess=fresh)
+    assert same.report["converged"] and same.report["iterations"] < fresh.report["iterations"] / 2
+    assert same.report["objective"] == pytest.approx(fresh.report["objective"], rel=1e-4)
+
+
+def test_planning_again_from_neighbouring_states_derives_nothing(monkeypatch):
+    q, v = start(rat())
+    once = again(start=(q, 1.005 * v), guess=again())
+    for module, name in ((transcription, "transcribe"), (solver, "_engine")):
+        monkeypatch.setattr(module, name, lambda *_: pytest.fail("derived again"))
+    found = again(start=(q, 1.01 * v), guess=once)
+    assert found.report["converged"] and found.report["iterations"] <= 8
+    np.testing.assert_allclose(found.trajectory.v[0, 3:], 1.01 * v[3:], atol=1e-9)
+
+
+def test_a_plan_of_the_same_size_lends_its_multipliers_and_no_other(monkeypatch):
+    begun = []
+
+    def noted(nlp, name, options, guess):
+        begun.append(guess)
+        return solver.solver(nlp, name, options, guess)
+
+    monkeypatch.setattr(ways, "solver", noted)
+    plan = again(intervals=4)
+    for settings, guess in (({}, "warm"), ({"rule": "lobatto"}, "close")):
+        del begun[:]
+        assert again(guess=plan, **settings).report["converged"] and begun[0] == guess
+
+
+def test_multipliers_are_carried_to_another_mesh():
+    """The solver, given none, finds the same ones there; on the mesh itself they stay."""
+    programs, solutions, plan = [], [], None
+    for intervals in (24, 36):
+        # One of several optima: the other mesh begins at the first one's.
+        plan = again(intervals=intervals, guess=plan, bounds=st.Bounds(angle=0.45))
+        own = (rat(), plan.problem, plan.mesh, plan.rule, equations_of_motion(rat()))
+        programs.append(transcription_of(*own))
+        solutions.append(plan.solution.multipliers)
+    assert np.abs(solutions[0][0]).max() > 1e-3  # a bound is active
+    kept = carried(solutions[0], programs[0], programs[0])
+    for found, given in zip(kept, solutions[0], strict=True):
+        np.testing.assert_allclose(found, given, atol=1e-12)
+    for found, wanted in zip(carried(solutions[0], *programs), solutions[1], strict=True):
+        assert np.linalg.norm(found - wanted) < 1e-3 * np.linalg.norm(wanted)
+
+
+def test_refinement_goes_on_from_the_multipliers(monkeypatch):
+    iterations = []
+    for carry in (carried, lambda *_: None):
+        monkeypatch.setattr(ways, "SPARSE", replace(ways.SPARSE, carried=carry))
+        plan = again(intervals=8, tolerance=1e-4)
+        assert plan.success and plan.report["rounds"] > 1
+        iterations.append(plan.report["iterations"])
+    assert iterations[0] < iterations[1]
+
+
+def test_other_problems_and_models_share_no_program():
+    """A memoised program answers for its own problem only: damping, goal and model all matter.
+    Dynamics by CasADi's operations gives the plan of the compiled one.
+    """
+    few = {"intervals": 4}
+    heavy = rat().with_parameters(tail_mass=0.005)
+    goal = st.Goal(attitude=from_angles(np.array([0.1, 0, 0])))
+    found = [again(**few), again(**few, damping=1e-3), again(**few, goal=goal), again(heavy, **few)]
+    assert len({plan.report["objective"] for plan in found}) == 4
+    np.testing.assert_array_equal(again(**few).solution.w, found[0].solution.w)
+    other = again(**few, dynamics="symbolic")
+    assert found[0].report["dynamics"] == "compiled" and other.report["dynamics"] == "symbolic"
+    objective = found[0].report["objective"]
+    assert other.report["objective"] == pytest.approx(objective, rel=1e-7)
+    np.testing.assert_allclose(other.solution.w, found[0].solution.w, atol=1e-5)
+
+
+def test_several_guesses_are_at_least_as_good_as_one():
+    one, many = (planned(tolerance=None, intervals=8, multi_start=count) for count in (1, 3))
+    assert one.report["guesses"] == 1 and many.report["guesses"] == 3
+    assert many.report["objective"] <= one.report["objective"] * (1 + 1e-6)
+
+
+def test_solver_uses_one_thread_and_gives_back_the_others():
+    blas = _blas()
+    before = blas.openblas_get_num_threads()
+    with one_thread():
+        assert blas.openblas_get_num_threads() == 1
+    assert blas.openblas_get_num_threads() == before
+
+
+# Stopping.
+
+
+def endless(name, **settings):
+    """A solve that would take a million iterations."""
+    return again(solver=name, options=ENDLESS[name], intervals=20, **settings)
+
+
+@pytest.mark.parametrize("name", ENDLESS)
+def test_interrupt_and_time_limit_end_a_solve_inside_and_return_its_iterate(name):
+    endless(name, time_limit=0.01)  # derives before it can be stopped
+    before = signal.getsignal(signal.SIGINT)
+    timer = threading.Timer(0.2, signal.raise_signal, (signal.SIGINT,))
+    timer.start()
+    plan = endless(name)
+    timer.join()
+    assert plan.report["stopped"] == "interrupt" and signal.getsignal(signal.SIGINT) is before
+    begun = time.perf_counter()
+    cut = endless(name, time_limit=0.2)
+    assert time.perf_counter() - begun >= 0.2
+    assert cut.report["stopped"] == "time limit" and cut.report["iterations"] > 1
+    for each in (plan, cut):
+        assert not each.success and np.isfinite(each.solution.w).all()
+        assert each.report["guesses"] == 1 and each.report["status"] == "User_Requested_Stop"
+
+
+def test_a_time_limit_that_is_not_reached_changes_nothing():
+    free, limited = again(intervals=6), again(intervals=6, time_limit=60)
+    assert limited.report["stopped"] is None and limited.success
+    np.testing.assert_array_equal(free.solution.w, limited.solution.w)
+
+
+def test_what_is_raised_while_a_solve_goes_on_is_raised_after_it(monkeypatch):
+    def interrupted():
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(fatrop, "stop_reason", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        again(solver="fatrop", intervals=12)
+
+
+def test_a_stop_between_rounds_keeps_the_best_round(monkeypatch):
+    """It is good for all but the tolerance."""
+    finer, settings = rounds.Search._finer, {"intervals": 6, "tolerance": 1e-12, "rounds": 30}
+
+    def interrupted(search, last):
+        signal.raise_signal(signal.SIGINT)
+        return finer(search, last)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(rounds.Search, "_finer", interrupted)
+        plan = again(**settings)
+    monkeypatch.setattr(rounds, "stop_reason", lambda: "time limit")
+    cut = again(**settings)
+    for each, why in ((plan, "interrupt"), (cut, "time limit")):
+        assert not each.success and each.report["converged"]
+        assert (each.report["stopped"], each.report["intervals"]) == (why, 6)
+    assert cut.report["rounds"] == 1
+
+
+def test_time_limits_count_the_tracking_and_leave_it_out_without_time(monkeypatch):
+    tracked, given = result_report.tracked, {"intervals": 6, "track": True}
+
+    def slow(*arguments):
+        time.sleep(0.2)
+        return tracked(*arguments)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(result_report, "tracked", slow)
+        begun = time.perf_counter()
+        report = again(**given).report
+        assert 0.2 + report["truth_s"] <= report["wall_s"] <= time.perf_counter() - begun
+    monkeypatch.setattr(result_report, "TRACKING_COST", 1e6)
+    for limit, stopped in ((60.0, "time limit"), (None, None)):
+        report = again(**given, time_limit=limit).report
+        assert report["stopped"] == stopped and report["success"]
+        assert (report["tracked_attitude_error_deg"] is None) == (limit is not None)
+
+
+def test_time_limits_are_of_one_thread_and_a_second_interrupt_is_the_usual_one():
+    found = {}
+
+    def other():
+        with interrupt.stoppable(3600.0):
+            found["other"] = interrupt.stop_reason()
+
+    with interrupt.stoppable(1e-9):
+        thread = threading.Thread(target=other)
+        thread.start()
+        thread.join()
+        assert (interrupt.stop_reason(), found["other"]) == ("time limit", None)
+    with pytest.raises(KeyboardInterrupt), interrupt.stoppable():
+        signal.raise_signal(signal.SIGINT)
+        assert interrupt.stop_reason() == "interrupt"
+        signal.raise_signal(signal.SIGINT)
+    with interrupt.stoppable():
+        assert not interrupt.stop_reason()

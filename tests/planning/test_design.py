@@ -1,0 +1,282 @@
+"""Plans that choose parameters of the model and parts of their start: the best of many ordinary
+plans, and true.
+"""
+
+from functools import cache
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import serpentail as st
+from serpentail.attitude import angle_deg, pitch_roll_yaw
+from serpentail.planning.design import checked_design
+from serpentail.planning.nlp.body import Body
+from serpentail.planning.nlp.equations import equations_of_motion
+from serpentail.planning.nlp.mesh import uniform
+from serpentail.planning.nlp.rules import collocation_rule
+from serpentail.planning.nlp.transcription import transcription_of
+from tests.support import zoo
+from tests.support.rows import row
+from tests.support.tumbling import AGAIN, DURATION, integrated, rat, start
+
+RANGE, RATES = (0.08, 0.25), 6.0  # m, rad/s
+LENGTH = {"design": {"tail_length": RANGE}}
+FREE = {"free_start": {"tail": (-0.5, 0.5), "tail_rate": (-RATES, RATES)}}
+# of plans that are true enough on a coarse mesh
+SETTINGS = AGAIN | {"tolerance": 0.01, "intervals": 12}
+
+
+@cache
+def planned() -> st.Plan:
+    """The plan of the rat's own tail and start."""
+    return st.plan(rat(), start=start(rat()), **AGAIN, intervals=12)
+
+
+def again(model=None, **settings) -> st.Plan:
+    """A plan of one round, from the plan of the rat's own start."""
+    model = model or rat()
+    return st.plan(model, **AGAIN | {"start": start(rat()), "guess": planned()} | settings)
+
+
+def ordinary(plan, **parameters):
+    """The least effort of an ordinary plan on a plan's mesh, for other parameters."""
+    found = again(rat().with_parameters(**parameters), start=plan.start, guess=plan)
+    assert found.report["converged"]
+    return found.report["objective"]
+
+
+@pytest.fixture(scope="module")
+def chosen() -> st.Plan:
+    """The tail length of least effort, on a mesh that is fine enough."""
+    return st.plan(rat(), start=start(rat()), guess=planned(), **LENGTH, **SETTINGS)
+
+
+@pytest.fixture(scope="module")
+def freed() -> st.Plan:
+    """The start of least effort, on a mesh that is fine enough."""
+    return st.plan(rat(), start=start(rat()), **FREE, **SETTINGS)
+
+
+def test_parameters_follow_as_in_the_model():
+    for values in (
+        {"tail_length": 0.12, "tail_mass": 0.005},
+        {"torso_inertia": (6e-5, 4e-5, 7e-5), "torso_mass": 0.2},
+        {"link_radius": 0.004, "tail_mount": (0.001, -0.03, 0.0)},
+        {"link_inertia": (5e-6, 1e-8, 6e-6), "gravity": 3.7},
+    ):
+        ranges = {name: (value, 1.1 * np.abs(value)) for name, value in values.items()}
+        design = checked_design(rat(), ranges)
+        symbols = ca.SX.sym("design", design.size)
+        vector = ca.Function("vector", [symbols], [Body(rat(), design, symbols).vector])
+        found = np.array(vector(np.concatenate([np.atleast_1d(x) for x in values.values()])))
+        wanted = np.array(rat().with_parameters(**values).casadi.parameter_vector)
+        np.testing.assert_allclose(found, wanted, rtol=1e-14, err_msg=str(values))
+
+
+def test_totals_follow_from_links():
+    """Mass and length of a tail whose links have their own."""
+    model = zoo.model("own_links")
+    masses = 1.2 * np.array(model.parameters["link_masses"])
+    design = checked_design(model, {"link_masses": (0.5 * masses, 2 * masses)})
+    body = Body(model, design, ca.SX(masses))
+    own = model.with_parameters(link_masses=masses)
+    assert float(ca.DM(body.parameters["tail_mass"])) == pytest.approx(own.parameters["tail_mass"])
+    assert body.parameters["tail_length"] == own.parameters["tail_length"]
+    vector = np.array(ca.DM(body.vector))
+    np.testing.assert_allclose(vector, np.array(own.casadi.parameter_vector), rtol=1e-14)
+
+
+def check_derivatives(formulation, attitude, rule):
+    """Those of the program are those of CasADi's differentiation of objective and constraints."""
+    model = zoo.model("m1_n1")
+    path = ((lambda point: point.tip[2] - point.parameters["tail_length"] * point.time, -1, 1),)
+    free = {"tail": ((-0.4, -0.1), (0.4, 0.2)), "tail_rate": (-8, 8), "torso_rate": (-4, 4)}
+    inertia = ((6e-5, 3.6e-5, 7e-5), (7e-5, 4e-5, 8e-5))
+    settings = {"formulation": formulation, "attitude": attitude, "rule": rule, "intervals": 2}
+    settings |= {"options": {"ipopt.max_iter": 0}, "retries": 0, "duration": (0.3, DURATION)}
+    settings |= {"design": {"tail_length": RANGE, "torso_inertia": inertia}, "path": path}
+    settings["free_start"] = free | ({"attitude": (-0.1, 1)} if attitude == "euler" else {})
+
+    def objective(point):
+        return ca.sumsqr(point.torque) * point.parameters["torso_inertia"][1]
+
+    plan = again(model, guess=None, objective=objective, **settings)
+    problem, found = plan.problem, plan.solution
+    equations = equations_of_motion(model, design=problem.design)
+    nlp = transcription_of(model, problem, uniform(2), collocation_rule(rule, None), equations)
+    w, p, lam_f, lam_g = (nlp.functions["hess_lag"].mx_in(k) for k in range(4))
+    f, g = nlp.functions["nlp"](w, p)
+    total = lam_f * f + ca.dot(lam_g, g)
+    parts = [ca.gradient(f, w), ca.jacobian(g, w), ca.triu(ca.hessian(total, w)[0])]
+    wanted = ca.Function("wanted", [w, p, lam_f, lam_g], parts)
+    random = np.random.default_rng(1)
+    point = found.w + random.uniform(-0.05, 0.05, found.w.size)
+    parameters, multipliers = np.r_[np.zeros(9), 1.0], random.normal(size=nlp.rows)
+    own = [
+        nlp.functions["grad_f"](point, parameters)[1],
+        nlp.functions["jac_g"](point, parameters)[1],
+        nlp.functions["hess_lag"](point, parameters, 0.7, multipliers),
+    ]
+    for ours, casadis in zip(own, wanted(point, parameters, 0.7, multipliers), strict=True):
+        atol = 1e-10 * np.abs(casadis.full()).max()
+        np.testing.assert_allclose(ours.full(), casadis.full(), atol=atol, rtol=1e-9)
+    assert np.abs(own[1].full()[:, 1]).max() > 0  # the length's column
+
+
+def test_derivatives_are_casadis():
+    for row_of in (
+        ("airborne", "quaternion", "radau"),
+        ("translation-free", "quaternion", "trapezoidal"),
+        ("full", "euler", "radau"),
+    ):
+        with row(*row_of):
+            check_derivatives(*row_of)
+
+
+def test_a_range_of_no_width_is_no_choice():
+    (q, v), length = start(rat()), rat().parameters["tail_length"]
+    narrow = {"tail_rate": (v[6:], v[6:] + 1e-12), "tail": (q[7:], q[7:] + 1e-12)}
+    usual, times = again(), np.linspace(0, DURATION, 50)
+    for more in (
+        {"design": {"tail_length": (length, length * (1 + 1e-12))}},
+        {"free_start": narrow},
+    ):
+        same = again(**more)
+        assert same.report["objective"] == pytest.approx(usual.report["objective"], rel=1e-6)
+        np.testing.assert_allclose(same.torque(times), usual.torque(times), atol=1e-6)
+
+
+def test_plans_are_true_for_what_they_chose(chosen, freed):
+    for plan in (chosen, freed):
+        q, v = integrated(plan.model, plan)
+        end = plan.trajectory
+        assert plan.success
+        assert angle_deg(q[3:7] / np.linalg.norm(q[3:7]), end.attitude[-1]) < 0.011
+        np.testing.assert_allclose(v[3:], end.v[-1, 3:], atol=0.01)
+    length = chosen.design["tail_length"]
+    assert RANGE[0] < length < RANGE[1] and chosen.report["design"] == chosen.design
+    assert chosen.model.parameters["tail_length"] == length
+    assert f"design: tail_length {length:.4f}" in repr(chosen)
+    wrong, _ = integrated(rat(), chosen)  # the model's own tail does something else
+    end = chosen.trajectory.attitude[-1]
+    assert angle_deg(wrong[3:7] / np.linalg.norm(wrong[3:7]), end) > 1
+
+    (q0, v0), given = freed.start, start(rat())
+    assert freed.report["start"] == {"tail": q0[7:].tolist(), "tail_rate": v0[6:].tolist()}
+    assert (np.abs(q0[7:]) <= 0.5).all() and (np.abs(v0[6:]) <= RATES).all()
+    np.testing.assert_array_equal(q0[:7], given[0][:7])
+    np.testing.assert_array_equal(v0[:6], given[1][:6])
+    wanted, usual = (rat().momentum(*each)[1] for each in (freed.start, given))
+    assert np.linalg.norm(wanted - usual) > 1e-3 * np.linalg.norm(usual)
+    kept = np.tile(wanted, (len(freed.trajectory.t), 1))
+    np.testing.assert_allclose(freed.trajectory.angular_momentum, kept, atol=1e-12)
+
+
+def test_no_ordinary_plan_is_better(chosen):
+    """Plans by compiled C, one for each of several lengths, and of several rates at the start, on
+    the same mesh; the vertex of the parabola through three of them is what was chosen.
+    """
+    other = start(rat())[1][7]
+    free = again(free_start={"tail_rate": ((-RATES, other), (RATES, other))})
+
+    def of_length(length):
+        return ordinary(chosen, tail_length=length)
+
+    def of_rate(rate):
+        q, v = start(rat())
+        v[6] = rate
+        return again(start=(q, v), guess=free).report["objective"]
+
+    length, rate = chosen.design["tail_length"], free.start[1][6]
+    assert free.report["converged"] and abs(rate) < RATES - 0.5
+    for plan, function, found, step, ends in (
+        (chosen, of_length, length, 0.02 * length, RANGE),
+        (free, of_rate, rate, 0.2, (-RATES, RATES)),
+    ):
+        best = plan.report["objective"]
+        assert function(found) == pytest.approx(best, rel=1e-6)
+        near = [function(found + way * step) for way in (-1, 1)]
+        assert min(near) > best * (1 + 1e-6)
+        assert min(map(function, np.linspace(*ends, 4))) > best * (1 - 1e-6)
+        vertex = found + step / 2 * (near[0] - near[1]) / (near[0] + near[1] - 2 * best)
+        assert vertex == pytest.approx(found, abs=0.1 * step)
+    slope = chosen.report["design_slopes"]["tail_length"]
+    assert abs(slope) < 1e-4 * chosen.report["objective"] / length
+
+
+def test_slopes_are_those_of_ordinary_plans(chosen):
+    """At a bound the multiplier is the derivative of the least effort by the length."""
+    for ends, at in (((0.08, 0.12), 1), ((0.22, 0.25), 0)):
+        plan, h = again(design={"tail_length": ends}, guess=chosen), 1e-3 * ends[at]
+        assert plan.report["converged"] and plan.design["tail_length"] == pytest.approx(ends[at])
+        low, high = (ordinary(plan, tail_length=ends[at] + step) for step in (-h, h))
+        slope = plan.report["design_slopes"]["tail_length"]
+        assert slope == pytest.approx((high - low) / (2 * h), rel=1e-3)
+
+
+def test_formulations_choose_the_same(chosen, freed):
+    for formulation in ("translation-free", "full"):
+        plan = again(formulation=formulation, guess=chosen, **LENGTH)
+        free = again(formulation=formulation, guess=freed, **FREE)
+        with row(formulation):
+            for own, wanted in ((plan, chosen), (free, freed)):
+                assert own.report["converged"]
+                cost = wanted.report["objective"]
+                assert own.report["objective"] == pytest.approx(cost, rel=1e-3)
+            length = chosen.design["tail_length"]
+            assert plan.design["tail_length"] == pytest.approx(length, rel=1e-3)
+            np.testing.assert_allclose(free.start[1], freed.start[1], atol=0.05)
+
+
+def test_attitude_and_torso_rate_may_be_free():
+    """Upright at the end is easier from a start that is nearly upright."""
+    free = {"attitude": ((0.2, 0, 0), (0.9, 0, 0)), "torso_rate": (-1, 1)}
+    plan = again(attitude="euler", free_start=free, guess=None)
+    v0, angles = plan.start[1], pitch_roll_yaw(plan.start[0])
+    assert plan.report["converged"] and 0.2 <= angles[0] + 1e-12 < 0.9
+    np.testing.assert_allclose(angles[1:], 0, atol=1e-9)
+    assert (np.abs(v0[3:6]) <= 1).all()
+    q, _ = integrated(rat(), plan)
+    assert angle_deg(q[3:7] / np.linalg.norm(q[3:7]), plan.trajectory.attitude[-1]) < 0.1
+
+
+def test_a_path_holds_from_the_start_on():
+    """The lowest throw begins at the floor, though no node of Radau's rule is at the start."""
+    floor = 0.32
+    plan = again(
+        path=((lambda point: point.height, floor, np.inf),),
+        objective=lambda point: ca.sumsqr(point.torque / 1e-3) + 100 * point.height,
+        free_start={"position": ((0, 0, 0.2), (0, 0, 0.5))},
+    )
+    assert plan.report["converged"] and plan.start[0][2] == pytest.approx(floor, rel=1e-6)
+    assert plan.trajectory.q[:, 2].min() >= floor * (1 - 1e-3)
+
+
+def test_both_at_once_and_again(freed):
+    """Start and length; the plan of both is a guess for the next, in another formulation, too."""
+    plan = again(guess=freed, **FREE, **LENGTH)
+    assert plan.report["converged"] and plan.report["objective"] < freed.report["objective"]
+    known = again(rat().with_parameters(**plan.design), start=plan.start, guess=plan)
+    assert known.report["objective"] == pytest.approx(plan.report["objective"], rel=1e-6)
+    full = again(formulation="full", guess=plan, **FREE, **LENGTH)
+    assert full.design["tail_length"] == pytest.approx(plan.design["tail_length"], rel=1e-2)
+
+
+@pytest.mark.slow
+def test_least_energy_and_time_from_passive_flight_with_several_guesses():
+    """Slower torques for energy: without their bound the best motion has pulses that no mesh
+    resolves.
+    """
+    common = {"guess": None, "tolerance": 0.01}
+    bounds = st.Bounds(angle=np.pi / 3, torque_rate=1.0)
+    known, free = (
+        again(objective="energy", bounds=bounds, **common, **more) for more in ({}, FREE)
+    )
+    assert known.success and free.success
+    assert free.report["energy_J"] < known.report["energy_J"]
+    common |= {"objective": "time", "duration": (0.1, DURATION), "multi_start": 3}
+    common["bounds"] = st.Bounds(angle=np.pi / 3, torque=0.005)
+    known, free, all_free = (again(**common, **more) for more in ({}, FREE, FREE | LENGTH))
+    assert known.success and free.success and all_free.success
+    assert all_free.duration < free.duration < known.duration

@@ -1,0 +1,170 @@
+"""Stages in C: collocation solved inside, exact derivatives of what they lead to, and threads."""
+
+import ctypes
+import os
+import threading
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+import serpentail as st
+from serpentail.planning.condensed import fatrop, helpers
+from serpentail.planning.condensed.fatrop import kernel
+from tests.support.rows import row
+from tests.support.stages import first_stage
+from tests.support.tumbling import AGAIN, rat, start
+
+H = np.array([1e-4, -2e-4, 5e-5])  # kg m^2/s
+CASES = [
+    ((1, 3), {}),
+    ((1, 3), {"controls": 2, "objective": "energy", "damping": 1e-4}),
+    ((1, 3), {"degree": 5, "objective": "time", "duration": (0.4, 0.4)}),
+    ((1, 3), {"degree": 1}),
+    ((2, 2), {"controls": 3, "damping": 1e-4}),
+]
+LIMIT = 30  # s, of a test that waits for a thread
+
+
+def state(nt: int) -> np.ndarray:
+    """A state in units: the quaternion not of norm 1."""
+    random = np.random.default_rng(1)
+    tail, rate = 0.2 * random.normal(size=nt), 0.3 * random.normal(size=nt)
+    return np.concatenate([[0.9, 0.3, 0.2, -0.1], tail, rate])
+
+
+def variables(stage, x: np.ndarray, size: float = 0.5) -> np.ndarray:
+    random = np.random.default_rng(2)
+    controls = size * random.normal(size=stage.size - len(x) - 1)
+    return np.concatenate([controls, x, [0.4]])
+
+
+def differences(function, v, step=1e-5):
+    """Central differences (.., v) of a function."""
+    rows = [(function(v + step * e) - function(v - step * e)) / (2 * step) for e in np.eye(len(v))]
+    return np.stack(rows, axis=-1)
+
+
+def test_derivatives_are_central_differences():
+    """Slopes of the results, and Hessians of the weighted results."""
+    for tail, settings in CASES:
+        model = rat(*tail)
+        x = state(model.layout.nt)
+        with row(tail, settings), first_stage(model, x, H, **settings) as stage:
+            v = variables(stage, x)
+            J = stage.slopes(v)
+            own = differences(stage.values, v)
+            np.testing.assert_allclose(J, own, atol=1e-6 * np.abs(J).max())
+            mu = np.random.default_rng(3).normal(size=len(J))
+            found = stage.hessian(v, mu)
+            np.testing.assert_array_equal(found, found.T)
+            wanted = mu @ np.moveaxis(differences(stage.slopes, v), 0, 1)
+            np.testing.assert_allclose(found, wanted, atol=1e-5 * np.abs(found).max())
+
+
+NODE = ctypes.CFUNCTYPE(ctypes.c_int, *(ctypes.c_void_p,) * 6)
+
+
+def filling(number, status):
+    """A function of a node of (1, 3) that gives one number everywhere, and its status."""
+
+    def node(*pointers):
+        numbers = ctypes.cast(pointers[4], ctypes.POINTER(ctypes.c_double))
+        np.ctypeslib.as_array(numbers, (11,))[:] = number
+        return status
+
+    return NODE(node)
+
+
+def test_a_stage_without_numbers_has_no_results_until_it_has_them_again():
+    model, x = rat(), state(2)
+    for given in ((np.nan, 0), (np.inf, 0), (1e300, 0), (0.0, 1)):
+        functions = dict.fromkeys(("rates", "slopes", "curvature"), filling(*given))
+        with row(*given), first_stage(model, x, H, functions=functions) as stage:
+            v = variables(stage, x)
+            assert stage.values(v) is None and stage.slopes(v) is None
+            assert stage.hessian(v, np.ones(1000)) is None
+    with first_stage(model, x, H) as stage:
+        v = variables(stage, x)
+        wanted, far = stage.values(v), np.where(np.arange(len(v)) < 6, 1e9, v)
+        assert stage.values(far) is None
+        np.testing.assert_allclose(stage.values(v), wanted, atol=1e-10)
+
+
+def test_linear_equations_are_solved_and_singular_ones_refused():
+    code, random = kernel(), np.random.default_rng(4)
+    code.factorise.argtypes = (ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)
+    code.solve.argtypes = (ctypes.c_int, *(ctypes.c_void_p,) * 2, ctypes.c_int, ctypes.c_void_p)
+    code.solve_transposed.argtypes = (ctypes.c_int, *(ctypes.c_void_p,) * 3)
+    for n in (1, 2, 5, 24):
+        A, B, b = random.normal(size=(n, n)), random.normal(size=(n, 7)), random.normal(size=n)
+        A[0, 0] = 0.0 if n > 1 else 2.0  # needs another pivot
+        factors, X, x, pivots = A.copy(), B.copy(), b.copy(), np.zeros(n, np.intc)
+        assert code.factorise(n, factors.ctypes.data, pivots.ctypes.data) == 0
+        code.solve(n, factors.ctypes.data, pivots.ctypes.data, 7, X.ctypes.data)
+        code.solve_transposed(n, factors.ctypes.data, pivots.ctypes.data, x.ctypes.data)
+        np.testing.assert_allclose(A @ X, B, atol=1e-11)
+        np.testing.assert_allclose(A.T @ x, b, atol=1e-11)
+    for singular in (np.zeros((3, 3)), np.ones((2, 2)), np.full((2, 2), np.nan)):
+        pivots = np.zeros(len(singular), np.intc)
+        assert code.factorise(len(singular), singular.ctypes.data, pivots.ctypes.data) == 1
+
+
+# Threads.
+
+
+@contextmanager
+def program(**settings):
+    """Yield the code and a program of six stages, and variables at which it can be evaluated."""
+    model, x = rat(), state(2)
+    with first_stage(model, x, H, **settings) as stage:
+        code = kernel()
+        code.program_slopes.argtypes = (ctypes.c_void_p,) * 2
+        w = np.zeros(code.program_variables(stage.program))
+        nu, own = stage.size - len(x) - 1, stage.size
+        w[nu] = 0.4
+        for k in range(1, 6):
+            first = k * own - len(x)
+            w[first + nu : first + own] = [*x, 0.4]
+        yield code, stage, w
+
+
+def slopes(code, stage, w):
+    """Jacobians of the results of all six stages."""
+    code.program_slopes(stage.program, w.ctypes.data)
+    stages = stage.all[:6]
+    assert all(own.sloped for own in stages)
+    return [np.ctypeslib.as_array(own.Jr, (own.results, own.variables)).copy() for own in stages]
+
+
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_stages_have_the_numbers_of_one_thread():
+    """Also in a forked child, which evaluates alone."""
+    with program() as (code, stage, w):
+        wanted = slopes(code, stage, w)
+    for crew in (1, 2, 5):
+        with program() as (code, stage, w), helpers.helped(code, stage.program, crew):
+            for a, b in zip(wanted, slopes(code, stage, w), strict=True):
+                np.testing.assert_array_equal(a, b)
+            child = os.fork()
+            if child == 0:
+                code.program_slopes(stage.program, (1.001 * w).ctypes.data)
+                pairs = zip(wanted, slopes(code, stage, w), strict=True)
+                os._exit(0 if all(np.allclose(a, b) for a, b in pairs) else 1)
+            assert os.waitpid(child, 0)[1] == 0
+
+
+def test_plans_have_as_many_threads_as_the_model_allows_and_do_not_depend_on_them(monkeypatch):
+    """But few stages have one; none of the threads is left afterwards."""
+    seen, before, found = set(), threading.active_count(), []
+    monkeypatch.setattr(fatrop, "stop_reason", lambda: seen.add(threading.active_count()))
+    monkeypatch.delenv("SERPENTAIL_THREADS", raising=False)
+    given = AGAIN | {"start": start(rat()), "solver": "fatrop"}
+    for count, intervals, used in ((1, 30, 1), (3, 30, 3), (3, 6, 1)):
+        monkeypatch.setattr(rat().batch_library, "threads", count)
+        found.append(st.plan(rat(), **given, intervals=intervals))
+        assert seen == {before + used - 1}
+        seen.clear()
+    assert threading.active_count() == before
+    assert found[0].report["iterations"] == found[1].report["iterations"]
+    np.testing.assert_array_equal(found[0].solution.w, found[1].solution.w)

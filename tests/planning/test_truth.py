@@ -1,0 +1,254 @@
+"""What a plan is called true for, by other means: its end, laws, bounds between nodes, energy."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import serpentail as st
+from serpentail.attitude import angle_deg
+from serpentail.planning.nlp.coordinates import attitude
+from serpentail.planning.result.full_state import full_state
+from serpentail.planning.result.truth import local_errors, open_loop
+from tests.references.passive import PassiveTail
+from tests.support import zoo
+from tests.support.rows import row
+from tests.support.tumbling import AGAIN, DURATION, integrated, planned, rat, rate, start
+
+FORMS = [
+    ("airborne", "quaternion"),
+    ("translation-free", "quaternion"),
+    ("full", "euler"),
+]
+WEAK = st.Bounds(angle=np.pi / 3, torque=1.5e-3)  # N m: an eighth of what the plan would like
+
+
+def dense(plan, count=4001):
+    """Times and torques of a plan, far more than it has nodes."""
+    times = np.linspace(0, plan.duration, count)
+    return times, plan.torque(times)
+
+
+def first_rate(point):
+    return point.tail_rate[0]
+
+
+def test_plans_of_all_formulations_reach_the_goal_in_truth():
+    """They are one optimum, and their ends those of an independent integration."""
+    for formulation, coordinates in FORMS:
+        plan = planned(formulation=formulation, attitude=coordinates, guess=planned())
+        report, end, (q, v) = plan.report, plan.trajectory, integrated(rat(), plan)
+        with row(formulation, coordinates):
+            assert plan.success and report["converged"] and report["dynamics"] == "compiled"
+            assert report["open_loop_attitude_error_deg"] <= 0.01
+            assert st.pitch_roll_yaw(end.q[-1])[:2] == pytest.approx([0, 0], abs=1e-6)
+            np.testing.assert_allclose(end.v[-1, 3:6], 0, atol=1e-6)
+            assert np.abs(end.tail).max() <= np.pi / 3 + 1e-3
+            assert np.abs(end.tau).max() <= 0.02 + 1e-6
+            assert report["objective"] == pytest.approx(planned().report["objective"], rel=2e-3)
+            off = angle_deg(q[3:7] / np.linalg.norm(q[3:7]), end.attitude[-1])
+            assert report["open_loop_attitude_error_deg"] == pytest.approx(off, abs=1e-5)
+            worst = np.abs(v[3:] - end.v[-1, 3:]).max()
+            assert report["open_loop_rate_error"] == pytest.approx(worst, abs=1e-5)
+            np.testing.assert_allclose(q[:3], end.q[-1, :3], atol=1e-4)
+
+
+def test_airborne_plans_conserve_momentum_and_move_as_fast_as_they_say():
+    """Between their nodes, too."""
+    flight, curve, problem, h = planned().trajectory, planned().curve, planned().problem, 1e-6
+    assert np.ptp(flight.angular_momentum, axis=0).max() < 1e-15
+    fall = flight.linear_momentum - flight.linear_momentum[0]
+    weight = 9.8 * (0.10572 + 0.00351)
+    np.testing.assert_allclose(fall, flight.t[:, None] * [0, 0, -weight], atol=1e-12)
+    times, origin = np.linspace(0.01, DURATION - 0.01, 7), (problem.q0, problem.v0)
+    behind, here, ahead = (
+        full_state(rat(), origin, attitude("quaternion"), t, curve.at(t))
+        for t in (times - h, times, times + h)
+    )
+    slope = (ahead[0] - behind[0])[:, :3] / (2 * h)
+    np.testing.assert_allclose(slope, here[1][:, :3], atol=2e-3)
+    assert flight.t[-1] == pytest.approx(DURATION)
+
+
+def test_energy_and_power_are_those_of_an_independent_flight():
+    model, plan = rat(), planned(tolerance=None, intervals=8)
+    y_dot, energy, peak = rate(model, plan), 0.0, 0.0
+    y = np.concatenate([plan.problem.q0, plan.problem.v0, [0.0]])
+
+    def power(t, y):
+        return np.abs(plan.torque(t)[0] * y[model.nq + 6 : -1]).sum()
+
+    def slope(t, y):
+        return np.append(y_dot(t, y[:-1]), power(t, y))
+
+    how = {"method": "DOP853", "rtol": 1e-9, "atol": 1e-11, "max_step": 2e-3}
+    for ends in zip(plan.curve.ends[:-1], plan.curve.ends[1:] - 1e-13, strict=True):
+        motion = solve_ivp(slope, ends, y, **how)
+        y, energy = motion.y[:, -1], motion.y[-1, -1]
+        peak = max(peak, *map(power, motion.t, motion.y.T))
+    assert plan.report["energy_J"] == pytest.approx(energy, rel=1e-5)
+    assert plan.report["peak_power_W"] == pytest.approx(peak, rel=2e-3)
+
+
+def test_errors_of_tracking_are_those_of_a_simulation_that_tracks():
+    """From the first sample to the last, by Tsit5 where the report has SciPy's DOP853."""
+    model = rat()
+    plan = st.plan(model, start=start(model), **AGAIN | {"intervals": 8, "track": True})
+    law = st.Pfl(model, plan, torque=plan.problem.bounds.torque)
+    how = {"t_span": DURATION, "method": "tsit5", "rtol": 1e-9, "output_step": 1e-4}
+    run = st.simulate(model, *start(model), controller=law, **how)
+    tail = np.column_stack([np.interp(plan.trajectory.t, run.t, angle) for angle in run.tail.T])
+    error = np.abs(tail - plan.trajectory.tail).max()
+    assert plan.report["tracked_tail_error_rad"] == pytest.approx(error, rel=0.01)
+
+
+def test_bounds_hold_between_nodes():
+    """The first round goes beyond the torque's bound, and says so; the last does not."""
+    settings = {"start": start(rat()), "duration": DURATION, "bounds": WEAK, "track": False}
+    goal = st.Goal(torso_rate=None)
+    first = st.plan(rat(), goal=goal, rounds=0, **settings)
+    beyond = np.abs(dense(first)[1]).max() / 1.5e-3 - 1
+    assert beyond > 0.01 and not first.success
+    assert first.report["bound_excess"] == pytest.approx(beyond, rel=0.02)
+    assert first.report["bound_excess_of"] == "torque"
+    plan = st.plan(rat(), goal=goal, **settings)
+    assert plan.success and plan.report["bound_excess"] <= 1e-3
+    times, torques = dense(plan)
+    assert np.abs(torques).max() / 1.5e-3 - 1 <= 1e-3
+    assert np.abs(plan.curve.at(times)["tail"]).max() / (np.pi / 3) - 1 <= 1e-3
+
+
+def test_torques_are_never_steeper_than_their_bound():
+    """Between nodes, and from interval to interval."""
+    given = AGAIN | {"start": start(rat())}
+    given |= {"bounds": st.Bounds(angle=np.pi / 3, torque_rate=0.04)}
+    for rule, degree, intervals in (("radau", 3, 12), ("radau", 1, 30), ("lobatto", 3, 12)):
+        plan = st.plan(rat(), **given, rule=rule, degree=degree, intervals=intervals)
+        times, torques = dense(plan)
+        if degree == 1:  # steps, each over an interval
+            times, torques = plan.curve.ends[1:], plan.curve.nodes["torque"][:, 0]
+        steepest = np.abs(np.diff(torques, axis=0) / np.diff(times)[:, None]).max()
+        with row(rule, degree):
+            assert plan.report["converged"] and 0.039 < steepest <= 0.04 * (1 + 1e-5)
+            assert plan.report["bound_excess"] < 1e-5
+
+
+def test_path_constraints_are_judged_between_nodes():
+    rows = ((first_rate, -3.7, 9.0),)
+    rough = planned(path=rows, rounds=0, intervals=8)
+    rates = rough.curve.at(np.linspace(0, DURATION, 4001))["tail_rate"][:, 0]
+    beyond = (-3.7 - rates.min()) / 9
+    assert beyond > 1e-3 and not rough.success
+    assert rough.report["bound_excess"] == pytest.approx(beyond, rel=0.02)
+    assert rough.report["bound_excess_of"] == "path"
+    fine = planned(path=rows, intervals=8)
+    assert fine.success and fine.report["bound_excess"] <= 1e-3
+
+
+def test_success_asks_for_attitude_tail_and_rates():
+    """A plan that cannot be refined is flagged where it is not as true as was asked."""
+    again = {"guess": planned(), "rounds": 0}
+    assert planned(**again).success
+    for name in ("tolerance", "tail_tolerance", "rate_tolerance"):
+        plan = planned(**again, **{name: 1e-12})
+        assert not plan.success and plan.report["converged"] and not plan.report["success"], name
+        assert planned(**again, **{name: None}).success
+    assert planned(**again).report["open_loop_tail_error_deg"] > 1e-12
+
+
+def test_refinement_reduces_the_true_error_and_each_round_is_watched():
+    plans, given = [], {"intervals": 4}
+    found = planned(**given, tolerance=1e-3, watch=plans.append)
+    rough = planned(**given, tolerance=None).report
+    fine = found.report
+    assert len(plans) == fine["rounds"] > 1 and fine["intervals"] > 4
+    assert fine["open_loop_attitude_error_deg"] <= 1e-3 < rough["open_loop_attitude_error_deg"]
+    assert [plan.report["rounds"] for plan in plans] == [k + 1 for k in range(len(plans))]
+    sizes = [plan.mesh.intervals for plan in plans]
+    assert sizes == sorted(set(sizes)) and sizes[0] == 4
+    (same,) = [plan for plan in plans if plan.mesh.intervals == found.mesh.intervals]
+    np.testing.assert_array_equal(same.trajectory.q, found.trajectory.q)
+    np.testing.assert_array_equal(planned(**given, tolerance=1e-3).solution.w, found.solution.w)
+
+    def refuse(plan):
+        raise ArithmeticError("no more")
+
+    with pytest.raises(ArithmeticError, match="no more"):
+        planned(**given, tolerance=None, watch=refuse)
+
+
+def test_torques_that_no_model_survives_are_an_infinite_error():
+    """A motion that leaves what the model describes, here the range of an arc, has no truth: nan
+    from there on, never an exception.
+    """
+    plan, model = planned(tolerance=None, intervals=4), zoo.model("arcs1")
+    torque = 1.0 + 0 * plan.curve.nodes["torque"]
+    wild = replace(plan.curve, nodes=plan.curve.nodes | {"torque": torque})
+    origin = (plan.problem.q0, plan.problem.v0)
+    assert np.isnan(np.concatenate(open_loop(model, wild, 0.0, origin))).all()
+    errors = local_errors(model, wild, 0.0, *(np.tile(x, (len(wild.ends), 1)) for x in origin))
+    assert np.isfinite(errors).all() and errors.max() == np.pi
+
+
+def test_arcs_are_bent_as_far_as_their_range_at_most():
+    model = zoo.model("arcs1")
+    most = model.manifest["scene"]["bend_range"]
+    tail = most * np.array([[0.3, 0.4], [0.9, 1.2], [0.0, 0.0]])
+    blocks = {"tail": tail, "tail_rate": np.zeros((3, 2)), "torso_rate": np.zeros((3, 3))}
+    blocks["attitude"] = np.tile([1.0, 0.0, 0.0, 0.0], (3, 1))
+    q, _ = full_state(model, start(model), attitude("quaternion"), np.zeros(3), blocks)
+    kept = most * np.array([[0.3, 0.4], [0.6, 0.8], [0.0, 0.0]])
+    np.testing.assert_allclose(q[:, 7:], kept, rtol=1e-11)
+    model.energy(q, np.zeros((3, model.nv)))  # takes them
+
+
+def test_a_guess_that_leaves_the_range_of_arcs_serves_until_there():
+    model = zoo.model("arcs1")
+    most = model.manifest["scene"]["bend_range"]
+    (q, v), damping = start(model), 1e-5  # N m s/rad
+    v[6] = 20.0 * most  # rad/s
+    with pytest.raises(st.SimulationError, match="bend_range"):
+        st.simulate(model, q, v, t_span=0.4, controller=st.Damping(damping))
+    settings = {"bounds": st.Bounds(angle=0.7 * most, torque=0.05), "guess_damping": damping}
+    plan = st.plan(model, start=(q, v), duration=(0.3, 1.0), track=False, **settings)
+    assert plan.success and np.hypot(*plan.trajectory.tail.T).max() < most
+
+
+def test_torques_of_elastic_tails_less_what_springs_and_stops_ask_for_move_one_without():
+    """By SciPy's DOP853, with the reference's forces of springs, damping and stops."""
+    model, bare = zoo.model("elastic"), zoo.model("m2_n2")
+    own, nq = PassiveTail(zoo.ELASTIC, 4), bare.nq
+    plan = st.plan(model, start=start(model), **AGAIN | {"intervals": 16, "track": True})
+    assert plan.report["converged"] and plan.report["dynamics"] == "compiled"
+    assert plan.report["open_loop_attitude_error_deg"] < 0.5
+    assert plan.report["tracked_attitude_error_deg"] < 0.5
+
+    def slope(t, y):
+        q, v = y[:nq], y[nq:]
+        turn = np.concatenate([[-q[4:7] @ v[3:6]], q[3] * v[3:6] + np.cross(q[4:7], v[3:6])]) / 2
+        tau = plan.torque(t)[0] - own.force(q[7:], v[6:])
+        return np.concatenate([v[:3], turn, v[6:], bare.forward_dynamics(q, v, tau)])
+
+    y = np.concatenate([plan.problem.q0, plan.problem.v0])
+    for a, b in zip(plan.curve.ends[:-1], plan.curve.ends[1:], strict=True):
+        y = solve_ivp(slope, (a, np.nextafter(b, a)), y, "DOP853", rtol=1e-8, atol=1e-10).y[:, -1]
+    end = plan.trajectory
+    assert np.abs(end.tail).max() > 0.15  # springs matter
+    np.testing.assert_allclose(y[7:nq], end.tail[-1], atol=2e-2)
+    np.testing.assert_allclose(np.abs(y[3:7]), np.abs(end.q[-1, 3:7]), atol=5e-3)
+
+
+def test_starts_and_goals_behind_the_stops_are_refused():
+    model = zoo.model("elastic")
+    q, v = start(model)
+    bent = q + 1.5 * np.eye(len(q))[7]
+    for words, changes in (
+        (r"start: tail coordinate 0 is 1\.", {"start": (bent, v)}),
+        (r"goal\.tail: tail coordinate 1 is -1\.2", {"goal": st.Goal(tail=[0.0, -1.2, 0, 0])}),
+        ("duration: value -1", {"goal": st.Goal(tail=[0.0, None, 0, 0]), "duration": -1}),
+        ("free_start.tail: tail coordinate 0", {"free_start": {"tail": (-1.5, 0.1)}}),
+        ("design.tail_stop_lower", {"design": {"tail_stop_lower": (-1.0, -0.5)}}),
+    ):
+        with row(words), pytest.raises(st.PlanningError, match=words):
+            st.plan(model, **{"start": (q, v), "duration": DURATION} | changes)
