@@ -134,9 +134,6 @@ def test_a_flight_without_ground_has_phases_too():
     assert run.trajectory.contact is None and run.complete
 
 
-# ---- landing -------------------------------------------------------------------------------------
-
-
 def test_a_posture_lands_when_a_fall_in_it_does():
     """A rat that falls in the goal's posture, and does not turn, touches down then."""
     wanted, q, v = checked_goal(goal(), 2), np.zeros(9), np.zeros(8)
@@ -207,8 +204,6 @@ def test_of_several_plans_the_first_true_one_is_taken():
     with pytest.raises(st.PlanningError, match="phase 'right': intervals: value -3"):
         sequence(kick(), wrong).simulate(*settled())
 
-
-# ---- refusals ------------------------------------------------------------------------------------
 
 WRONG = [
     ({"name": ""}, "Phase: name: value ''"),

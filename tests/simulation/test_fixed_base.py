@@ -30,9 +30,6 @@ def swing(**settings):
     return st.simulate(chain(), *START, **{"t_span": 0.1} | settings)
 
 
-# ---- against other derivations -------------------------------------------------------------------
-
-
 @pytest.fixture(scope="module")
 def peer():
     """The same tail by MuJoCo, whose torso is held."""
@@ -107,9 +104,6 @@ def test_without_weight_the_centre_of_mass_flies_straight():
     assert np.all(run.potential == 0) and not run.warnings
 
 
-# ---- controllers ---------------------------------------------------------------------------------
-
-
 def test_the_choice_of_a_method_tells_of_the_base():
     for damping, reason in ((0, "fixed base"), (1e-5, "fixed base, damping")):
         run = swing(controller=st.Damping(damping), t_span=0.01)
@@ -143,9 +137,6 @@ def test_many_runs():
     assert not any(runs.warnings) and np.all(runs.audit.momentum == 0)
 
 
-# ---- motions -------------------------------------------------------------------------------------
-
-
 def test_motions_have_a_tail_alone(tmp_path):
     run = swing()
     assert run.q.shape == run.v.shape == (201, 4) and run.segments == 2
@@ -164,9 +155,6 @@ def test_motions_have_a_tail_alone(tmp_path):
     drawn = frames(chain(), run, [0], 0.0)[0]
     assert not drawn.body.marked
     assert drawn.body.semi_axes == pytest.approx([np.linalg.norm(TABLE_1["tail_mount"])] * 3)
-
-
-# ---- refusals ------------------------------------------------------------------------------------
 
 
 def test_plans_and_settling_are_for_torsos_that_move():

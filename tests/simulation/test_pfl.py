@@ -60,9 +60,6 @@ def test_after_the_reference_the_tail_is_held():
     np.testing.assert_allclose(flight.tail[-1], [0.4, 0], atol=1e-6)
 
 
-# ---- plans ---------------------------------------------------------------------------------------
-
-
 def plan():
     return planned(intervals=40, tolerance=None)
 
@@ -105,9 +102,6 @@ def test_a_plan_is_tracked_from_where_its_phase_begins():
         early = st.simulate(model, *state, controller=st.Pfl(model, plan()), t_span=end, **how)
         late = st.simulate(model, q, v, controller=in_phase, t_span=0.2 + end, **how)
         np.testing.assert_allclose(late.q[-1, 3:], early.q[-1, 3:], atol=1e-6, err_msg=method)
-
-
-# ---- limits and refusals -------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("method", ["tsit5", "dop853"])

@@ -22,6 +22,11 @@ def loaded(name="m1_n3"):
     return st.load(zoo.folder(name))
 
 
+def first_of(state, name="m1_n3", **how):
+    """The run of a model for which none waits."""
+    return st.simulate(loaded(name), *state, **how)
+
+
 def start(k=0, nq=9):
     rng = np.random.default_rng(k)
     return np.array([0, 0, 1.0, *rng.normal(size=nq - 3)]), rng.normal(size=nq - 1)
@@ -57,7 +62,7 @@ def test_bit_for_bit_what_it_is_the_first_time(name, nq):
             assert len(waits(model)) == 1
             for k, motion in enumerate(found):
                 with row(controller, how, k):
-                    assert_same(motion, st.simulate(loaded(name), *start(k, nq), **asked))
+                    assert_same(motion, first_of(start(k, nq), name, **asked))
 
 
 LEGS = st.Legs.fixed(np.radians(210), np.radians(-15))
@@ -76,7 +81,7 @@ def test_the_same_on_the_ground():
         found = [st.simulate(model, *above_ground(k), **asked) for k in range(3)]
         assert len(waits(model)) == 1 and any(motion.events for motion in found)
         for k, motion in enumerate(found):
-            first = st.simulate(loaded("feet_tail"), *above_ground(k), **asked)
+            first = first_of(above_ground(k), "feet_tail", **asked)
             with row(how, k):
                 assert_same(motion, first)
                 for name in ("bristles", "forces"):
@@ -96,8 +101,8 @@ def test_on_the_ground_what_differs_is_made_anew():
         {"legs": LEGS, "bristles0": np.full((9, 2), 1e-4)},
         {"legs": LEGS, "stop_at": [("touch_down", "feet")]},
     ):
-        runs = [st.simulate(m, q, v, **how, **other) for m in (model, loaded("feet_tail"))]
-        assert_same(*runs)
+        again = st.simulate(model, q, v, **how, **other)
+        assert_same(again, first_of((q, v), "feet_tail", **how, **other))
     with pytest.raises(st.SimulationError, match="this model has feet"):
         st.simulate(model, q, v, **how)
 
@@ -109,7 +114,7 @@ def test_auto_chooses_for_each_start():
         how = {"t_span": 0.01, "controller": st.Damping(1e-3)}
         motion = st.simulate(model, q, np.zeros(8), **how)
         decays.append(motion.info["reason"])
-        assert_same(motion, st.simulate(loaded(), q, np.zeros(8), **how))
+        assert_same(motion, first_of((q, np.zeros(8)), **how))
     assert decays[0] != decays[1]
     # just stiff for one of the starts
     rates = [float(words.split()[-2]) for words in decays]
@@ -131,7 +136,7 @@ def test_what_was_found_before_stays():
         np.testing.assert_array_equal(getattr(first, name), array)
         assert not np.shares_memory(getattr(first, name), getattr(second, name))
     # books that are asked for late
-    assert first.info["imbalance"] == st.simulate(loaded(), *start(0), t_span=0.1).info["imbalance"]
+    assert first.info["imbalance"] == first_of(start(0), t_span=0.1).info["imbalance"]
 
 
 WRONG = [
@@ -202,7 +207,7 @@ def test_few_wait_and_none_keeps_its_model_alive():
 
 def test_threads_share_no_run():
     model, wrong = loaded(), []
-    alone = [st.simulate(loaded(), *start(k), t_span=0.2) for k in range(4)]
+    alone = [first_of(start(k), t_span=0.2) for k in range(4)]
 
     def fly(k):
         for _ in range(30):
@@ -234,4 +239,4 @@ def test_a_child_makes_its_own():
     found = ours.recv()
     child.join()
     assert_same(mine, first)
-    np.testing.assert_array_equal(found, st.simulate(loaded(), *start(1), t_span=0.2).q)
+    np.testing.assert_array_equal(found, first_of(start(1), t_span=0.2).q)

@@ -105,8 +105,6 @@ def test_torques_change_energy_by_their_work():
     assert flight.energy[-1] - flight.energy[0] == pytest.approx(work, rel=1e-6)
 
 
-# ---- results -------------------------------------------------------------------------------------
-
 METHODS = {"rk4": {"step": 1e-3}, "tsit5": {"rtol": 1e-6}, "dop853": {"rtol": 1e-6}}
 SPANS = [(0.3, None, 200), ((-1.0, 0.1), 0.1, 11), ((0.7, 1.7), 0.3, 3), (0.1, 1.0, 1)]
 

@@ -194,8 +194,6 @@ def test_a_clock_that_rounds_times_to_one_is_refused():
         fly(controller=controller, t_span=0.01)
 
 
-# ---- ticks ---------------------------------------------------------------------------------------
-
 RATE, TICKS = 200.0, 12
 PERIOD = 1 / RATE
 

@@ -130,9 +130,6 @@ def test_ctrl_c_ends_all_threads_within_a_second(monkeypatch, abreast):
     assert threading.active_count() == before
 
 
-# ---- refusals ------------------------------------------------------------------------------------
-
-
 def row_with(array, where, value):
     changed = array.copy()
     changed[where] = value

@@ -187,9 +187,6 @@ def test_torques_of_their_own_fly_abreast_but_kinks_at_other_times_one_by_one():
     assert both(tail(), q, v, given, **RK4)[0].info["abreast"] == 1
 
 
-# ---- when it pays --------------------------------------------------------------------------------
-
-
 @pytest.fixture
 def priced(monkeypatch):
     """Lanes only where they pay."""

@@ -85,9 +85,6 @@ def test_runs_that_stop_at_events():
     assert not np.isnan(found.q[0]).any() and np.isnan(found.q[1:, -1]).all()
 
 
-# ---- parameters ----------------------------------------------------------------------------------
-
-
 def test_each_run_has_its_own_parameters():
     """Of the body, and of the ground."""
     rng = np.random.default_rng(1)
@@ -129,9 +126,6 @@ def test_the_stiffest_run_chooses_the_method():
     mild, stiff = st.Damping(1e-9), st.Damping(1e-2)
     for law, method in ((mild, "tsit5"), ([mild, stiff, mild], "ros34pw2")):
         assert st.simulate(tail(), q, v, controller=law, t_span=0.01).info["method"] == method
-
-
-# ---- order and sharing ---------------------------------------------------------------------------
 
 
 def test_runs_do_not_depend_on_their_order_or_on_threads():
@@ -176,8 +170,6 @@ def test_arguments_are_left_alone_and_results_are_read_only_and_can_be_pickled()
     again = pickle.loads(pickle.dumps(found))
     np.testing.assert_array_equal(again[1].contact.forces, found[1].contact.forces)
 
-
-# ---- controllers ---------------------------------------------------------------------------------
 
 TIMES = [0.0, 0.0123, 0.031]
 SPAN = {"t_span": 0.05, "output_step": 5e-3}
