@@ -13,7 +13,7 @@ from serpentail_codegen.targets.c.tableaux import RK4, ROS34PW2, TSIT5, transfor
 from tests.support import zoo
 from tests.support.rows import row
 
-from ..runs import TABLE, V0, fly, tail
+from ..runs import V0, fly, tail
 
 ROUNDING = 3e-14  # coefficients of up to 88, printed with 16 digits
 
@@ -217,13 +217,6 @@ def test_tracking_in_c_is_tracking_in_python_and_implicit_methods_track_too():
     assert apart(flight, checked) < 1e-6
     np.testing.assert_allclose(flight.tau[5], law(flight.t[5], flight.q[5], flight.v[5]), rtol=1e-9)
     assert apart(fly(controller=law, method="ros34pw2", rtol=1e-6), flight) < 1e-4
-
-
-def test_two_runs_are_bit_for_bit_the_same():
-    for method in ORDERS:
-        first, second = (fly(method=method, controller=TABLE) for _ in range(2))
-        for name in ("q", "v", "tau"):
-            np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
 
 
 def test_torques_of_a_long_tail_spoil_no_factors():
