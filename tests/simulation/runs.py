@@ -45,11 +45,10 @@ def starts(model, count, seed=0):
     return q, v * ([0.1] * 3 + [1.0] * (model.nv - 3))
 
 
-def alone(model, q, v, controllers=None, **settings):
-    """Every run by a call of its own, with a controller of its own."""
-    if controllers is None:
-        return [st.simulate(model, *state, **settings) for state in zip(q, v, strict=True)]
-    runs = zip(q, v, controllers, strict=True)
+def alone(model, q, v, controller=None, **settings):
+    """Every run by a call of its own, with one of the controllers if there are several."""
+    each = controller if isinstance(controller, list | tuple) else [controller] * len(q)
+    runs = zip(q, v, each, strict=True)
     return [st.simulate(model, *run[:2], controller=run[2], **settings) for run in runs]
 
 
@@ -69,6 +68,14 @@ def near(rollouts, flights, digits=1e-11):
         expected = np.array([getattr(flight, name) for flight in flights])
         error = np.abs(getattr(rollouts, name) - expected).max()
         assert error <= digits * max(np.abs(expected).max(), 1e-9), (name, error)
+
+
+def both(model, q, v, controller=None, each=None, compare=same, **settings):
+    """Rollouts, and every run by a call of its own, with the controllers ``each``: they agree."""
+    found = st.simulate(model, q, v, controller=controller, **settings)
+    flights = alone(model, q, v, controller if each is None else each, **settings)
+    compare(found, flights)
+    return found, flights
 
 
 def summed(values, t):

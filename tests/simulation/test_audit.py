@@ -5,7 +5,7 @@ import pytest
 
 import serpentail as st
 from serpentail.motion.summary import summary
-from serpentail.simulation import audit, parallel_runs
+from serpentail.simulation import audit
 from tests.support import zoo
 from tests.support.rows import row
 
@@ -162,19 +162,6 @@ def test_a_fault_in_a_swing_from_rest_to_rest_is_found(runs, monkeypatch):
             assert len(run.info["warnings"]) == warnings
             assert run.info["imbalance"]["energy_J"] == pytest.approx(-wrong, rel=0.1)
         monkeypatch.undo()
-
-
-def test_flights_balance_in_lanes_as_singly(monkeypatch):
-    model, both = flying(), []
-    how = {"controller": st.Damping(1e-3), "t_span": 0.05, "method": "rk4", "step": 1e-5}
-    for many in (False, True):
-        monkeypatch.setattr(parallel_runs, "worth_batching", lambda *_, many=many: many)
-        runs = st.simulate(model, *dropped(model, 9), **how)
-        assert (runs.info["abreast"] > 1) == many
-        assert runs.audit.relative.max() < 1e-9 and not any(runs.warnings)
-        assert (runs.audit.work["damping"] < 0).all()
-        both.append(runs.audit.work["damping"])
-    np.testing.assert_allclose(*both, rtol=1e-9)
 
 
 def test_rollouts_audit_each_run_up_to_where_it_stopped():

@@ -28,9 +28,6 @@ def bent(angles):
     return np.concatenate([[0, 0, 0, 1, 0, 0, 0], np.broadcast_to(angles, 4)]), np.zeros(10)
 
 
-# ---- books ---------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", TAILS)
 def test_energy_balances_over_long_runs_and_better_with_tolerance(name):
     """Kinetic, potential and stored energy and what damping lost, over 3 s of tumbling flight."""
@@ -84,9 +81,6 @@ def test_a_rise_is_that_of_the_centre_of_mass_whatever_a_tail_stores():
     assert com_rise(elastic(), run) == pytest.approx(expected, rel=1e-4)
 
 
-# ---- stops ---------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", TAILS)
 def test_a_tail_thrown_at_its_stops_comes_back_with_its_energy(name):
     """20 rad/s at stops at 0.5 rad of 10 N m/rad: an overshoot of less than 0.1 rad stores it."""
@@ -123,9 +117,6 @@ def test_a_start_behind_its_stops_is_refused():
             with pytest.raises(st.StateError, match="behind tail_stop"):
                 st.simulate(elastic(), q, v, t_span=0.01)
             st.simulate(elastic(), *bent([0, 0, sound, 0]), t_span=0.01)  # on the way into a stop
-
-
-# ---- methods and tracking ------------------------------------------------------------------------
 
 
 def test_stiff_springs_get_a_method_for_them():
@@ -165,9 +156,6 @@ def test_a_passive_tail_is_tracked_as_one_without():
         asked = [own.force(a, b) for a, b in zip(run.tail, run.v[:, 6:], strict=True)]
         torques = bare.pfl(run.q, run.v, given) + asked
         np.testing.assert_allclose(run.tau, torques, atol=1e-6, err_msg=method)
-
-
-# ---- the ground ----------------------------------------------------------------------------------
 
 
 def landing():

@@ -100,9 +100,6 @@ def test_a_model_in_single_precision_lands_too():
     assert other["time"] == pytest.approx(first["time"], abs=1e-3)
 
 
-# ---- stops, pauses, samples ----------------------------------------------------------------------
-
-
 def test_a_run_stops_at_take_off_and_its_friction_springs_are_told():
     """An implicit step from there is the run's own: with the bristles of the start it is not."""
     how = {"rtol": 1e-6, "output_step": 1e-3}
@@ -175,8 +172,6 @@ def test_contact_is_what_the_model_says_also_from_a_file(tmp_path):
     assert again.resample([0.1, 0.2]).contact.points.shape == (2, 6, 3)
     assert flight.info["seconds"] > 0 and flight.info["cpu_seconds"] >= 0
 
-
-# ---- refusals ------------------------------------------------------------------------------------
 
 WRONG = [
     ({"legs": None}, "feet: give Legs"),

@@ -8,11 +8,6 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail_codegen.functions.catalogue import CATALOGUE
-from serpentail_codegen.functions.function import assemble
-from serpentail_codegen.functions.tail import Tail
-from serpentail_codegen.ir.interpret import Numbers, Run
-from serpentail_codegen.scene.shape import Shape
 from tests.support import zoo
 from tests.support.rows import row
 
@@ -217,18 +212,3 @@ def test_other_tails_land_with_books_that_balance_better_with_the_tolerance(name
     assert left[1] < 1e-4 and left[1] < 0.2 * left[0]
     other = st.simulate(model, q, v, method="tsit5", rtol=1e-9, **how)
     assert np.abs(other.q - run.q).max() < 1e-3
-
-
-@pytest.mark.parametrize("name", ["contact_points", "contact_dynamics", "implicit_factor"])
-def test_links_alone_are_the_articulated_tail(name):
-    """Bit for bit, although the generator takes them as segments of a mixed tail."""
-    counts, rng = (2, 3), np.random.default_rng(0)
-    given = {"contacts": ("tail", "torso"), "shape": Shape(counts, links=5)}
-    pure = assemble(CATALOGUE[name], Tail(2, 3, **given))
-    given["shape"] = Shape(counts, ("articulated", "articulated"), links=5)
-    mixed = assemble(CATALOGUE[name], Tail(2, 3, "mixed", **given))
-    values = {a.name: rng.uniform(0.1, 1, a.length).tolist() for a in pure.of_role("parameters")}
-    values |= {a.name: rng.normal(size=a.length).tolist() for a in pure.of_role("input")}
-    expected, found = (Run(each, Numbers(np), values).values for each in (pure, mixed))
-    for entry in pure.of_role("output"):
-        np.testing.assert_array_equal(found[entry.name], expected[entry.name])

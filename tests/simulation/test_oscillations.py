@@ -1,7 +1,5 @@
 """Small oscillations of elastic tails: those of linear mechanics, of cantilevers and of arcs."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from scipy.linalg import eigh
@@ -92,11 +90,6 @@ def clamped(model, stiffness):
     return np.sqrt(squares) / first
 
 
-def sized(segments, links):
-    """A model of its own: sizes are the point."""
-    return st.load(model_folder(segments, links, functions=["mass_matrix"]))
-
-
 @pytest.mark.filterwarnings("ignore::serpentail.errors.UnusualSize")
 def test_arcs_converge_to_the_euler_bernoulli_cantilever():
     """Arcs of stiffness EI / L_arc; a single one has sqrt(20 EI / (rho L^4)), and the error falls
@@ -112,25 +105,3 @@ def test_arcs_converge_to_the_euler_bernoulli_cantilever():
     for errors in (first, second):
         assert (np.diff(errors) < 0).all() and min(errors) > 0
     assert first[1] / first[2] == pytest.approx((3 / 2) ** 2, rel=0.1)
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::serpentail.errors.UnusualSize")
-def test_many_arcs_are_a_cantilever_and_many_links_an_arc():
-    """n links whose joints have EI / l each, k = EI n^2 / L_segment in their common angle: the
-    error falls as 1 / n.
-    """
-    ratio = (CANTILEVER[1] / CANTILEVER[0]) ** 2
-    four, eight = (clamped(sized(n, None), BENDING / (LENGTH / n)) - 1 for n in (4, 8))
-    assert eight[0] < 0.0031 and eight[2] + 1 < 1.022 * ratio
-    assert four[0] / eight[0] == pytest.approx(4, rel=0.02)
-    for segments in (1, 2):
-        arc = LENGTH / segments
-        limit = clamped(zoo.model(f"arcs{segments}"), BENDING / arc)[::2]
-        errors = []
-        for n in (8, 16, 32):
-            found = clamped(sized(segments, n), BENDING * n**2 / arc)[::2]
-            errors.append(np.abs(found / limit - 1))
-        assert (errors[2] < 0.05).all()
-        for coarse, fine in pairwise(errors):
-            assert coarse / fine == pytest.approx(2, rel=0.15)

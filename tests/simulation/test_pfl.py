@@ -6,27 +6,33 @@ import pytest
 import serpentail as st
 from serpentail.simulation.pfl import KD, KP
 from tests.references.parameters import random_states
-from tests.support.models import model_folder
+from tests.support import zoo
+from tests.support.rows import row
 from tests.support.tumbling import planned, rat, start
 
+STILL = ([0.0, 1.0], np.zeros((2, 2)))
 
-@pytest.mark.parametrize("size", [(1, 3), (2, 3), (2, None)])
-def test_tail_accelerations_are_those_commanded(size):
-    """Eqs. 44 to 46: e_ddot + Kd e_dot + Kp e = 0, through forward dynamics."""
-    model = rat(*size)
-    times = np.linspace(0, 1, 30)
-    reference = 0.3 * np.sin(times[:, None] * np.arange(1, model.nv - 5))
-    law = st.Pfl(model, (times, reference))
-    for q, v, _, _ in zip(*random_states(size[0], 3, 5, "random"), strict=True):
-        v_dot = model.forward_dynamics(q, v, law(0.37, q, v))
-        angles, rates, accelerations = law.reference(0.37)
-        expected = accelerations + KD * (rates - v[6:]) + KP * (angles - q[7:])
-        np.testing.assert_allclose(v_dot[6:], expected, rtol=1e-9)
+
+def test_tail_accelerations_are_those_commanded():
+    """Eqs. 44 to 46: e_ddot + Kd e_dot + Kp e = 0, through forward dynamics; also of a model that
+    lacks the function, and makes it of others.
+    """
+    times, lacking = np.linspace(0, 1, 30), st.load(zoo.folder("m2_n2"))
+    del lacking.kernels["pfl"]
+    models = [zoo.model(name) for name in ("m1_n3", "m2_n2", "arcs2")]
+    for model in (*models, lacking):
+        reference = 0.3 * np.sin(times[:, None] * np.arange(1, model.nv - 5))
+        law = st.Pfl(model, (times, reference))
+        for q, v, _, _ in zip(*random_states(model.segments, 3, 5, "random"), strict=True):
+            v_dot = model.forward_dynamics(q, v, law(0.37, q, v))
+            angles, rates, accelerations = law.reference(0.37)
+            expected = accelerations + KD * (rates - v[6:]) + KP * (angles - q[7:])
+            np.testing.assert_allclose(v_dot[6:], expected, rtol=1e-8, err_msg=model.name)
 
 
 def test_torques_are_those_of_the_papers_formula():
     """Eq. 46 as it stands: X^+ (S H^-1 C + ...), X = S H^-1 J_ta."""
-    model = rat(2, 3)
+    model = zoo.model("m2_n2")
     law = st.Pfl(model, (np.linspace(0, 1, 9), np.zeros((9, 4))), feedforward=False)
     q, v, _, _ = (rows[0] for rows in random_states(2, 1, 1, "random"))
     H, C = model.mass_matrix(q), model.bias_force(q, v)
@@ -36,71 +42,66 @@ def test_torques_are_those_of_the_papers_formula():
     np.testing.assert_allclose(law(0.5, q, v), expected, rtol=1e-8)
 
 
-def test_a_disturbed_tail_returns_to_the_plan():
-    model, plan = rat(), planned()
-    q, v = start(model)
-    q[7:] += 0.05
-    flight = st.simulate(
-        model, q, v, controller=st.Pfl(model, plan), t_span=plan.duration, method="dop853"
-    )
-    error = np.abs(flight.resample(plan.trajectory.t).tail - plan.trajectory.tail).max(axis=1)
-    assert error[0] > 0.049 and error[-1] < 1e-4
+def test_functions_that_the_model_lacks_are_named_at_once_or_made_of_others():
+    with pytest.raises(st.ModelError, match=r"without .*'inverse_dynamics'"):
+        st.Pfl(zoo.model("bare"), STILL)
+    polar, q, v = zoo.model("polar"), np.eye(1, 9, 3)[0], np.zeros(8)
+    q[7:] = 0.3, 0.5
+    law = st.Pfl(polar, ([0.0, 0.1], np.tile([0.4, 0.5], (2, 1))))
+    run = st.simulate(polar, q, v, controller=law, t_span=0.1, method="tsit5")
+    np.testing.assert_allclose(run.tail[-1], [0.4, 0.5], atol=1e-6)
 
 
 def test_after_the_reference_the_tail_is_held():
-    model = rat()
-    law = st.Pfl(model, ([0.0, 0.1, 0.2, 0.3], np.array([[0.0, 0], [0.1, 0], [0.3, 0], [0.4, 0]])))
-    q, v = start(model)
-    flight = st.simulate(model, q, v, controller=law, t_span=0.6, method="dop853", rtol=1e-8)
+    nodes = np.array([[0.0, 0], [0.1, 0], [0.3, 0], [0.4, 0]])
+    law = st.Pfl(rat(), ([0.0, 0.1, 0.2, 0.3], nodes))
+    how = {"controller": law, "t_span": 0.6, "method": "dop853", "rtol": 1e-8}
+    flight = st.simulate(rat(), *start(rat()), **how)
     np.testing.assert_allclose(flight.tail[-1], [0.4, 0], atol=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("reference", "gains", "words"),
-    [
-        (3, {}, "reference is a int"),
-        (([0, 1], np.zeros((2, 3))), {}, "times (2,) and angles (2, 3)"),
-        (([1, 0], np.zeros((2, 2))), {}, "needs increasing times"),
-        (([0, 1], np.full((2, 2), np.nan)), {}, "]: value nan: needs a finite number"),
-        (([0, 1], np.zeros((2, 2))), {"kp": -1}, "kp: value -1: needs a number from 0"),
-        (
-            ([0, 1], np.zeros((2, 2))),
-            {"torque": 0},
-            "torque: value 0: needs torques above 0, in N m",
-        ),
-        (([0, 1], np.zeros((2, 2))), {"torque": [1, 2, 3]}, "Pfl: torque"),
-    ],
-)
-def test_misuse(reference, gains, words):
-    with pytest.raises(st.SimulationError) as caught:
-        st.Pfl(rat(), reference, **gains)
-    assert words in str(caught.value)
+def plan():
+    return planned(intervals=40, tolerance=None)
 
 
-def test_functions_that_the_model_lacks_are_named_at_once():
-    reference = ([0.0, 1.0], np.zeros((2, 2)))
-    has = ["forward_dynamics", "energy", "momentum", "rollout", "mass_matrix"]
-    with pytest.raises(st.ModelError, match="without 'inverse_dynamics'"):
-        st.Pfl(st.load(model_folder(1, 1, functions=has)), reference)
-    st.Pfl(st.load(model_folder(1, 1, functions=[*has, "inverse_dynamics"])), reference)
-    st.Pfl(st.load(model_folder(1, 1, functions=[*has, "pfl"])), reference)
+def test_a_disturbed_tail_returns_to_the_plan():
+    q, v = start(rat())
+    q[7:] += 0.05
+    how = {"controller": st.Pfl(rat(), plan()), "t_span": plan().duration, "method": "dop853"}
+    flight = st.simulate(rat(), q, v, **how).resample(plan().trajectory.t)
+    error = np.abs(flight.tail - plan().trajectory.tail).max(axis=1)
+    assert error[0] > 0.049 and error[-1] < 1e-4
 
 
 def test_tracking_a_plan_takes_the_planned_torques():
     """On the planned motion Eq. 46 is Eq. 1 solved for tau, at its ends, too, where one by rates is
     further off.
     """
-    model, plan = rat(), planned(intervals=40, tolerance=None)
-    flight = plan.trajectory
-    times = np.append(flight.t[:-1], np.nextafter(plan.duration, 0))
+    flight = plan().trajectory
+    times = np.append(flight.t[:-1], np.nextafter(plan().duration, 0))
     states = list(zip(times, flight.q, flight.v, strict=True))
     by_plan, by_rates = (
-        np.abs([law(*state) for state in states] - plan.torque(times)).max(axis=1)
+        np.abs([law(*state) for state in states] - plan().torque(times)).max(axis=1)
         / np.abs(flight.tau).max()
-        for law in (st.Pfl(model, plan), st.Pfl(model, flight))
+        for law in (st.Pfl(rat(), plan()), st.Pfl(rat(), flight))
     )
     assert by_plan[[0, -1]].max() < 1e-2 and np.median(by_plan) < 1e-2
     assert (3 * by_plan[[0, -1]] < by_rates[[0, -1]]).all()
+
+
+def test_a_plan_is_tracked_from_where_its_phase_begins():
+    """What stands at the start of a plan after 0.2 s in which nothing happens goes as planned."""
+    (q, v), model = start(rat()), rat()
+    free = st.Pfl(model, ([0.0, 1.0], np.stack([q[7:], q[7:]])), kp=0, kd=0)
+    in_phase = st.Phases([(0.0, free), (0.2, st.Pfl(model, plan()))])
+    end = plan().duration
+    for method in ("tsit5", "dop853"):
+        how = {"method": method, "output_step": 1e-3}
+        before = st.simulate(model, q, v, controller=free, t_span=0.2, **how)
+        state = before.q[-1], before.v[-1]
+        early = st.simulate(model, *state, controller=st.Pfl(model, plan()), t_span=end, **how)
+        late = st.simulate(model, q, v, controller=in_phase, t_span=0.2 + end, **how)
+        np.testing.assert_allclose(late.q[-1, 3:], early.q[-1, 3:], atol=1e-6, err_msg=method)
 
 
 @pytest.mark.parametrize("method", ["tsit5", "dop853"])
@@ -108,23 +109,36 @@ def test_torques_keep_their_limit(method):
     """A far reference asks for more than there is; a limit that is never met changes nothing."""
     model, (q, v) = rat(), start(rat())
     reference = ([0.0, 0.1], np.stack([q[7:], q[7:] + 0.3]))
-    settings = {"t_span": 0.1, "method": method}
-    free, wide, tight = (
-        st.simulate(model, q, v, controller=st.Pfl(model, reference, torque=limit), **settings)
-        for limit in (None, 1e3, (1e-3, 2e-3))
-    )
+    laws = [st.Pfl(model, reference, torque=limit) for limit in (None, 1e3, (1e-3, 2e-3))]
+    how = {"t_span": 0.1, "method": method}
+    free, wide, tight = (st.simulate(model, q, v, controller=law, **how) for law in laws)
     assert np.abs(free.tau).max() > 4e-3
     np.testing.assert_allclose(wide.q, free.q, atol=1e-6)
     assert np.abs(tight.tau).max(axis=0) == pytest.approx([1e-3, 2e-3])
-    law = st.Pfl(model, reference, torque=(1e-3, 2e-3))
-    wanted = [law(*state) for state in zip(tight.t, tight.q, tight.v, strict=True)]
+    wanted = [laws[2](*state) for state in zip(tight.t, tight.q, tight.v, strict=True)]
     np.testing.assert_allclose(tight.tau[1:-1], wanted[1:-1], rtol=1e-9, atol=1e-12)
 
 
 def test_a_limit_may_be_a_text_with_a_unit():
-    model, reference = rat(), ([0.0, 0.1], np.zeros((2, 2)))
-    texts = "1 mN m", ["1 mN m", "0.2 N mm"]
-    for text, wanted in zip(texts, ([1e-3, 1e-3], [1e-3, 2e-4]), strict=True):
-        assert st.Pfl(model, reference, torque=text).torque.tolist() == wanted
-    with pytest.raises(st.SimulationError, match="Pfl: torque: value '1 g': a mass where a torque"):
-        st.Pfl(model, reference, torque="1 g")
+    for text, wanted in (("1 mN m", [1e-3, 1e-3]), (["1 mN m", "0.2 N mm"], [1e-3, 2e-4])):
+        assert st.Pfl(rat(), STILL, torque=text).torque.tolist() == wanted
+
+
+WRONG = [
+    (3, {}, "reference is a int"),
+    (([0, 1], np.zeros((2, 3))), {}, r"times \(2,\) and angles \(2, 3\)"),
+    (([1, 0], np.zeros((2, 2))), {}, "increasing times"),
+    (([0, 1], np.full((2, 2), np.nan)), {}, "value nan"),
+    (([0], np.zeros((1, 2))), {}, "one node only"),
+    (STILL, {"kp": -1}, "kp: value -1"),
+    (STILL, {"kd": -1}, "kd: value -1"),
+    (STILL, {"torque": 0}, "torque: value 0"),
+    (STILL, {"torque": [1, 2, 3]}, "Pfl: torque"),
+    (STILL, {"torque": "1 g"}, "torque: value '1 g'"),
+]
+
+
+def test_wrong_references_gains_and_limits_are_named():
+    for reference, gains, words in WRONG:
+        with row(words), pytest.raises(st.SimulationError, match=words):
+            st.Pfl(rat(), reference, **gains)

@@ -10,26 +10,26 @@ import pytest
 
 import serpentail as st
 from serpentail.simulation import waiting
+from tests.support import zoo
+from tests.support.rows import row
 
-from ..support.models import model_folder
-
-FEW = ["forward_dynamics", "energy", "momentum", "rollout", "implicit"]
 FIELDS = ("t", "q", "v", "tau", "energy", "linear_momentum", "angular_momentum")
 TIMES = {"seconds", "cpu_seconds"}
 
 
-def loaded(**options):
-    return st.load(model_folder(1, 3, functions=FEW, **options))
+def loaded(name="m1_n3"):
+    """A model of its own, for which no run waits."""
+    return st.load(zoo.folder(name))
 
 
-@pytest.fixture
-def model():
-    return loaded()
+def first_of(state, name="m1_n3", **how):
+    """The run of a model for which none waits."""
+    return st.simulate(loaded(name), *state, **how)
 
 
-def start(k=0):
+def start(k=0, nq=9):
     rng = np.random.default_rng(k)
-    return np.array([0, 0, 1.0, *rng.normal(size=6)]), rng.normal(size=8)
+    return np.array([0, 0, 1.0, *rng.normal(size=nq - 3)]), rng.normal(size=nq - 1)
 
 
 def waits(model):
@@ -38,38 +38,34 @@ def waits(model):
 
 def assert_same(one, other):
     for name in FIELDS:
-        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
     infos = ({k: v for k, v in each.info.items() if k not in TIMES} for each in (one, other))
     assert next(infos) == next(infos)
 
 
-@pytest.mark.parametrize("controller", [None, st.Damping(1e-3), st.Damping((1e-3, 2e-3))])
-@pytest.mark.parametrize(
-    "how",
-    [
-        {},
-        {"method": "tsit5", "rtol": 1e-4, "output_step": 0.1},
-        {"method": "ros34pw2", "most_steps": 1000},
-        {"method": "rk4", "step": 1e-3},
-        {"step": np.float64(1e-3)},
-    ],
-)
-@pytest.mark.parametrize("real", ["double", "float"])
-def test_bit_for_bit_what_it_is_the_first_time(controller, how, real):
-    model = loaded(real=real)
-    how = {"controller": controller, "t_span": (0.1, 0.3), **how}
-    found = [st.simulate(model, *start(k), **how) for k in range(4)]
-    assert len(waits(model)) == 1
-    for k, motion in enumerate(found):
-        assert_same(motion, st.simulate(loaded(real=real), *start(k), **how))
+HOW = [
+    {},
+    {"method": "tsit5", "rtol": 1e-4, "output_step": 0.1},
+    {"method": "ros34pw2", "most_steps": 1000},
+    {"method": "rk4", "step": 1e-3},
+    {"step": np.float64(1e-3)},
+]
+
+
+@pytest.mark.parametrize(("name", "nq"), [("m1_n3", 9), ("single", 11)])
+def test_bit_for_bit_what_it_is_the_first_time(name, nq):
+    each = tuple(np.linspace(1e-3, 2e-3, nq - 7).tolist())
+    for controller in (None, st.Damping(1e-3), st.Damping(each)):
+        for how in HOW:
+            model, asked = loaded(name), {"controller": controller, "t_span": (0.1, 0.3)} | how
+            found = [st.simulate(model, *start(k, nq), **asked) for k in range(3)]
+            assert len(waits(model)) == 1
+            for k, motion in enumerate(found):
+                with row(controller, how, k):
+                    assert_same(motion, first_of(start(k, nq), name, **asked))
 
 
 LEGS = st.Legs.fixed(np.radians(210), np.radians(-15))
-GROUNDED = [*FEW, "contact_points", "contact_dynamics"]
-
-
-def grounded():
-    return st.load(model_folder(1, 3, contacts=["feet", "tail"], functions=GROUNDED))
 
 
 def above_ground(k):
@@ -78,20 +74,23 @@ def above_ground(k):
     return q, 0.3 * rng.normal(size=8)
 
 
-@pytest.mark.parametrize("how", [{}, {"method": "tsit5", "rtol": 1e-4}, {"step": 1e-3}])
-def test_the_same_on_the_ground(how):
-    model, how = grounded(), {"legs": LEGS, "controller": st.Damping(1e-3), "t_span": 0.2, **how}
-    found = [st.simulate(model, *above_ground(k), **how) for k in range(3)]
-    assert len(waits(model)) == 1 and any(motion.events for motion in found)
-    for k, motion in enumerate(found):
-        first = st.simulate(grounded(), *above_ground(k), **how)
-        assert_same(motion, first)
-        np.testing.assert_array_equal(motion.contact.bristles, first.contact.bristles)
-        np.testing.assert_array_equal(motion.contact.forces, first.contact.forces)
+def test_the_same_on_the_ground():
+    acting = {"legs": LEGS, "controller": st.Damping(1e-3), "t_span": 0.2}
+    for how in ({}, {"method": "tsit5", "rtol": 1e-4}, {"step": 1e-3}):
+        model, asked = loaded("feet_tail"), acting | how
+        found = [st.simulate(model, *above_ground(k), **asked) for k in range(3)]
+        assert len(waits(model)) == 1 and any(motion.events for motion in found)
+        for k, motion in enumerate(found):
+            first = first_of(above_ground(k), "feet_tail", **asked)
+            with row(how, k):
+                assert_same(motion, first)
+                for name in ("bristles", "forces"):
+                    one, other = (getattr(each.contact, name) for each in (motion, first))
+                    np.testing.assert_array_equal(one, other)
 
 
 def test_on_the_ground_what_differs_is_made_anew():
-    model, (q, v) = grounded(), above_ground(0)
+    model, (q, v) = loaded("feet_tail"), above_ground(0)
     how = {"controller": st.Damping(1e-3), "t_span": 0.05}
     st.simulate(model, q, v, legs=LEGS, **how)
     deep = np.array([*q[:2], -0.1, *q[3:]])
@@ -102,32 +101,34 @@ def test_on_the_ground_what_differs_is_made_anew():
         {"legs": LEGS, "bristles0": np.full((9, 2), 1e-4)},
         {"legs": LEGS, "stop_at": [("touch_down", "feet")]},
     ):
-        motion, first = (st.simulate(m, q, v, **how, **other) for m in (model, grounded()))
-        assert_same(motion, first)
+        again = st.simulate(model, q, v, **how, **other)
+        assert_same(again, first_of((q, v), "feet_tail", **how, **other))
     with pytest.raises(st.SimulationError, match="this model has feet"):
         st.simulate(model, q, v, **how)
 
 
 def test_auto_chooses_for_each_start():
-    model, stretched, bent = loaded(), *(np.array([0, 0, 1, 1, 0, 0, 0, a, 0]) for a in (0, 1.2))
-    decays = []
+    model, decays = loaded(), []
+    stretched, bent = (np.array([0, 0, 1, 1, 0, 0, 0, a, 0]) for a in (0, 1.2))
     for q in (stretched, bent):
-        motion = st.simulate(model, q, np.zeros(8), t_span=0.01, controller=st.Damping(1e-3))
+        how = {"t_span": 0.01, "controller": st.Damping(1e-3)}
+        motion = st.simulate(model, q, np.zeros(8), **how)
         decays.append(motion.info["reason"])
-        other = st.simulate(loaded(), q, np.zeros(8), t_span=0.01, controller=st.Damping(1e-3))
-        assert_same(motion, other)
+        assert_same(motion, first_of((q, np.zeros(8)), **how))
     assert decays[0] != decays[1]
     # just stiff for one of the starts
     rates = [float(words.split()[-2]) for words in decays]
     law = st.Damping(1e-3 * 5e3 / np.sqrt(np.prod(rates)))
-    found = [
-        st.simulate(model, q, np.zeros(8), t_span=0.001, controller=law).info["method"]
+    runs = [
+        st.simulate(model, q, np.zeros(8), t_span=0.001, controller=law)
         for q in (stretched, bent, stretched)
     ]
+    found = [run.info["method"] for run in runs]
     assert sorted({*found}) == ["ros34pw2", "tsit5"] and found[0] == found[2]
 
 
-def test_what_was_found_before_stays(model):
+def test_what_was_found_before_stays():
+    model = loaded()
     first = st.simulate(model, *start(0), t_span=0.1)
     before = {name: getattr(first, name).copy() for name in ("t", "q", "v", "tau")}
     second = st.simulate(model, *start(1), t_span=0.1)
@@ -135,50 +136,58 @@ def test_what_was_found_before_stays(model):
         np.testing.assert_array_equal(getattr(first, name), array)
         assert not np.shares_memory(getattr(first, name), getattr(second, name))
     # books that are asked for late
-    assert first.info["imbalance"] == st.simulate(loaded(), *start(0), t_span=0.1).info["imbalance"]
+    assert first.info["imbalance"] == first_of(start(0), t_span=0.1).info["imbalance"]
 
 
-@pytest.mark.parametrize(
-    ("wrong", "words"),
-    [
-        ({"q0": [1.0]}, "q0 has shape"),
-        ({"q0": np.full(9, np.nan)}, r"q0\[0\]: value nan"),
-        ({"v0": np.full(8, np.inf)}, r"v0\[0\]: value inf"),
-        ({"q0": np.zeros(9)}, "zero quaternion"),
-        ({"controller": st.Damping(True)}, "damping: value True"),
-        ({"controller": st.Damping(-1.0)}, "damping: value -1.0"),
-        ({"t_span": True}, "t_span"),
-        ({"rtol": True}, "rtol: value True"),
-        ({"most": 3}, "no setting 'most'"),
-        ({"threads": 2}, "one start only"),
-        ({"watch": 1}, "watch: value 1"),
-        ({"legs": 3}, "has no contacts"),
-        ({"method": "euler"}, "method: value 'euler'"),
-    ],
-)
-def test_refused_as_the_first_time(model, wrong, words):
-    q0, v0 = start()
+WRONG = [
+    ({"q0": [1.0]}, "q0 has shape"),
+    ({"q0": np.full(9, np.nan)}, r"q0\[0\]: value nan"),
+    ({"v0": np.full(8, np.inf)}, r"v0\[0\]: value inf"),
+    ({"q0": np.zeros(9)}, "zero quaternion"),
+    ({"controller": st.Damping(True)}, "damping: value True"),
+    ({"controller": st.Damping(-1.0)}, "damping: value -1.0"),
+    ({"t_span": True}, "t_span"),
+    ({"rtol": True}, "rtol: value True"),
+    ({"most": 3}, "'most'"),
+    ({"threads": 2}, "threads: value 2"),
+    ({"watch": 1}, "watch: value 1"),
+    ({"legs": 3}, "no contacts"),
+    ({"method": "euler"}, "method: value 'euler'"),
+]
+
+
+def test_refused_as_the_first_time():
+    model, (q0, v0) = loaded(), start()
     sound = {"q0": q0, "v0": v0, "controller": st.Damping(1.0), "t_span": 1.0, "rtol": 1.0}
     sound["method"] = "ros34pw2"
-    st.simulate(model, **sound)
-    for twice in range(2):
-        with pytest.raises(st.SerpentailError, match=words):
-            st.simulate(model, **sound | wrong)
-        assert len(waits(model)) == 1, twice
+    for wrong, words in WRONG:
+        st.simulate(model, **sound)
+        for twice in range(2):
+            with row(words, twice):
+                with pytest.raises(st.SerpentailError, match=words):
+                    st.simulate(model, **sound | wrong)
+                assert len(waits(model)) == 1
 
 
-def test_only_what_is_plain_and_came_to_its_end_waits(model):
-    st.simulate(model, *start(), t_span=0.1, controller=lambda t, q, v: [0, 0])
-    st.simulate(model, *start(), t_span=0.1, controller=st.TorqueTable([0, 1], np.ones((2, 2))))
-    st.simulate(model, *start(), t_span=[0.0, 0.1])
-    st.simulate(model, *start(), t_span=0.1, watch=lambda part: None)
-    st.simulate(model, *start(), t_span=0.1, method="dop853")
+def test_only_what_is_plain_and_came_to_its_end_waits():
+    model = loaded()
+    table = st.TorqueTable([0, 1], np.ones((2, 2)))
+    for how in (
+        {"controller": lambda t, q, v: [0, 0]},
+        {"controller": table},
+        {"t_span": [0.0, 0.1]},
+        {"watch": lambda part: None},
+        {"method": "dop853"},
+    ):
+        st.simulate(model, *start(), **{"t_span": 0.1} | how)
+        assert not waits(model), how
     with pytest.raises(st.SimulationError, match="most_steps"):
         st.simulate(model, *start(), t_span=0.1, most_steps=1)
     assert not waits(model)
 
 
-def test_few_wait_and_none_keeps_its_model_alive(model):
+def test_few_wait_and_none_keeps_its_model_alive():
+    model = loaded()
     for k in range(1, 12):
         st.simulate(model, *start(), t_span=k / 100)
     assert len(waits(model)) == waiting.MOST_RUNS
@@ -196,9 +205,9 @@ def test_few_wait_and_none_keeps_its_model_alive(model):
         gc.enable()
 
 
-def test_threads_share_no_run(model):
-    alone = [st.simulate(loaded(), *start(k), t_span=0.2) for k in range(4)]
-    wrong = []
+def test_threads_share_no_run():
+    model, wrong = loaded(), []
+    alone = [first_of(start(k), t_span=0.2) for k in range(4)]
 
     def fly(k):
         for _ in range(30):
@@ -215,7 +224,8 @@ def test_threads_share_no_run(model):
 
 
 @pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="needs fork")
-def test_a_child_makes_its_own(model):
+def test_a_child_makes_its_own():
+    model = loaded()
     first = st.simulate(model, *start(0), t_span=0.2)
     ours, theirs = multiprocessing.get_context("fork").Pipe()
 
@@ -229,4 +239,4 @@ def test_a_child_makes_its_own(model):
     found = ours.recv()
     child.join()
     assert_same(mine, first)
-    np.testing.assert_array_equal(found, st.simulate(loaded(), *start(1), t_span=0.2).q)
+    np.testing.assert_array_equal(found, first_of(start(1), t_span=0.2).q)

@@ -1,10 +1,13 @@
-"""Free flight: what mechanics conserves stays; torques and damping change energy by their work."""
+"""Free flight: samples are where they shall be, what mechanics conserves stays, and torques and
+damping change energy by their work.
+"""
 
 import numpy as np
 import pytest
 from scipy.integrate import simpson
 
 import serpentail as st
+from tests.support import zoo
 from tests.support.rows import row
 
 from ..runs import NT, Q0, V0, fly, tail
@@ -100,3 +103,47 @@ def test_torques_change_energy_by_their_work():
     work = simpson((flight.tau * flight.v[:, 6:]).sum(axis=1), x=flight.t)
     assert abs(work) > 1e-6
     assert flight.energy[-1] - flight.energy[0] == pytest.approx(work, rel=1e-6)
+
+
+METHODS = {"rk4": {"step": 1e-3}, "tsit5": {"rtol": 1e-6}, "dop853": {"rtol": 1e-6}}
+SPANS = [(0.3, None, 200), ((-1.0, 0.1), 0.1, 11), ((0.7, 1.7), 0.3, 3), (0.1, 1.0, 1)]
+
+
+def test_samples_are_evenly_spaced_from_start_to_end():
+    rows = [(method, *each) for method in METHODS for each in (*SPANS, ((1.0, 1.01), 1e-4, 100))]
+    for method, span, output_step, intervals in rows:
+        with row(method, span):
+            flight = fly(t_span=span, output_step=output_step, method=method, **METHODS[method])
+            start, end = span if isinstance(span, tuple) else (0.0, span)
+            assert (len(flight.t), flight.t[0], flight.t[-1]) == (intervals + 1, start, end)
+            np.testing.assert_allclose(np.diff(flight.t), (end - start) / intervals, rtol=1e-10)
+            np.testing.assert_array_equal(flight.v[0], V0)
+            assert flight.info["method"] == method and flight.info["model"] == "m2_n2"
+
+
+def test_steps_divide_the_samples_and_looser_tolerances_cost_less():
+    for step, used, steps in ((3e-3, 2.5e-3, 8), (2.5e-3, 2.5e-3, 8), (1.0, 5e-3, 4)):
+        info = fly(t_span=0.02, output_step=5e-3, step=step).info
+        found = info["step"], info["steps"], info["evaluations"]
+        assert found == (pytest.approx(used), steps, 4 * steps)
+    for method in ("tsit5", "dop853"):
+        how = [{"method": method, "rtol": r, "atol": r} for r in (1e-4, 1e-7, 1e-10)]
+        costs = [fly(t_span=0.1, **each).info["evaluations"] for each in how]
+        assert costs == sorted(set(costs)), method
+
+
+def test_results_hold_parameters():
+    own = tail().with_parameters(tail_mass=0.01)
+    told = fly(own, t_span=0.01).info["parameters"]
+    assert told["tail_mass"] == 0.01
+    assert told["link_inertia"] == list(own.parameters["link_inertia"])
+
+
+def test_a_model_in_single_precision_flies():
+    laws = st.Damping(tuple(DAMPING)), lambda t, q, v: -DAMPING * v[6:]
+    reference = fly(t_span=0.1, controller=laws[0])
+    for law in laws:
+        for method in METHODS:
+            flight = fly(zoo.model("single"), t_span=0.1, controller=law, method=method)
+            assert 0 < np.abs(flight.q - reference.q).max() < 1e-3, method
+            assert flight.info["evaluations"] < 10_000 and flight.q.dtype == np.float64

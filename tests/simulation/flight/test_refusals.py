@@ -128,13 +128,6 @@ def test_a_diverging_run_names_the_time():
             assert caught.value.__cause__ is None
 
 
-def test_an_energy_beyond_numbers_names_the_sample():
-    fast = [1e200] + [0] * (NV - 1)
-    words = r"^from t = 5 s to 5\.5 s, by sample: energy: .*state 0"
-    with pytest.raises(st.SimulationError, match=words):
-        st.simulate(tail(), Q0, fast, t_span=(5, 5.5), step=0.1, output_step=0.1)
-
-
 def test_degrees_are_told_where_they_are_given():
     """At the start, in one row or in one of several, and in bends."""
     upright, v = np.eye(1, NQ, 3)[0], np.zeros(NV)

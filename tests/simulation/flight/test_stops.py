@@ -78,9 +78,6 @@ def test_statuses_of_the_c_differ_and_the_runtime_knows_them():
     assert found["NOT_FINITE"] == library.NOT_FINITE
 
 
-# ---- kinks ---------------------------------------------------------------------------------------
-
-
 def test_quintic_blends_rest_at_nodes():
     curve = st.Reference([0.0, 0.5, 0.7, 1.0], [[0.0], [1.0], [1.0], [-2.0]]).curve
     values, rates, accelerations = curve.at(np.array([-1.0, 0.0, 0.5, 0.6, 0.7, 1.0, 3.0]))

@@ -1,14 +1,21 @@
-"""Flights side by side in vectors: each lane is what its run is alone, to rounding."""
+"""Flights side by side in vectors: each lane is what its run is alone, to rounding; and when that
+pays.
+"""
+
+from functools import partial
 
 import numpy as np
 import pytest
 
 import serpentail as st
+from serpentail.model.snapshot import model_library
+from serpentail.simulation import batched_runs, parallel_runs
+from serpentail.simulation.adaptive_runs import AdaptiveRuns
 from tests.references.metrics import block_error
 from tests.support import zoo
 from tests.support.rows import row
 
-from ..runs import DAMPING, JUMPS, NT, TABLE, alone, near, same, starts, tail
+from ..runs import DAMPING, JUMPS, NT, TABLE, alone, both, near, starts, tail
 
 EACH = st.Damping((1e-6, 2e-6, 3e-6, 4e-6))
 PHASES = st.Phases([(0.0, DAMPING), (0.1, TABLE), (0.2, None)])
@@ -16,7 +23,11 @@ LAWS = {"none": None, "damping": EACH, "table": TABLE, "jumps": JUMPS, "phases":
 RK4 = {"t_span": (0.005, 0.05), "method": "rk4", "step": 3e-4, "output_step": 5e-3}
 TSIT5 = {"t_span": (0.005, 0.3), "method": "tsit5", "output_step": 0.0123}
 METHODS = {"rk4": RK4, "tsit5": TSIT5}
-pytestmark = pytest.mark.usefixtures("any_number_is_many")
+
+
+@pytest.fixture(autouse=True)
+def any_number_is_many(monkeypatch):
+    monkeypatch.setattr(parallel_runs, "worth_batching", lambda *_: True)
 
 
 def unlike(count, seed=0):
@@ -59,15 +70,13 @@ def test_the_tolerance_holds_against_scipy():
         assert max(errors) <= 300 * rtol
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_the_reproducible_profile_gives_the_same_bits(method):
+def test_the_reproducible_profile_gives_the_same_bits():
     model, (q, v) = st.load(tail().folder, profile="reproducible"), unlike(11)
-    for name in ("none", "table", "phases") if method == "tsit5" else ("none", "damping"):
-        how = METHODS[method] | {"controller": LAWS[name]}
-        found = st.simulate(model, q, v, **how)
-        assert found.info["abreast"] == 8
-        with row(name):
-            same(found, alone(model, q, v, **how))
+    for method, names in (("rk4", ("none", "damping")), ("tsit5", ("none", "table", "phases"))):
+        for name in names:
+            with row(method, name):
+                found, _ = both(model, q, v, LAWS[name], **METHODS[method])
+                assert found.info["abreast"] == 8
 
 
 FORMS = {"loops": 1e-11, "baked": 1e-11, "single": 3e-3, "arcs2": 1e-11}
@@ -78,12 +87,11 @@ def test_every_form_of_a_model_has_lanes(name):
     model = zoo.model(name)
     (q, v), nt = starts(model, 19), model.layout.nt
     law = st.TorqueTable(TABLE.times, np.array(TABLE.torques)[:, :nt], 1e-6)
+    rounding = partial(near, digits=FORMS[name])
     for method, own in METHODS.items():
-        settings = own | {"t_span": 0.05, "controller": law}
-        found = st.simulate(model, q, v, **settings)
-        assert found.info["abreast"] == (16 if name == "single" else 8)
         with row(method):
-            near(found, alone(model, q, v, **settings), FORMS[name])
+            found, _ = both(model, q, v, law, compare=rounding, **own | {"t_span": 0.05})
+            assert found.info["abreast"] == (16 if name == "single" else 8)
 
 
 @pytest.mark.parametrize("name", ["elastic", "elastic_arcs"])
@@ -128,9 +136,7 @@ def test_settings_of_steps_hold_in_lanes():
     q, v = unlike(9)
     for own in ({"first_step": 1e-3}, {"most_step": 2e-3}, {"least_step": 1e-5}):
         with row(own):
-            flights = alone(tail(), q, v, **TSIT5 | own)
-            found = st.simulate(tail(), q, v, **TSIT5 | own)
-            near(found, flights)
+            found, flights = both(tail(), q, v, compare=near, **TSIT5 | own)
             assert found.info["steps"] == sum(flight.info["steps"] for flight in flights)
 
 
@@ -168,28 +174,105 @@ def test_runs_do_not_depend_on_their_order_or_on_threads():
     np.testing.assert_array_equal(other.v, first.v[order])
 
 
-@pytest.mark.parametrize("law", ["constants", "tables", "mixed"])
-def test_torques_of_their_own_fly_abreast(law):
-    q, v = starts(tail(), 19)
-    rng = np.random.default_rng(4)
+def test_torques_of_their_own_fly_abreast_but_kinks_at_other_times_one_by_one():
+    (q, v), rng = starts(tail(), 19), np.random.default_rng(4)
     constants = [st.TorqueTable([0.0], 1e-5 * rng.normal(size=(1, NT)), 1e-6) for _ in range(19)]
     tables = [st.TorqueTable(TABLE.times, 1e-5 * rng.normal(size=(3, NT))) for _ in range(19)]
-    mixed = [None, DAMPING, *constants[2:]]
-    given = {"constants": constants, "tables": tables, "mixed": mixed}[law]
-    found = st.simulate(tail(), q, v, controller=given, **RK4)
-    assert found.info["abreast"] == 8 and found.errors == [None] * 19
-    expected = alone(tail(), q, v, given, **RK4)
-    near(found, expected)
-    work = [each.info["work_J"]["torques"] for each in expected]
-    np.testing.assert_allclose(found.audit.work["torques"], work, rtol=1e-9, atol=1e-20)
+    for given in (constants, tables, [None, DAMPING, *constants[2:]]):
+        found, flights = both(tail(), q, v, given, compare=near, **RK4)
+        assert found.info["abreast"] == 8 and found.errors == [None] * 19
+        work = [flight.info["work_J"]["torques"] for flight in flights]
+        np.testing.assert_allclose(found.audit.work["torques"], work, rtol=1e-9, atol=1e-20)
+    given = [st.TorqueTable([0.0, 0.01 + 1e-3 * k], 1e-5 * np.eye(2, NT)) for k in range(19)]
+    assert both(tail(), q, v, given, **RK4)[0].info["abreast"] == 1
 
 
-def test_kinks_at_other_times_fly_one_by_one():
-    q, v = starts(tail(), 9)
-    given = [
-        st.TorqueTable([0.0, 0.01 + 1e-3 * k], 1e-5 * (k + 1) * np.eye(2, NT), 1e-6)
-        for k in range(9)
-    ]
-    found = st.simulate(tail(), q, v, controller=given, **RK4)
-    assert found.info["abreast"] == 1
-    same(found, alone(tail(), q, v, given, **RK4))
+@pytest.fixture
+def priced(monkeypatch):
+    """Lanes only where they pay."""
+    monkeypatch.undo()
+
+
+@pytest.fixture
+def built(monkeypatch):
+    """What is compiled beside models, where the cache has nothing of it."""
+    found = []
+    monkeypatch.setattr(
+        "serpentail.model.batch.model_library", lambda *a: found.append(a) or model_library(*a)
+    )
+    monkeypatch.setattr("serpentail.model.batch.library_in_cache", lambda *_: None)
+    return found
+
+
+def test_short_work_compiles_nothing_until_all_of_it_would_have_paid(priced, built):
+    model = st.load(tail().folder)
+    q, v = starts(model, 9)
+    assert st.simulate(model, q, v, **RK4).info["abreast"] == 1 and not built
+    source = model.batch_library.rollouts
+    price = batched_runs.COMPILE_S_PER_BYTE * source.bytes
+    assert 0 < source.missed < price
+    source.missed = price - source.missed / 2  # what many such calls would have come to
+    assert st.simulate(model, q[:7], v[:7], **RK4).info["abreast"] == 1  # no full vector
+    for _ in range(2):
+        assert st.simulate(model, q, v, **RK4).info["abreast"] == 8 and len(built) == 1
+
+
+def test_long_work_compiles_at_once(priced, built, monkeypatch):
+    monkeypatch.setattr(batched_runs, "COMPILE_S_PER_BYTE", 1e-10)
+    model = st.load(tail().folder)
+    assert st.simulate(model, *starts(model, 9), **RK4).info["abreast"] == 8 and len(built) == 1
+
+
+def test_what_the_cache_has_is_used_for_short_work(priced):
+    tail().batch_library.rollouts.function("m2_n2_side_by_side_flights")
+    model = st.load(tail().folder)
+    assert st.simulate(model, *starts(model, 8), **RK4).info["abreast"] == 8
+
+
+def test_other_laws_fly_alone(built):
+    model = st.load(tail().folder)
+    q, v = starts(model, 9)
+    laws = [st.Phases([(0.0, None), (0.02, DAMPING)]), lambda t, q, v: [0.0] * NT]
+    laws.append(st.Pfl(model, st.Reference([0.0, 0.05], [[0.0] * NT, [0.3] * NT])))
+    for law in laws:
+        assert st.simulate(model, q, v, **RK4 | {"controller": law}).info["abreast"] == 1
+    assert not built
+    assert st.simulate(model, q, v, **RK4).info["abreast"] == 8 and len(built) == 1
+    st.simulate(model.with_parameters(torso_mass=1.0), q, v, **RK4)
+    assert len(built) == 1
+
+
+def test_the_models_library_has_no_lanes():
+    """Batches and flights are compiled when they are needed."""
+    for name in ("side_by_side_forward_dynamics", "side_by_side_flights"):
+        with pytest.raises(AttributeError):
+            getattr(tail().library, f"m2_n2_{name}")
+
+
+@pytest.mark.parametrize(("price", "lanes"), [(1e-9, 8), (1.0, 1)])
+def test_pilots_tell_whether_compiling_pays(priced, monkeypatch, price, lanes):
+    monkeypatch.setattr("serpentail.model.batch.library_in_cache", lambda *_: None)
+    monkeypatch.setattr(batched_runs, "COMPILE_S_PER_BYTE", price)
+    monkeypatch.setattr(parallel_runs, "PILOTS", 5)
+    model, how = st.load(tail().folder), {"t_span": 0.3, "method": "tsit5", "output_step": 0.0123}
+    found, flights = both(model, *starts(model, 19), compare=near, **how)
+    assert found.info["abreast"] == lanes and found.errors == [None] * 19
+    np.testing.assert_array_equal(found.q[:5], [flight.q for flight in flights[:5]])
+
+
+def test_sound_flights_are_made_abreast_and_no_second_time(monkeypatch):
+    """A group that fails is made singly, run by run: none of these may."""
+    go, again = AdaptiveRuns.go, []
+
+    def told(self, runs, ended):
+        for numbers, outcome in go(self, runs, ended):
+            again.extend([] if outcome else numbers)
+            yield numbers, outcome
+
+    monkeypatch.setattr(AdaptiveRuns, "go", told)
+    q, v = starts(tail(), 19)
+    found = st.simulate(tail(), q, v, t_span=0.3, method="tsit5")
+    assert again == [] and found.errors == [None] * 19
+    monkeypatch.setattr(parallel_runs, "RunsInTurn", lambda *_: pytest.fail("in turn"))
+    for law in (None, DAMPING, TABLE, JUMPS):
+        st.simulate(tail(), q, v, controller=law, **RK4)

@@ -1,4 +1,6 @@
-"""Many runs at once give what each gives alone, bit for bit, in any order, on any core."""
+"""Many runs at once give what each gives alone, bit for bit: with parameters and a controller of
+its own, in any order, on any core.
+"""
 
 import pickle
 
@@ -6,10 +8,11 @@ import numpy as np
 import pytest
 
 import serpentail as st
+from serpentail.simulation import parallel_runs
 from tests.support import zoo
 from tests.support.rows import row
 
-from ..runs import ARRAYS, DAMPING, LEGS, NQ, NT, PER_RUN, alone, rat, same, starts, tail
+from ..runs import ARRAYS, DAMPING, LEGS, NQ, NT, PER_RUN, alone, both, rat, same, starts, tail
 
 
 def own_info(info):
@@ -37,8 +40,7 @@ def test_each_run_is_what_it_is_alone():
     for own in SETTINGS:
         with row(own):
             settings = {"t_span": 0.05, "output_step": 5e-3, "controller": DAMPING} | own
-            flights, found = alone(tail(), q, v, **settings), st.simulate(tail(), q, v, **settings)
-            same(found, flights)
+            found, flights = both(tail(), q, v, **settings)
             assert len(found) == 5 and found.errors == [None] * 5
             assert found.info["method"] == flights[0].info["method"]
             assert found.info["steps"] == sum(flight.info["steps"] for flight in flights)
@@ -46,31 +48,23 @@ def test_each_run_is_what_it_is_alone():
                 assert own_info(found[k].info) == own_info(flight.info)
                 assert found.ends[k] == flight.t[-1]
                 np.testing.assert_array_equal(found[k].q, flight.q)
-
-
-def test_a_tracked_reference_and_single_precision():
     for model in (tail(), zoo.model("single")):
         law = st.Pfl(model, st.Reference([0.0, 0.05], [[0.0] * NT, [0.3] * NT]))
-        settings, (q, v) = {"t_span": 0.05, "method": "tsit5"}, starts(model, 3)
-        found = st.simulate(model, q, v, controller=law, **settings)
-        same(found, alone(model, q, v, controller=law, **settings))
+        found, _ = both(model, q, v, law, t_span=0.05, method="tsit5")
         assert found.q.dtype == found.kinetic.dtype == np.float64
 
 
-@pytest.mark.parametrize("method", ["ros34pw2", "tsit5", "implicit_euler"])
-def test_on_the_ground(method):
-    settings = {"legs": LEGS, "controller": st.Damping(1e-3), "t_span": 0.3, "output_step": 0.02}
-    q, v = starts(rat(), 4)
-    flights = alone(rat(), q, v, method=method, **settings)
-    found = st.simulate(rat(), q, v, method=method, **settings)
-    assert any(flight.events for flight in flights)
-    same(found, flights)
-    for k, flight in enumerate(flights):
-        assert found[k].events == flight.events
-        np.testing.assert_array_equal(found.bristles[k], flight.contact.bristles)
-        for name in ("points", "forces", "bristles"):
-            one, other = getattr(found[k].contact, name), getattr(flight.contact, name)
-            np.testing.assert_array_equal(one, other)
+def test_on_the_ground():
+    how = {"legs": LEGS, "controller": st.Damping(1e-3), "t_span": 0.3, "output_step": 0.02}
+    for method in ("ros34pw2", "tsit5", "implicit_euler"):
+        found, flights = both(rat(), *starts(rat(), 4), method=method, **how)
+        assert any(flight.events for flight in flights)
+        for k, flight in enumerate(flights):
+            assert found[k].events == flight.events
+            np.testing.assert_array_equal(found.bristles[k], flight.contact.bristles)
+            for name in ("points", "forces", "bristles"):
+                one, other = getattr(found[k].contact, name), getattr(flight.contact, name)
+                np.testing.assert_array_equal(one, other, err_msg=f"{method}: {name} of run {k}")
 
 
 def test_runs_that_stop_at_events():
@@ -91,22 +85,22 @@ def test_runs_that_stop_at_events():
     assert not np.isnan(found.q[0]).any() and np.isnan(found.q[1:, -1]).all()
 
 
-# ---- parameters ----------------------------------------------------------------------------------
-
-
 def test_each_run_has_its_own_parameters():
-    q, v = starts(tail(), 4)
+    """Of the body, and of the ground."""
     rng = np.random.default_rng(1)
     own = {"tail_mass": rng.uniform(0.002, 0.005, 4), "tail_mount": 0.02 * rng.normal(size=(4, 3))}
-    settings = {"t_span": 0.05, "controller": st.Damping(1e-3)}
-    found = st.simulate(tail(), q, v, parameters=own, **settings)
-    for k in range(4):
-        model = tail().with_parameters(**{name: values[k] for name, values in own.items()})
-        flight = st.simulate(model, q[k], v[k], method=found.info["method"], **settings)
-        for name in PER_RUN:
-            np.testing.assert_array_equal(getattr(found, name)[k], getattr(flight, name))
-        assert found[k].info["parameters"] == flight.info["parameters"]
-    assert len(np.unique(found.kinetic[:, 0])) == 4
+    ground = {"mu": [0.0, 0.5, 1.0, 0.2], "K_n": [500.0, 1000.0, 2000.0, 700.0]}
+    flies = {"t_span": 0.05, "controller": st.Damping(1e-3)}
+    for model, given, how in ((tail(), own, flies), (rat(), ground, {"legs": LEGS, "t_span": 0.2})):
+        q, v = starts(model, 4)
+        found = st.simulate(model, q, v, parameters=given, **how)
+        for k in range(4):
+            one = model.with_parameters(**{name: values[k] for name, values in given.items()})
+            flight = st.simulate(one, q[k], v[k], method=found.info["method"], **how)
+            for name in PER_RUN:
+                np.testing.assert_array_equal(getattr(found, name)[k], getattr(flight, name))
+            assert found[k].info["parameters"] == flight.info["parameters"]
+        assert len(np.unique(found.kinetic[:, -1])) == 4
 
 
 def test_parameters_of_runs_are_those_of_models():
@@ -120,19 +114,8 @@ def test_parameters_of_runs_are_those_of_models():
         np.testing.assert_array_equal(vectors, [model.parameter_vector for model in models])
 
 
-def test_the_ground_may_differ_from_run_to_run():
-    q, v = starts(rat(), 3)
-    own = {"mu": [0.0, 0.5, 1.0], "K_n": [500.0, 1000.0, 2000.0]}
-    settings = {"legs": LEGS, "t_span": 0.2}
-    found = st.simulate(rat(), q, v, parameters=own, **settings)
-    for k in range(3):
-        model = rat().with_parameters(mu=own["mu"][k], K_n=own["K_n"][k])
-        flight = st.simulate(model, q[k], v[k], **settings)
-        np.testing.assert_array_equal(found.q[k], flight.q)
-        np.testing.assert_array_equal(found[k].contact.forces, flight.contact.forces)
-
-
 def test_the_stiffest_run_chooses_the_method():
+    """By its parameters, or by its controller."""
     q, v = starts(tail(), 3)
     settings = {"controller": st.Damping(1e-2), "t_span": 0.01}
     rows = [([0.1], "tsit5"), ([0.001], "ros34pw2"), ([0.1, 0.1], "tsit5")]
@@ -140,9 +123,9 @@ def test_the_stiffest_run_chooses_the_method():
         own, k = {"parameters": {"tail_mass": masses}}, len(masses)
         found = st.simulate(tail(), q[:k], v[:k], **own, **settings)
         assert found.info["method"] == method, masses
-
-
-# ---- order and sharing ---------------------------------------------------------------------------
+    mild, stiff = st.Damping(1e-9), st.Damping(1e-2)
+    for law, method in ((mild, "tsit5"), ([mild, stiff, mild], "ros34pw2")):
+        assert st.simulate(tail(), q, v, controller=law, t_span=0.01).info["method"] == method
 
 
 def test_runs_do_not_depend_on_their_order_or_on_threads():
@@ -186,3 +169,76 @@ def test_arguments_are_left_alone_and_results_are_read_only_and_can_be_pickled()
         found.q[0, 0, 0] = 1
     again = pickle.loads(pickle.dumps(found))
     np.testing.assert_array_equal(again[1].contact.forces, found[1].contact.forces)
+
+
+TIMES = [0.0, 0.0123, 0.031]
+SPAN = {"t_span": 0.05, "output_step": 5e-3}
+
+
+def table(k):
+    """A table of torques of run k, whose kinks are its own."""
+    return st.TorqueTable([0.0, 0.01 + 1e-3 * k], 1e-5 * (k + 1) * np.eye(2, NT), 1e-6)
+
+
+def test_a_list_has_a_controller_of_any_kind_for_each_run():
+    reference = st.Reference([0.0, 0.05], [[0.0] * NT, [0.3] * NT])
+    ramp = st.TorqueCurve(st.Piecewise(np.array([0.01, 0.02]), np.full((1, NT, 2), 1e-5)))
+    tracking = [st.Pfl(tail(), reference, kp=3e4), st.Pfl(tail(), reference, kd=300.0)]
+    phases = st.Phases([(0.0, None), (0.02, DAMPING)])
+    given = [None, DAMPING, table(2), ramp, *tracking, phases]
+    functions = [lambda t, q, v: -1e-6 * v[6:], DAMPING, lambda t, q, v: [1e-5] * NT]
+    q, v = starts(tail(), len(given))
+    for method in ({"method": "tsit5"}, {"method": "rk4", "step": 1e-3}, {"method": "ros34pw2"}):
+        for threads in (1, 3):
+            with row(method, threads):
+                how = {"threads": threads} | method | SPAN
+                found = st.simulate(tail(), q, v, controller=given, **how)
+                same(found, alone(tail(), q, v, given, **method, **SPAN))
+                assert len(np.unique(found.q[:, -1, -1])) == len(given)
+    for method in ("tsit5", "dop853"):
+        both(tail(), q[:3], v[:3], functions, method=method, **SPAN)
+    given = (st.Damping(1e-3), st.TorqueTable([0.0], [[1e-4, -1e-4]], 1e-3), st.Damping(2e-3))
+    how = {"legs": LEGS, "t_span": 0.2, "output_step": 0.02, "method": "ros34pw2"}
+    both(rat(), *starts(rat(), 3), given, **how)
+
+
+def test_tables_and_damping_may_have_an_axis_of_the_runs():
+    torques = 1e-5 * np.random.default_rng(3).normal(size=(3, 3, NT))
+    rows, still = np.outer([1, 2, 3], [1e-6] * NT), np.zeros((3, 1, NT))
+    nodes = [(TIMES[:1], torques[:, :1], 1e-6), (TIMES, torques, 1e-6), (TIMES[:1], still, rows)]
+    cases = [(st.Damping(rows), [st.Damping(tuple(each)) for each in rows])]
+    for times, values, damping in nodes:
+        own = [damping] * 3 if np.ndim(damping) == 0 else map(tuple, damping)
+        each = [st.TorqueTable(times, *pair) for pair in zip(values, own, strict=True)]
+        cases.append((st.TorqueTable(times, values, damping), each))
+    for law, each in cases:
+        both(tail(), *starts(tail(), 3), law, each, method="tsit5", **SPAN)
+
+
+def test_equal_controllers_are_read_once(monkeypatch):
+    made, law = [], parallel_runs.Acting._of
+    monkeypatch.setattr(parallel_runs.Acting, "_of", lambda *a: made.append(a) or law(*a))
+    given = [DAMPING, table(1), DAMPING, None]
+    st.simulate(tail(), *starts(tail(), 4), controller=given, method="tsit5", **SPAN)
+    assert len(made) == 3
+
+
+WRONG = [
+    ([None, None], "2 controllers for 3 runs"),
+    ([], "0 controllers for 3 runs"),
+    ([None, 5, None], "run 1: controller: value 5"),
+    ([None, None, st.TorqueTable([0.0], [[0.0]])], "run 2: TorqueTable"),
+    (st.TorqueTable([0.0], np.zeros((2, 1, NT))), "2 controllers for 3 runs"),
+    (st.TorqueTable([0.0], np.full((3, 1, NT), np.nan)), "run 0.*torques"),
+    (st.Damping(np.full((3, NT), -1.0)), "run 0: damping"),
+    ([None, [None], None], "run 1: controller: value"),
+]
+
+
+def test_what_is_wrong_is_told_with_its_run():
+    for given, words in WRONG:
+        with row(words), pytest.raises(st.SimulationError, match=words):
+            st.simulate(tail(), *starts(tail(), 3), controller=given, t_span=0.01)
+    q, v = starts(tail(), 1)
+    with pytest.raises(st.SimulationError, match="a list of 1, one start"):
+        st.simulate(tail(), q[0], v[0], controller=[DAMPING], t_span=0.01)
