@@ -29,6 +29,10 @@ TOUCHING = ("ground_m2_n2", "box", "smooth", "paper", "small")
 TOUCHING_SLOW = ("ground_arcs", "single_ground", "ground_mixed", "feet", "feet_tail")
 
 
+# largest differences by rounding, in units of the last digit of each output's largest value
+LIMITS = {"mixed": 2e4}  # H has a condition number of 2e7, because a segment weighs 0.2 g
+
+
 def slow(*names):
     """Cases of slow tests."""
     return [pytest.param(name, marks=pytest.mark.slow) for name in names]
@@ -61,7 +65,9 @@ def test_any_number_of_states_gives_what_each_gives_alone(name, monkeypatch):
                     in_lanes(patch)
                 out = evaluated(model, function, arrays)
                 assert out.dtype == expected.dtype and np.isfinite(out).all()
-                assert (np.abs(out - expected[:count]) <= 3e3 * digits * scale).all()
+                assert (
+                    np.abs(out - expected[:count]) <= LIMITS.get(name, 3e3) * digits * scale
+                ).all()
 
 
 def test_states_whose_lanes_fail_are_evaluated_again_one_by_one(monkeypatch):
