@@ -1,4 +1,6 @@
-"""Every block of every document runs as pasted, or says why it does not."""
+"""Every block of every document runs as pasted, or says why it does not; the table of functions
+that a scene needs is what the runtime asks for.
+"""
 
 import ast
 import doctest
@@ -11,11 +13,20 @@ import pytest
 from scipy.integrate import simpson
 
 import serpentail as st
+from serpentail.differentiable.rules import RULES
+from serpentail.exporting.fmu import FLYING, TOUCHING
+from serpentail.identification import identify
+from serpentail.planning import best
+from serpentail.planning.condensed import node
+from serpentail.planning.predictive import settings
 from serpentail_codegen.scene.problems import SceneError
-from tests.docs.blocks import PAGES, RUN, SHOWN, blocks
-from tests.docs.running import run_page
+from serpentail_codegen.scene.signatures.table import ALL, EXACT_DERIVATIVES
+from tests.docs.running import PAGES, blocks, run_page
+from tests.support import zoo
 from tests.support.rows import row
 
+RUN = ("python", "sh", "toml", "c", "cpp", "cmake")  # languages whose blocks do something here
+SHOWN = ("text", "json", "html")  # output, formulas
 QUICK = {"autodiff", "contact", "continuum_forms", "learning", "python"}
 NEEDS = {"autodiff": ["jax"], "export": ["pinocchio"], "viewing": ["imageio_ffmpeg", "viser"]}
 ELSEWHERE = {"recipes"}  # tests/exporting/test_recipes.py
@@ -52,7 +63,6 @@ def test_the_blocks_of_a_page_run(name, tmp_path):
 
 
 def of_c(ran):
-    """The line of the C program is the model's own acceleration."""
     model = st.load(ran.folder / "generated" / "articulated_m3_n4")
     q = np.array([0, 0, 0, 1, 0, 0, 0, 0.5, 0, 0, 0, 0, 0])
     v_dot = model.forward_dynamics(q, np.zeros(model.nv), np.array([1e-3, 0, 0, 0, 0, 0]))
@@ -61,13 +71,11 @@ def of_c(ran):
 
 
 def of_planning(ran):
-    """The plan is true."""
     good, error, _ = ran.printed.split()[:3]
     assert good == "True" and float(error) <= 0.01
 
 
 def of_sweeps(ran):
-    """The study is complete, as the page says."""
     text = PAGES["sweeps"].read_text(encoding="utf-8")
     first, second = ran.printed.splitlines()
     assert first == re.search(r"print\(study.status\(\)\)  # (.*)", text)[1] and float(second) > 0
@@ -75,25 +83,21 @@ def of_sweeps(ran):
 
 
 def of_getting_started(ran):
-    """The planned flight ends upright, and the passive one does not."""
     tilts = re.findall(r"^(\S+) degrees of tilt at the end", ran.printed, re.MULTILINE)
     planned, passive = map(float, tilts[-2:])
     assert planned < 0.1 and passive > 90
 
 
 def of_casadi(ran):
-    """The examples find their postures and the motion."""
     assert ran.printed.count("Solve_Succeeded") == 3
 
 
 def of_python(ran):
-    """The equation of motion holds."""
     numbers = re.search(r"C = \[(.*?)\]", ran.printed, re.DOTALL)[1].split()
     assert np.abs(np.array(numbers, float)).max() < 1e-12
 
 
 def of_flight(ran):
-    """A free fall, shown on a page."""
     (height,) = re.findall(r"after 0.5 s: height (\S+) m", ran.printed)
     fallen = 0.3 + 2 * 0.5 - 9.8 / 2 * 0.5**2
     assert float(height) == pytest.approx(fallen, abs=0.1)  # of B, not of the centre of mass
@@ -101,7 +105,6 @@ def of_flight(ran):
 
 
 def of_demo(ran):
-    """The demo writes its files, and its flights lose what is damped."""
     demo = ran.folder / "output" / "demo"
     for scene in ("kangaroo_rat_m1_n3", "kangaroo_rat_m3_n4"):
         flight = st.Trajectory.load(demo / f"{scene}.npz")
@@ -152,6 +155,44 @@ def test_figures_of_the_readme_are_those_of_the_benchmarks():
     for text in rows:
         for number in re.findall(r"(?<![\w.-])\d[\d.e-]*(?:x| us| ms)?(?![\w.])", text):
             assert number.removesuffix(" us") in measured, (text, number)
+
+
+# Functions that a scene needs.
+
+FIRST, SECOND = EXACT_DERIVATIVES["forward_dynamics"]
+ALL_DERIVATIVES = {part for orders in EXACT_DERIVATIVES.values() for o in orders for part in o}
+OF_RULES = {name for rule in RULES.values() for name, _ in rule.jacobians}
+NEEDED = {
+    "`st.plan`": set(best.NEEDED),
+    "`st.plan`, up to seven times as fast": ALL_DERIVATIVES - set(best.NEEDED),
+    '`st.plan(..., solver="fatrop")`': set(node.FUNCTIONS.values()),
+    "`st.Mpc`": set(settings.NEEDED.values()),
+    "`st.identify`": {*identify.FUNCTIONS, "forward_dynamics_parameter_derivatives"},
+    '`casadi.external("x_dot", derivatives=1)`': {"forward_dynamics", *FIRST},
+    '`casadi.external("x_dot", derivatives=2)`': set(SECOND) - set(FIRST),
+    "`st.jax_functions`, `st.torch_functions`": {*RULES, *OF_RULES},
+    "[an FMU](export.md)": {*FLYING, *TOUCHING},
+}
+
+
+def test_the_table_of_functions_that_a_scene_needs_is_what_the_runtime_asks_for():
+    """Of simulations, what their errors name: a model with next to nothing is told all it lacks."""
+    section = PAGES["models"].read_text(encoding="utf-8").partition("## Which functions")[2]
+    section = section.partition("\n## ")[0]
+    _, *table = [line.strip("|").split("|") for line in section.splitlines() if line[:2] == "| "]
+    rows = {purpose.strip(): {*re.findall(r"`(\w+)`", names)} & {*ALL} for purpose, names in table}
+    model = zoo.model("bare")
+    q, v = np.eye(model.nq)[3], np.zeros(model.nv)
+    for purpose, at_times, call in [
+        ("`st.simulate`", "implicit", lambda: st.simulate(model, q, v)),
+        ("`model.step`, `st.environment`", "implicit", lambda: model.step(q, v, [0, 0], 1e-3)),
+        ("`st.Pfl`", "pfl", lambda: st.Pfl(model, ([0.0, 1.0], np.zeros((2, 2))))),
+    ]:
+        with row(purpose), pytest.raises(st.ModelError) as caught:
+            call()
+        named = re.findall(r"'(\w+)'", str(caught.value).partition("(it has")[0])
+        assert rows.pop(purpose) - {*model.generated} == {*named, at_times}, purpose
+    assert rows == NEEDED
 
 
 # The runner.

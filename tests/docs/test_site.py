@@ -11,7 +11,7 @@ from urllib.parse import unquote
 import pytest
 
 import serpentail as st
-from tests.docs.blocks import ROOT
+from tests.docs.running import ROOT
 from tests.support.rows import row
 
 CLASSES = (st.Model, st.Trajectory, st.Plan, st.Rollouts, st.Mpc, st.Sweep, st.Identification)
@@ -62,7 +62,7 @@ def of_class(member) -> bool:
 
 
 @pytest.mark.slow
-def test_every_name_and_method_has_its_place(site):
+def test_the_site_has_every_name_fetches_nothing_from_elsewhere_and_leads_somewhere(site):
     from sphinx.util.inventory import InventoryFile
 
     with (site / "objects.inv").open("rb") as file:
@@ -73,10 +73,6 @@ def test_every_name_and_method_has_its_place(site):
         members = inspect.getmembers(each, of_class)
         wanted |= {f"serpentail.{each.__name__}.{name}" for name, _ in members if name[0] != "_"}
     assert wanted - names == set()
-
-
-@pytest.mark.slow
-def test_pages_fetch_nothing_from_elsewhere_and_links_lead_somewhere(site):
     pages = {path: Page(path) for path in site.rglob("*.html")}
     for path, found in pages.items():
         with row(path):
@@ -93,22 +89,19 @@ def test_pages_fetch_nothing_from_elsewhere_and_links_lead_somewhere(site):
         assert re.findall(r"@import[^;]*//|url\([\"']?(?:https?:)?//", text) == [], sheet
 
 
-def test_links_lead_somewhere_from_any_page():
-    sys.path.insert(0, str(ROOT / "docs"))
-    try:
-        from _site.links import links_of_page, links_of_root
-    finally:
-        sys.path.pop(0)
+def test_links_lead_somewhere_from_any_page(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "docs")
+    from _site.links import links_of_page, links_of_root
 
-    def seen(change, *place, text):
+    for change, place, text, found in [
+        (links_of_page, ["a"], "[x](../CHANGELOG.md#y)", "[x](changelog.md#y)"),
+        (links_of_page, ["a/b"], "[x](../../SECURITY.md)", "[x](../security.md)"),
+        (links_of_page, ["a/b"], "[x](../a.md), [y](#y)", "[x](../a.md), [y](#y)"),
+        (links_of_page, ["a"], "[x](../scenes/kick.toml)", "[x](../scenes/kick.toml)"),
+        (links_of_page, ["a"], "[x](../viewer)", "/tree/main/viewer)"),
+        (links_of_root, [ROOT, "a"], "[x](docs/a.md#b)", "[x](a.md#b)"),
+        (links_of_root, [ROOT, "a"], "[x](CHANGELOG.md)", "[x](changelog.md)"),
+    ]:
         source = [text]
         change(None, *place, source)
-        return source[0]
-
-    assert seen(links_of_page, "a", text="[x](../CHANGELOG.md#y)") == "[x](changelog.md#y)"
-    assert seen(links_of_page, "a/b", text="[x](../../SECURITY.md)") == "[x](../security.md)"
-    assert seen(links_of_page, "a/b", text="[x](../a.md), [y](#y)") == "[x](../a.md), [y](#y)"
-    assert seen(links_of_page, "a", text="[x](../scenes/kick.toml)") == "[x](../scenes/kick.toml)"
-    assert seen(links_of_page, "a", text="[x](../viewer)").endswith("/tree/main/viewer)")
-    assert seen(links_of_root, ROOT, "a", text="[x](docs/a.md#b)") == "[x](a.md#b)"
-    assert seen(links_of_root, ROOT, "a", text="[x](CHANGELOG.md)") == "[x](changelog.md)"
+        assert source[0].endswith(found), text

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.docs.blocks import PAGES
-from tests.docs.running import run_page
+from tests.docs.running import PAGES, run_page
 
 pytest.importorskip("fmpy")
 pytestmark = pytest.mark.slow  # it compiles and links as a user does

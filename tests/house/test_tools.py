@@ -1,0 +1,225 @@
+"""Mutants change what runs and are judged by the tests that run it; the benchmark's figures are
+those of the faster peer.
+"""
+
+import ast
+import json
+import platform
+import runpy
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from benchmarks import closing, processors, report
+from benchmarks.comparison import faster
+from benchmarks.peak import best_chains
+from benchmarks.peers import build, compilers
+from benchmarks.targets import judged
+from mutants import judge, python_source, results, sample, template_source
+from mutants.mutation import Mutation
+from mutants.recorded import NO_JUDGES, own_lines
+from tests.support.rows import row
+
+ROOT = Path(__file__).parents[2]
+TOLD = '''"""Docs 1 < 2."""
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from a import b as c
+
+
+@cached(3)
+def f(x: Literal[3]) -> Literal[4]:
+    """Docs 1 < 2."""
+    raise StateError(f"{x + 1}: needs 3")
+'''
+PYTHON = {
+    "a < b": {"a < b -> a <= b", "a < b -> a >= b", "a < b -> pass"},
+    "x = a + b": {"a + b -> a - b"},
+    "x = 'a' + b": set(),
+    "x = a and b": {"a and b -> a or b"},
+    "x = not a": {"not a -> a"},
+    "x = 3": {"3 -> 4"},
+    "x = 2.0": {"2.0 -> 3.0"},
+    "x = 0.0": {"0.0 -> 1.0"},
+    "x = True": {"True -> False"},
+    "x = f(a, b)": {"f(a, b) -> f(b, a)"},
+    "x = f(a, b=c)": {"f(a, b=c) -> f(a)"},
+    "x.y = z": {"x.y = z -> pass"},
+    "x += y": {"x += y -> pass", "x += y -> x -= y"},
+    "f()": {"f() -> pass"},
+    "if x:\n    y = z": {"x -> not x"},
+    "x = [a for a in b if c]": {"[a for a in b if c] -> [a for a in b]"},
+    "def f():\n    return x": {"return x -> return None"},
+    TOLD: {"raise StateError(f'{x + 1}: needs 3') -> pass"},
+}
+TEMPLATES = {
+    "  x = a + b;": {" + -> -", "x = a + b; -> ;"},
+    "  const real x = a * b;": {"* -> /"},
+    "  real *const x = a;": set(),
+    "  if (a < {{ 0 | number }}) {": {"< -> <=", "< -> >=", "0 -> 1"},
+    "/* a < 3 */ {# 4 #}": set(),
+    '#include "a.h"\n#define A 3': set(),
+    "{% if has.contacts %}": {"has.contacts -> not (has.contacts)"},
+    "  f(a, 1);": {"1 -> 2", "f(a, 1); -> ;"},
+    "  return a;": set(),
+    "  if (!a) {": {"! -> (nothing)", "!a -> !(!a)"},
+}
+
+
+def test_mutants_change_what_runs_and_not_what_only_tells():
+    for text, changes in PYTHON.items():
+        with row(text):
+            assert {m.change for m in python_source.mutations("a.py", text.encode())} == changes
+    for text, changes in TEMPLATES.items():
+        with row(text):
+            mutations = template_source.mutations("a.c.jinja", text.encode())
+            found = {m.change.strip() for m in mutations if "->" in m.change}
+            found -= {"a < {{ 0 | number }} -> !(a < {{ 0 | number }})"}
+            assert found == {change.strip() for change in changes}
+
+
+def test_a_sample_is_of_programs_of_all_parts_and_grows(tmp_path):
+    for folder, suffix in sample.PARTS.values():
+        for path in sorted((ROOT / folder).rglob(f"*{suffix}"))[3:9:2]:
+            copy = tmp_path / path.relative_to(ROOT)
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            copy.write_bytes(path.read_bytes())
+    few, many = sample.drawn(tmp_path, 30, 7), sample.drawn(tmp_path, 60, 7)
+    assert many[:30] == few != sample.drawn(tmp_path, 30, 8)
+    assert len({mutation.key for mutation in many}) == 60
+    parts = [sample.part_of(mutation.path) for mutation in few]
+    assert [parts.count(part) for part in sample.PARTS] == [10, 10, 10]
+    (path,) = {mutation.path for mutation in sample.drawn(tmp_path, 30, 7, few[0].path)}
+    assert path == few[0].path
+    for mutation in (m for m in many if m.path.endswith(".py")):
+        source = (ROOT / mutation.path).read_bytes()
+        assert ast.dump(ast.parse(mutation.of(source))) != ast.dump(ast.parse(source))
+
+
+def test_a_mutant_says_that_it_was_loaded(tmp_path):
+    witness, file = tmp_path / "witness", tmp_path / "mutant.py"
+    text = b'"""Docs.\n\nMore.\n"""\n\nfrom __future__ import annotations\nraise ValueError\n'
+    file.write_bytes(python_source.with_first(text, f"open({str(witness)!r}, 'w').close()"))
+    assert len(file.read_bytes().splitlines()) == len(text.splitlines())
+    with pytest.raises(ValueError, match=r"^$"):
+        runpy.run_path(str(file))
+    assert witness.exists()
+
+
+def test_what_is_late_on_a_busy_machine_gets_more_time(monkeypatch):
+    """Late with and without the mutant: the machine is busy.  Late with it alone: it is noticed."""
+    told, patient = [], []
+
+    def failed(place, mutation, tests, patience=1.0):
+        patient.append(patience)
+        with_mutant, needed = told[-1] == b"mutant", 4.0 if place.hangs else 2.0
+        if patience >= needed and not (place.hangs and with_mutant):
+            return None
+        return place.end, "Failed: Timeout (>120.0s) from pytest-timeout."
+
+    monkeypatch.setattr(judge.tree, "BASE", ROOT)
+    monkeypatch.setattr(judge.Tree, "_failed", failed)
+    monkeypatch.setattr(judge.Tree, "_plant", lambda place, mutation, text: told.append(text))
+    place = object.__new__(judge.Tree)
+    place.recorder = SimpleNamespace(distrusted=set(), trusted={"tests/a.py::test_b"})
+    change = Mutation("runtime/serpentail/attitude.py", 1, 0, 0, "", "", "")
+    for place.end in ("timeout", "tests/a.py::test_b"):
+        for place.hangs, tries in [(False, [1, 1, 2]), (True, [1, 1, 2, 2, 4, 4])]:
+            told[:], patient[:] = [b"mutant"], []
+            found = place._noticed(change, b"mutant", ["tests/a.py::test_b"])
+            assert (found and found[0], patient) == (place.end if place.hangs else None, tries)
+            assert told[-1] == b"mutant" and not place.recorder.distrusted
+
+
+def test_the_nearest_files_judge_first_and_alone_where_no_test_runs_the_line():
+    source = "codegen/serpentail_codegen/targets/c/templates/batch/lane_samples.c.jinja"
+    names = ("simulation/test_adaptive_lanes", "c/batches/test_kernels", "fuzz/test_plans")
+    assert [judge.nearness(source, f"tests/{name}.py") for name in names] == [1, 2, 0]
+    passed = {"tests/sweeps/test_kills.py": ["kills"], "tests/fuzz/test_plans.py": ["plans"]}
+    child = Mutation("runtime/serpentail/sweeps/child.py", 1, 0, 1, "", "", "")
+    for runs in (True, False):
+        recorder = SimpleNamespace(
+            files=lambda: list(passed),
+            cost=lambda file: 1.0,
+            chosen=lambda _, file, runs=runs: [["plans"] if runs and "plans" in file else []],
+            of=lambda file: SimpleNamespace(passed=passed[file]),
+        )
+        assert list(judge.rows(recorder, child)) == [["plans" if runs else "kills"]]
+    tree = ast.parse("if (a and\n    b):\n    c()\nd()\n")
+    assert [list(own_lines(node)) for node in tree.body] == [[1, 2], [4]]
+
+
+def test_the_score_leaves_out_what_is_argued_of_lines_that_are_there(monkeypatch):
+    for entry in results.arguments():
+        with row(entry):
+            of_file = sample.of_file(ROOT, entry["file"])
+            assert any(results.argument(mutation, [entry]) for mutation in of_file)
+    assert all((ROOT / name).is_file() for name in NO_JUDGES)
+    of, changes = "runtime/serpentail/a.py", [(True, "a -> b"), (False, "a -> b"), (False, "c")]
+    why = {"file": of, "line": "x", "change": "a -> b", "why": "the same"}
+    monkeypatch.setattr(results, "arguments", lambda: [why])
+    found = [
+        results.Verdict(Mutation(of, 1, 0, 1, "", "x", change), killed, "", "", 1, 1.0, "", "")
+        for killed, change in changes
+    ]
+    told = results.report(found)
+    assert results.score(found) == 50 and told.count("SURVIVED") == 1 and "the same" in told
+
+
+FD = {"function": "forward_dynamics", "model": "(1, 3)"}
+REPORT = {
+    "machine": {"processor": "made up", "peers": "gcc only"},
+    "peak": [{"processor": "AVX-512", "scalar_gf": 10.0, "vector_gf": 80.0}],
+    "speed": [
+        {"processor": name, "model": "(1, 3)", "ns": ns, "plain_ns": 2000.0, "own_ns": 500.0}
+        for name, ns in (("AVX-512", 100.0), ("AVX2", 160.0))
+    ],
+    "other_peers": [{"processor": "AVX-512", "model": "(1, 3)", "ns": 100.0, "casadi_ns": 80.0}],
+    "operation_counts": [FD | {"executed": 1000.0, "needed": 500.0}],
+    "rollout_rates": [{"processor": "AVX2", "model": "(3, 4)", "6000 in a call, 1/s": 14321.0}],
+    "seconds": [{"measure": "speed", "processor": "AVX2", "took_s": 7.0}],
+}
+
+
+def test_the_benchmark_compares_with_before_peers_limits_and_targets(monkeypatch, tmp_path):
+    times = [("casadi", "gcc", 150.0, 160.0), ("casadi", "clang", 100.0, 110.0)]
+    found = faster((50.0, 55.0), times)
+    assert (found["casadi_ns"], found["casadi_ratio"]) == (100.0, "2.00x (2.00x)")
+    assert best_chains({8: 50.0, 10: 60.0, 12: 60.0, 16: 48.0}) == (10, 60.0)
+    monkeypatch.setattr(closing, "BEFORE", tmp_path / "before.json")
+    slower = json.loads(json.dumps(REPORT))
+    slower["speed"][0]["ns"] = 150.0
+    (tmp_path / "before.json").write_text(json.dumps(closing.figures(slower)))
+    peak, eight, *_ = closing.closing(REPORT)
+    assert (peak["what"], peak["value"], peak["times faster"]) == ("peak of a core", 80.0, "1.00x")
+    assert (eight["before"], eight["value"], eight["times faster"]) == (150.0, 100.0, "1.50x")
+    assert (eight["peer's best"], eight["peer / ours"]) == (80.0, "0.80x")
+    assert (eight["limit"], eight["left"], eight["of the peak"]) == (50.0, "2.0x", "50%")
+    report.written(tmp_path, REPORT, {}, [])
+    again = report.written(tmp_path, slower, {}, [])
+    assert "| speed | AVX-512, (1, 3) | serpentail, ns | 100 | 150 | 1.5 |" in again
+    verdicts = [(line["model"], line["verdict"]) for line in judged(REPORT)]
+    assert ("(1, 3)", "met") in verdicts and ("(1, 3)", "MISSED") in verdicts
+
+
+def test_processors_and_compilers_that_are_missing_are_left_out_and_told(monkeypatch, capsys):
+    for flags, names, lacks in [
+        ("avx avx2 avx512f", ["AVX-512", "AVX2"], []),
+        ("avx avx2", ["AVX2"], ["AVX-512: this processor has none"]),
+        ("neon", [platform.machine()], list(processors.ABSENT.values())),
+    ]:
+        with row(flags):
+            there = processors.processors(flags)
+            assert [p.name for p in there] == names and processors.left_out(there) == lacks
+    clang = compilers.Compiler("clang", ("clang",), ("clang++",), "clang 22")
+    gcc = compilers.Compiler("gcc", ("gcc",), ("g++",), "gcc 12")
+    monkeypatch.setitem(sys.modules, "ziglang", None)
+    assert [compiler.name for compiler in compilers.compilers.__wrapped__()] == ["gcc"]
+    monkeypatch.setattr(build, "PATIENCE", 0.2)
+    monkeypatch.setattr(build, "compilers", lambda: (gcc, clang))
+    slow = ["sh", "-c", "sleep 600 & wait"]  # as a driver waits for its compiler
+    assert build.by_each(lambda c: build.run(slow) if c is clang else "made") == {"gcc": "made"}
+    assert capsys.readouterr().err.startswith("clang is left out: ")
