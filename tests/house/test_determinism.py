@@ -29,9 +29,9 @@ FILES |= {f"include/{NAME}_unchecked.h", f"include/{NAME}_simulation.h"}
 FILES |= {f"src/{NAME}_simulation.c", "Makefile", "CMakeLists.txt", "LICENSE", "README.md"}
 
 
-def scene(**options):
-    """The scene of these tests, with other options."""
-    return scene_for("articulated", 2, 2, **OPTIONS | options)
+def made_in(root, **options):
+    """Generate the scene of these tests with other options; return what was written."""
+    return generate(scene_for("articulated", 2, 2, **OPTIONS | options), root)
 
 
 def texts(folder):
@@ -40,11 +40,15 @@ def texts(folder):
     return {str(path.relative_to(folder)): path.read_bytes() for path in files}
 
 
+def states(folder):
+    return {path: (path.stat().st_mtime_ns, path.stat().st_ino) for path in folder.rglob("*")}
+
+
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     """What the scene generates, made once: no test writes to it."""
     root = tmp_path_factory.mktemp("made")
-    changed = generate(scene(), root)
+    changed = made_in(root)
     assert set(changed) == FILES and len(changed) == len(FILES)
     return root / NAME
 
@@ -66,10 +70,7 @@ def test_same_bytes_under_another_hash_seed_and_from_another_folder(made, tmp_pa
     printed = subprocess.check_output(command, cwd=tmp_path, env=env, text=True)
     assert f"made/here/{NAME}: {len(FILES)} files written" in printed
     assert texts(tmp_path / "made" / "here" / NAME) == texts(made)
-
-
-def test_texts_tell_nothing_of_where_and_when(made):
-    for name, text in texts(made).items():
+    for name, text in texts(made).items():  # which tell nothing of where and when
         with row(name):
             assert str(made.parent).encode() not in text
             assert str(Path.home()).encode() + b"/" not in text
@@ -78,14 +79,11 @@ def test_texts_tell_nothing_of_where_and_when(made):
 
 def test_second_generation_writes_only_what_is_lost_or_edited(root, made):
     folder = root / NAME
-    before = {path: (path.stat().st_mtime_ns, path.stat().st_ino) for path in folder.rglob("*")}
-    assert generate(scene(), root) == []
-    after = {path: (path.stat().st_mtime_ns, path.stat().st_ino) for path in folder.rglob("*")}
-    assert after == before and texts(folder) == texts(made)
+    before = states(folder)
+    assert made_in(root) == [] and states(folder) == before and texts(folder) == texts(made)
     (folder / MODEL).write_text("edited")
     (folder / HEADER).unlink()
-    assert set(generate(scene(), root)) == {MODEL, HEADER}
-    assert texts(folder) == texts(made)
+    assert set(made_in(root)) == {MODEL, HEADER} and texts(folder) == texts(made)
 
 
 def differing_lines(some, other):
@@ -96,7 +94,7 @@ def differing_lines(some, other):
 
 def test_a_parameter_changes_only_its_value_and_the_hash(root, made):
     expected = texts(made)
-    changed = generate(scene(parameters={"gravity": 1.62}), root)
+    changed = made_in(root, parameters={"gravity": 1.62})
     assert set(changed) == {HEADER, MODEL, CASADI, MANIFEST}
     now = texts(root / NAME)
     assert differing_lines(expected[MODEL], now[MODEL]) == [
@@ -106,35 +104,28 @@ def test_a_parameter_changes_only_its_value_and_the_hash(root, made):
     for name in (HEADER, CASADI):
         pairs = differing_lines(expected[name], now[name])
         assert pairs and all(old.replace(before, after) == new for old, new in pairs)
-    generate(scene(baked=True), root)
-    changed = generate(scene(baked=True, parameters={"gravity": 1.62}), root)
+    made_in(root, baked=True)
+    changed = made_in(root, baked=True, parameters={"gravity": 1.62})
     assert set(changed) == {HEADER, MODEL, BATCH, FLIGHTS, CASADI, MANIFEST}
 
 
-def test_manifest_describes_the_files(made):
+def test_the_manifest_describes_the_files_and_its_hashes_tell_what_changed(made, tmp_path):
     expected = texts(made)
     manifest = json.loads(expected[MANIFEST])
+    content, abi = manifest["content_hash"], manifest["abi_hash"]
     assert manifest["files"] == {
         name: digest(expected[name].decode()) for name in sorted(FILES - {MANIFEST})
     }
-    for name in (HEADER, CASADI):
-        assert manifest["content_hash"] in expected[name].decode()
-    assert f'return "{manifest["abi_hash"]}";' in expected[HOST].decode()
-
-
-def test_hashes_tell_what_changed(made, tmp_path):
-    def hashes(**options):
-        generate(scene(**options), tmp_path)
-        manifest = json.loads((tmp_path / NAME / MANIFEST).read_text())
-        return manifest["content_hash"], manifest["abi_hash"]
-
-    manifest = json.loads((made / MANIFEST).read_text())
-    content, abi = manifest["content_hash"], manifest["abi_hash"]
-    other, same = hashes(parameters={"gravity": 1.62})
-    assert other != content and same == abi
-    changes = ({"real": "float"}, {"functions": ["energy"]}, {"emission": "straight"})
-    contents, abis = zip(*(hashes(**change) for change in changes), strict=True)
-    assert len({content, other, *contents}) == 5 and len({abi, *abis}) == 4
+    assert all(content in expected[name].decode() for name in (HEADER, CASADI))
+    assert f'return "{abi}";' in expected[HOST].decode()
+    changes = [{"parameters": {"gravity": 1.62}}, {"real": "float"}, {"functions": ["energy"]}]
+    contents, abis = [content], [abi]
+    for change in (*changes, {"emission": "straight"}):
+        made_in(tmp_path, **change)
+        now = json.loads((tmp_path / NAME / MANIFEST).read_text())
+        contents.append(now["content_hash"])
+        abis.append(now["abi_hash"])
+    assert len({*contents}) == 5 and abis[1] == abi and len({*abis}) == 4
 
 
 def test_files_of_an_earlier_generation_go_and_others_stay(tmp_path):
@@ -148,10 +139,7 @@ def test_files_of_an_earlier_generation_go_and_others_stay(tmp_path):
     assert write_folder(folder, now, {}) == ["a.txt"] and not write_folder(folder, now, {})
     assert write_folder(folder, now | {"c.txt": "\u00e4"}, {}) == ["c.txt", "manifest.json"]
     assert (folder / "c.txt").read_bytes() == "\u00e4".encode()
-
-
-def test_damaged_manifest_does_no_harm(tmp_path):
-    outside = tmp_path / "outside.txt"
+    outside = tmp_path / "outside.txt"  # which a damaged manifest does not harm
     outside.write_text("outside")
     away = '{"files": {"../outside.txt": "", "/outside.txt": "", "lost": ""}}'
     for k, manifest in enumerate(["", "{", "[]", "{}", '{"files": 3}', "null", away]):
