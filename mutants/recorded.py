@@ -19,7 +19,6 @@ NO_JUDGES = {
     "tests/docs/test_names.py",
     "tests/house/test_architecture.py",
     "tests/house/test_golden.py",
-    "tests/house/test_make.py",
     "tests/house/test_tools.py",
 }
 LONGEST = 1200.0  # s that one file of tests may take
