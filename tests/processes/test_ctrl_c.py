@@ -26,7 +26,7 @@ HEAR = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\
 # does what each line of stdin tells until Ctrl-C, and tells what is kept
 SERVES = """
 import sys, time, numpy as np, scipy.integrate, serpentail as st
-from tests.processes.jobs import start
+from tests.processes.elsewhere import start
 say = lambda *words: print(*words, flush=True)
 model = st.load(sys.argv[1], threads=int(sys.argv[2]))
 q, v = start(model)
