@@ -6,7 +6,10 @@ import ast
 import doctest
 import inspect
 import re
+import subprocess
 import tomllib
+from contextlib import chdir
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,12 +32,12 @@ RUN = ("python", "sh", "toml", "c", "cpp", "cmake")  # languages whose blocks do
 SHOWN = ("text", "json", "html")  # output, formulas
 QUICK = {"autodiff", "contact", "continuum_forms", "learning", "python"}
 NEEDS = {"autodiff": ["jax"], "export": ["pinocchio"], "viewing": ["imageio_ffmpeg", "viser"]}
-ELSEWHERE = {"recipes"}  # tests/exporting/test_recipes.py
-RUNNING = {
-    name
+NEEDS |= {"recipes": ["fmpy"]}
+RUNNING = [
+    pytest.param(name, marks=[] if name in QUICK else [pytest.mark.slow])
     for name, path in PAGES.items()
     if any(block.language in RUN and not block.reason for block in blocks(path))
-} - ELSEWHERE
+]
 
 
 def test_every_block_says_what_it_is_or_why_it_is_not_run():
@@ -49,11 +52,7 @@ def test_every_block_says_what_it_is_or_why_it_is_not_run():
                 tomllib.loads(block.text)
 
 
-def page(name):
-    return pytest.param(name, marks=[] if name in QUICK else [pytest.mark.slow])
-
-
-@pytest.mark.parametrize("name", [page(name) for name in sorted(RUNNING)])
+@pytest.mark.parametrize("name", RUNNING)
 def test_the_blocks_of_a_page_run(name, tmp_path):
     for library in NEEDS.get(name, []):
         pytest.importorskip(library)
@@ -121,6 +120,33 @@ def of_demo(ran):
     assert max(map(float, drifts)) < 1e-9 and max(map(float, differences)) < 1e-8
 
 
+def of_recipes(ran):
+    """Code of CasADi, a unit and plain C come to what the model does."""
+    model, casadi, block, flown = (ran.names[x] for x in ("model", "casadi", "block", "flown"))
+    q, v = np.array([0, 0, 0.34, 0.9, 0.3, -0.2, 0.1, 0.2, 0.1]), np.arange(8.0) - 3.5
+    q[3:7] /= np.linalg.norm(q[3:7])
+    x, u = np.concatenate([q, v]), np.array([1e-3, -2e-3])
+    with chdir(ran.folder):
+        words = "cc -shared -fPIC f.c -L. -lrat -Wl,-rpath,$ORIGIN -lm -o g.so"  # as for acados
+        subprocess.run(words.split(), check=True)
+        for rates in (ran.names["compiled"], casadi.external("f", "./g.so")):
+            np.testing.assert_allclose(rates(x, u), model.x_dot(x, u)[:, None], rtol=1e-12)
+        jacobians = casadi.external("f_jac", "./f.so")(x, u)
+        for found, one in zip(jacobians, model.x_dot_derivatives(x, u), strict=True):
+            np.testing.assert_allclose(found, one, rtol=0, atol=1e-9 * np.abs(one).max())
+        printed = np.loadtxt("v_dot.txt")
+        assert "rat_casadi_forward_dynamics(" in Path("f.c").read_text()
+    wanted = model.forward_dynamics(block["q"], block["v"], block["tau"])
+    assert ran.names["status"] == 0
+    for found in (block["v_dot"], printed):
+        np.testing.assert_allclose(found, wanted, rtol=1e-10, atol=1e-12)
+    law, q, v = st.TorqueTable([0.0, 1.0], [[1e-3, 0.0]] * 2), np.eye(9)[3], 5 * np.eye(8)[3]
+    q[2] = 2.0
+    motion = st.simulate(model, q, v, controller=law, t_span=0.2)
+    for k in range(9):
+        assert flown[f"q[{k + 1}]"][-1] == pytest.approx(motion.q[-1, k], abs=1e-6)
+
+
 TOLD = {
     "README": [of_c, of_python, of_flight, of_demo],
     "c": [of_c],
@@ -128,6 +154,7 @@ TOLD = {
     "getting_started": [of_getting_started],
     "planning": [of_planning],
     "python": [of_python],
+    "recipes": [of_recipes],
     "sweeps": [of_sweeps],
 }
 
