@@ -33,33 +33,6 @@ def test_what_no_fmu_can_be_of(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.fixture
-def unit(fmu, tmp_path):
-    """Return a unit of a kind by its interface, as made, and what it tells."""
-    fmpy = pytest.importorskip("fmpy")
-    path = str(fmu("m1_n1"))
-    guid = fmpy.read_model_description(path).guid
-    folder = fmpy.extract(path, str(tmp_path / "unit"))
-
-    def made(kind, guid=guid):
-        told = []
-        found = getattr(fmpy.fmi2, kind)(
-            guid=guid, unzipDirectory=folder, modelIdentifier="m1_n1", instanceName="rat"
-        )
-        callbacks = fmpy.fmi2.fmi2CallbackFunctions()
-        logger = fmpy.fmi2.fmi2CallbackLoggerTYPE(
-            lambda _, name, status, category, message: told.append(message.decode())
-        )
-        callbacks.logger = logger
-        callbacks.allocateMemory = fmpy.fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
-        callbacks.freeMemory = fmpy.fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
-        found.instantiate(callbacks=callbacks)
-        found.kept = logger, callbacks
-        return found, told
-
-    return made
-
-
 def status_of(call, *arguments):
     """The status that a call is refused with."""
     from fmpy.fmi1 import FMICallException
@@ -69,10 +42,10 @@ def status_of(call, *arguments):
     return refused.value.status
 
 
-def test_calls_that_make_no_sense_are_refused_and_told(unit):
+def test_calls_that_make_no_sense_are_refused_and_told(fmu, opened):
     with pytest.raises(Exception, match="Failed to instantiate"):
-        unit("FMU2Model", guid="0")
-    one, told = unit("FMU2Model")
+        opened(fmu("m1_n1"), "Model", guid="0")
+    one, _, told = opened(fmu("m1_n1"), "Model")
     for call, *arguments in (
         (one.getReal, [10**6]),
         (one.setReal, [20], [0.0]),
@@ -95,11 +68,10 @@ def test_calls_that_make_no_sense_are_refused_and_told(unit):
     status_of(one.getDirectionalDerivative, [20], [0], [1.0])
     one.setReal([3], [1.0])
     assert one.getReal([28]) == pytest.approx([-9.8], rel=1e-12)
-    one.freeInstance()
 
 
-def test_a_step_that_cannot_be_made_leaves_the_state(unit):
-    one, told = unit("FMU2Slave")
+def test_a_step_that_cannot_be_made_leaves_the_state(fmu, opened):
+    one, _, told = opened(fmu("m1_n1"), "Slave")
     references = list(range(17))
     before = one.getReal(references)
     one.setReal([34], [1e300])
@@ -112,7 +84,6 @@ def test_a_step_that_cannot_be_made_leaves_the_state(unit):
     last = ctypes.c_double()
     one.fmi2GetRealStatus(one.component, 2, ctypes.byref(last))
     assert last.value == 0.25
-    one.freeInstance()
 
 
 def shown(library):
