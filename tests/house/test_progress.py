@@ -68,15 +68,9 @@ def test_a_function_is_told_each_stage_and_ends_the_work_by_what_it_raises(tmp_p
     assert told_of(lambda: st.build(**tiny)) == []
 
 
-def test_the_estimate_is_of_what_is_left():
-    assert st.Progress("plan", "", 0.25, 10.0).left == 30.0
-    assert st.Progress("plan", "", None, 10.0).left is None
-    assert str(st.Progress("plan", "rat", 0.25, 10.0)) == "plan rat: 25%, 10 s, 30 s left"
-    assert str(st.Progress("plan", "rat", 0.25, 10.0, ended=True)) == "plan rat: 10.0 s"
-
-
 def test_a_pipe_has_few_lines_and_a_terminal_one_that_ends_empty(clock):
     """Of a stage of half a second, and one of a minute."""
+    assert st.Progress("plan", "", None, 10.0).left is None
     texts = []
     for stream in (io.StringIO(), Terminal()):
         with st.progress(Told(stream)):

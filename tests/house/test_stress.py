@@ -1,4 +1,4 @@
-"""Bad calls and scenes are answered or refused, drops gain no energy, and what once broke stays
+"""Bad scenes and calls are answered or refused, drops gain no energy, and what once broke stays
 mended.
 """
 
@@ -11,55 +11,21 @@ import pytest
 import serpentail as st
 from serpentail.model.sizes import UNLIKE as UNLIKE_FROM
 from serpentail.model.sizes import disparity
-from stress import call_fuzz, drops, poses, scene_fuzz, stress_plots
-from stress.call_fuzz import Target
-from stress.figures import Figure
-from stress.poses import Point
-from stress.subjects import Errors, Subject, changed, errors, exact_of, judged, state
+from stress import drops, poses, scene_fuzz
+from stress.subjects import Subject, changed, errors, exact_of, judged, state
 from tests.references.metrics import mass_matrix_error
 from tests.support import zoo
 from tests.support.rows import row
 
 ROOT = Path(__file__).parents[2]
 SCENES = sorted((ROOT / "scenes").glob("*.toml"))
-KINDS = {"links": "feet_tail", "arcs": "ground_arcs"}  # models of the zoo
 
 
-def numbers(few, many):
-    """Two sizes of a test, the larger of them slow."""
-    return pytest.mark.parametrize("count", [few, pytest.param(many, marks=pytest.mark.slow)])
-
-
-@numbers(150, 4000)
-def test_random_calls_are_answered_or_refused(count, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    for seed, model in enumerate(map(zoo.model, KINDS.values())):
-        assert call_fuzz.fuzz(call_fuzz.targets(model, tmp_path), count, seed) == []
-
-
-def test_the_fuzz_sees_bare_errors_and_results_that_are_no_numbers():
-    for result in (np.array([1.0, np.nan]), (1.0, (np.inf,))):
-        found = call_fuzz.fuzz([Target("it", lambda x, r=result: r, {"x": 1.0})], 5, 1)
-        assert [fault.kind for fault in found] == ["no number"]
-    (fault,) = call_fuzz.fuzz([Target("it", lambda x: {}["absent"], {"x": 1.0})], 5, 1)
-    assert (fault.kind, fault.target) == ("bare error", "it")
-
-
-@numbers(100, 1000)
+@pytest.mark.parametrize("count", [100, pytest.param(1000, marks=pytest.mark.slow)])
 def test_mutated_scene_files_are_read_or_refused(count, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     dice, model = random.Random(count), zoo.model("ground")
     assert scene_fuzz.faults(SCENES, count, dice, tmp_path, model) == []
-
-
-def test_a_figure_beyond_its_limit_fails_and_plots_are_drawn(tmp_path):
-    for found, passed in [(1.0, True), (1.1, False), (np.nan, False), (np.inf, False)]:
-        assert Figure("it", found, 1.0).passed == passed
-    found = [Errors(1e-16, 0.0, 1e-15, condition) for condition in (3.0, 1e4)]
-    swept = [Point(tail, bend, found[bend]) for tail in ("one", "two") for bend in (0, 1)]
-    figures = [Figure("v_dot", 1e-16, 5e-15, "cond(H) 1e4"), Figure("faults", 0, 0)]
-    stress_plots.draw({"Part": figures}, swept, tmp_path)
-    assert len(list(tmp_path.iterdir())) == 3
 
 
 @pytest.mark.parametrize("one_arc", [False, pytest.param(True, marks=pytest.mark.slow)])
@@ -118,7 +84,7 @@ def test_the_warning_is_true():
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::serpentail.errors.UnusualSize")
-@pytest.mark.parametrize("name", KINDS.values())
+@pytest.mark.parametrize("name", ["feet_tail", "ground_arcs"])
 def test_bodies_without_the_warning_keep_their_digits(name):
     """Random bodies as unlike as may be without it."""
     of, rng, quiet = Subject("", zoo.model(name), None), np.random.default_rng(4), 0

@@ -21,8 +21,6 @@ import serpentail as st
 from examples import learning
 from examples.studies import morphology_study as study
 from examples.studies.parts import Part, as_flight, as_lists, digest, made
-from examples.studies.righting_figures import draw_rates
-from examples.studies.righting_kinds import WAYS, table
 from tests.support import tiny_study, zoo
 from tests.support.rows import row
 
@@ -64,23 +62,6 @@ def test_a_study_starts_with_its_attitude_and_rates():
     z, x, y = (Rotation.from_rotvec(turn).as_matrix() for turn in turns)
     np.testing.assert_allclose(st.rotation_matrix(q[3:7]), z @ x @ y, atol=1e-12)
     np.testing.assert_array_equal(v[3:6], [12.0, 1.0, -2.0])
-
-
-def test_rates_are_of_plans_that_converged_and_end_where_they_should(tmp_path):
-    def solved(cpu_s, converged=True, error=1e-3):
-        return {"cpu_s": cpu_s, "converged": converged, "open_loop_attitude_error_deg": error}
-
-    few = {"IPOPT": [solved(0.2), solved(0.1), solved(0.4, error=0.011), solved(0.3)]}
-    few |= {"FATROP": [solved(0.1)] * 4, "paper": [solved(1.0, error=2.0)] * 4}
-    failed = solved(5.0, converged=False, error=np.nan)
-    rates = {"several": few, "none": {way: [failed] for way in WAYS}}
-    _, (shares, times, errors) = draw_rates(rates, tmp_path / "rates.png")
-    found = [line.get_xdata().tolist() for line in shares.get_lines()]
-    assert found == [[75, 0], [100, 0], [0, 0]]
-    np.testing.assert_allclose(times.get_lines()[0].get_xdata(), [0.25, 5.0])
-    np.testing.assert_allclose(errors.get_lines()[2].get_xdata(), [2.0, np.nan])
-    several, none = table(rates)[2:]
-    assert several.startswith("| several | 4 | 3 | 0.25, 0.39 | ") and "nan" in none
 
 
 @pytest.mark.slow

@@ -4,18 +4,12 @@ those of the faster peer.
 
 import ast
 import json
-import platform
-import runpy
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
-import pytest
-
-from benchmarks import closing, processors, report
+from benchmarks import closing, report
 from benchmarks.comparison import faster
 from benchmarks.peak import best_chains
-from benchmarks.peers import build, compilers
 from benchmarks.targets import judged
 from mutants import judge, python_source, results, sample, template_source
 from mutants.mutation import Mutation
@@ -97,16 +91,6 @@ def test_a_sample_is_of_programs_of_all_parts_and_grows(tmp_path):
     for mutation in (m for m in many if m.path.endswith(".py")):
         source = (ROOT / mutation.path).read_bytes()
         assert ast.dump(ast.parse(mutation.of(source))) != ast.dump(ast.parse(source))
-
-
-def test_a_mutant_says_that_it_was_loaded(tmp_path):
-    witness, file = tmp_path / "witness", tmp_path / "mutant.py"
-    text = b'"""Docs.\n\nMore.\n"""\n\nfrom __future__ import annotations\nraise ValueError\n'
-    file.write_bytes(python_source.with_first(text, f"open({str(witness)!r}, 'w').close()"))
-    assert len(file.read_bytes().splitlines()) == len(text.splitlines())
-    with pytest.raises(ValueError, match=r"^$"):
-        runpy.run_path(str(file))
-    assert witness.exists()
 
 
 def test_what_is_late_on_a_busy_machine_gets_more_time(monkeypatch):
@@ -203,23 +187,3 @@ def test_the_benchmark_compares_with_before_peers_limits_and_targets(monkeypatch
     assert "| speed | AVX-512, (1, 3) | serpentail, ns | 100 | 150 | 1.5 |" in again
     verdicts = [(line["model"], line["verdict"]) for line in judged(REPORT)]
     assert ("(1, 3)", "met") in verdicts and ("(1, 3)", "MISSED") in verdicts
-
-
-def test_processors_and_compilers_that_are_missing_are_left_out_and_told(monkeypatch, capsys):
-    for flags, names, lacks in [
-        ("avx avx2 avx512f", ["AVX-512", "AVX2"], []),
-        ("avx avx2", ["AVX2"], ["AVX-512: this processor has none"]),
-        ("neon", [platform.machine()], list(processors.ABSENT.values())),
-    ]:
-        with row(flags):
-            there = processors.processors(flags)
-            assert [p.name for p in there] == names and processors.left_out(there) == lacks
-    clang = compilers.Compiler("clang", ("clang",), ("clang++",), "clang 22")
-    gcc = compilers.Compiler("gcc", ("gcc",), ("g++",), "gcc 12")
-    monkeypatch.setitem(sys.modules, "ziglang", None)
-    assert [compiler.name for compiler in compilers.compilers.__wrapped__()] == ["gcc"]
-    monkeypatch.setattr(build, "PATIENCE", 0.2)
-    monkeypatch.setattr(build, "compilers", lambda: (gcc, clang))
-    slow = ["sh", "-c", "sleep 600 & wait"]  # as a driver waits for its compiler
-    assert build.by_each(lambda c: build.run(slow) if c is clang else "made") == {"gcc": "made"}
-    assert capsys.readouterr().err.startswith("clang is left out: ")
