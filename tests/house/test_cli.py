@@ -41,8 +41,7 @@ def test_info_is_a_table_in_columns_or_json(run):
     assert head == "m1_n1: 1 x 1 links, nq 9, nv 8, double"
     functions = [line for line in lines if not line.startswith("    ")]
     names = [line.split()[0] for line in functions]
-    assert names == [name for name in SIGNATURES if name in names]
-    assert {"mass_matrix", "forward_dynamics_derivatives", "energy"} <= set(names)
+    assert names == [name for name in SIGNATURES if name in names] and "energy" in names
     for line in functions:  # no column is glued to the next
         with row(line):
             assert re.fullmatch(r"  \w+ +(straight|loops) +\d+ operations", line)
@@ -53,10 +52,6 @@ def test_info_is_a_table_in_columns_or_json(run):
     assert ["in", "q", "9", SIGNATURES["energy"].inputs[0].meaning] in words
     # each last column begins where the others do
     assert len({line.index(last) for line, (*_, last) in zip(ports, words, strict=True)}) == 1
-    below = lines.index(functions[names.index("energy")]) + 1
-    told = [line.split("  ")[-1].strip() for line in lines[below : below + 4]]
-    energy = SIGNATURES["energy"]
-    assert told == [port.meaning for port in (*energy.inputs, *energy.outputs)]
     status, out, err = run("info", zoo.folder("m1_n1"), "--json", "-")
     report = json.loads(out)
     assert (status, err, out.count("\n")) == (0, "", 1)
@@ -68,21 +63,21 @@ def test_info_is_a_table_in_columns_or_json(run):
 
 
 def test_verify_tells_what_failed_by_status_1(run, monkeypatch):
-    status, out, err = run("verify", zoo.folder("bare"))
-    assert (status, besides_progress(err)) == (0, "")
-    assert "0 failed" in out and "FAILED" not in out
-    status, out, err = run("verify", zoo.folder("bare"), "--json", "-")
-    report = json.loads(out)
-    assert (status, err, out.count("\n")) == (0, "", 1)
-    assert report["passed"] is True and report["counts"]["failed"] == 0
-    assert {check["status"] for check in report["checks"]} == {"passed", "not checked"}
-    found = [verify.Check("a law", "It holds.", 2.0, 1.0, "a state")]
-    found += [verify.Check("another", "It holds.", 0.0, 1.0)]
-    monkeypatch.setattr(verify, "laws", lambda _: found)
-    status, out, err = run("verify", zoo.folder("bare"))
-    assert (status, err) == (1, "") and "FAILED" in out
-    status, out, err = run("verify", zoo.folder("bare"), "--json", "-")
-    assert (status, err) == (1, "") and json.loads(out)["passed"] is False
+    def both():
+        told = run("verify", zoo.folder("bare")), run("verify", zoo.folder("bare"), "--json", "-")
+        (status, text, words), (same, out, err) = told
+        assert (status, besides_progress(words), err, out.count("\n")) == (same, "", "", 1)
+        return status, text, json.loads(out)
+
+    status, text, found = both()
+    assert status == 0 and "0 failed" in text and "FAILED" not in text
+    assert found["passed"] is True and found["counts"]["failed"] == 0
+    assert {check["status"] for check in found["checks"]} == {"passed", "not checked"}
+    broken = verify.Check("a law", "It holds.", 2.0, 1.0, "a state")
+    whole = verify.Check("another", "It holds.", 0.0, 1.0)
+    monkeypatch.setattr(verify, "laws", lambda _: [broken, whole])
+    status, text, found = both()
+    assert status == 1 and "FAILED" in text and found["passed"] is False
 
 
 def test_no_folder_and_no_compiler_are_one_line_and_status_2(run, tmp_path, monkeypatch):

@@ -194,35 +194,27 @@ def test_nothing_that_the_package_gives_fills_the_screen():
     assert repr(st.Legs([0.0], 3.5, -0.25)).startswith("Legs(times=[0.0], gamma=3.5, delta=-0.25,")
 
 
-def test_a_motion_says_what_it_is(tmp_path):
+def test_a_motion_says_what_it_is_what_failed_why_and_a_plan_whether_it_succeeded(tmp_path):
     motion = flown(output_step=0.001)
     lines = repr(motion).splitlines()
-    assert lines[0].startswith("<Trajectory of ") and "articulated, 1 x 3 links" in lines[0]
-    assert lines[0].endswith("51 samples, 0 to 0.05 s")
-    assert lines[1] == "  q (51, 9), v (51, 8), tau (51, 2); SI: s, m, rad, kg, N"
-    assert lines[2] == "  on the ground by points: 6 of the feet; 0 events"
+    assert "articulated, 1 x 3 links" in lines[0] and "51 samples, 0 to 0.05 s" in lines[0]
+    assert "q (51, 9), v (51, 8), tau (51, 2)" in lines[1]
+    assert "by points: 6 of the feet; 0 events" in lines[2]
     assert lines[3].startswith("  by ros34pw2: ") and "steps" in lines[3]
-    assert repr(motion.contact) == (
-        "Contact(points=array of 51 x 6 x 3, forces=array of 51 x 6 x 3, "
-        "bristles=array of 51 x 6 x 2, groups={feet: 6}, legs=array of 51 x 4)"
-    )
+    assert "forces=array of 51 x 6 x 3" in repr(motion.contact)
     loaded = st.Trajectory.load(motion.save(tmp_path / "run.npz"))
     assert "without its model" in repr(loaded).splitlines()[0]
     warned = dataclasses.replace(motion, info=motion.info | {"warnings": ["word " * 99, "b"]})
     last = repr(warned).splitlines()[-1]
-    assert last.startswith("  2 warnings, the first: word word") and len(last) <= 100
-    assert last.endswith("...>")
-
-
-def test_what_failed_says_why_and_a_plan_whether_it_succeeded():
+    assert "2 warnings, the first: word word" in last and len(last) <= 100 and last[-4:] == "...>"
     with pytest.raises(st.SimulationError) as caught:
         flown(controller=tired)
     text = repr(caught.value.trajectory)
     assert "failed: it is tired" in text and text.count("\n") == 4
     runs = flown(3, parameters={"gravity": [90.0, 90.0, 9.8]}, controller=tired)
     lines = repr(runs).splitlines()
-    assert ": 3 runs of 201 samples, 0 to 0.05 s" in lines[0]
-    assert lines[3] == "  1 failed, the first run 2: it is tired>"
+    assert "3 runs of 201 samples, 0 to 0.05 s" in lines[0]
+    assert "1 failed, the first run 2: it is tired" in lines[3]
     plan = planned()
     lines = repr(plan).splitlines()
     assert lines[0].endswith(": success") and f"{plan.mesh.intervals} intervals" in lines[1]

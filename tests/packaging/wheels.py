@@ -10,7 +10,7 @@ import sys
 import tempfile
 import time
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from email import message_from_bytes
 from pathlib import Path
 
@@ -110,27 +110,20 @@ def build(folder: Path) -> Path:
 
 def interpreter(version: str) -> str | None:
     """Return a Python of a version that can make environments: of PATH, pyenv or uv."""
+    candidates = [shutil.which(f"python{version}")]
+    if "PYENV_ROOT" in os.environ:
+        found = Path(os.environ["PYENV_ROOT"]).glob(f"versions/{version}.*/bin/python")
+        candidates += map(str, sorted(found))
+    if UV:
+        command = [UV, "python", "find", "--no-python-downloads", version]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        candidates.append(done.stdout.strip())
     question = "import ensurepip, sys; print('%d.%d' % sys.version_info[:2])"
-    for candidate in candidates(version):
+    for candidate in filter(None, candidates):
         done = subprocess.run([candidate, "-c", question], capture_output=True, check=False)
         if done.stdout.decode().strip() == version:
             return candidate
     return None
-
-
-def candidates(version: str) -> Iterator[str]:
-    """Yield programs that may be a Python of a version."""
-    on_path = shutil.which(f"python{version}")
-    if on_path:
-        yield on_path
-    if "PYENV_ROOT" in os.environ:
-        found = Path(os.environ["PYENV_ROOT"]).glob(f"versions/{version}.*/bin/python")
-        yield from map(str, sorted(found))
-    if UV:
-        command = [UV, "python", "find", "--no-python-downloads", version]
-        done = subprocess.run(command, capture_output=True, check=False)
-        if done.returncode == 0:
-            yield done.stdout.decode().strip()
 
 
 def tried(wheel: Path, python: str, home: Path, cache: Path) -> list[str]:
