@@ -93,31 +93,6 @@ def test_a_sample_is_of_programs_of_all_parts_and_grows(tmp_path):
         assert ast.dump(ast.parse(mutation.of(source))) != ast.dump(ast.parse(source))
 
 
-def test_what_is_late_on_a_busy_machine_gets_more_time(monkeypatch):
-    """Late with and without the mutant: the machine is busy.  Late with it alone: it is noticed."""
-    told, patient = [], []
-
-    def failed(place, mutation, tests, patience=1.0):
-        patient.append(patience)
-        with_mutant, needed = told[-1] == b"mutant", 4.0 if place.hangs else 2.0
-        if patience >= needed and not (place.hangs and with_mutant):
-            return None
-        return place.end, "Failed: Timeout (>120.0s) from pytest-timeout."
-
-    monkeypatch.setattr(judge.tree, "BASE", ROOT)
-    monkeypatch.setattr(judge.Tree, "_failed", failed)
-    monkeypatch.setattr(judge.Tree, "_plant", lambda place, mutation, text: told.append(text))
-    place = object.__new__(judge.Tree)
-    place.recorder = SimpleNamespace(distrusted=set(), trusted={"tests/a.py::test_b"})
-    change = Mutation("runtime/serpentail/attitude.py", 1, 0, 0, "", "", "")
-    for place.end in ("timeout", "tests/a.py::test_b"):
-        for place.hangs, tries in [(False, [1, 1, 2]), (True, [1, 1, 2, 2, 4, 4])]:
-            told[:], patient[:] = [b"mutant"], []
-            found = place._noticed(change, b"mutant", ["tests/a.py::test_b"])
-            assert (found and found[0], patient) == (place.end if place.hangs else None, tries)
-            assert told[-1] == b"mutant" and not place.recorder.distrusted
-
-
 def test_the_nearest_files_judge_first_and_alone_where_no_test_runs_the_line():
     source = "codegen/serpentail_codegen/targets/c/templates/batch/lane_samples.c.jinja"
     names = ("simulation/test_adaptive_lanes", "c/batches/test_kernels", "fuzz/test_plans")
