@@ -19,7 +19,7 @@ NO_JUDGES = {
     "tests/docs/test_names.py",
     "tests/house/test_architecture.py",
     "tests/house/test_golden.py",
-    "tests/house/test_tools.py",
+    "tests/house/test_mutants.py",
 }
 LONGEST = 1200.0  # s that one file of tests may take
 

@@ -162,9 +162,6 @@ def test_the_description_has_units_and_parts(fmu, tmp_path):
     assert rows["v[3]"][-1] == pytest.approx(-0.98, rel=1e-9)
 
 
-# On the ground.
-
-
 def legs_of(model):
     """The argument of functions that know of legs."""
     return (LEGS,) if "feet" in model.contacts else ()

@@ -11,8 +11,8 @@ import pytest
 import serpentail as st
 from serpentail.model.sizes import UNLIKE as UNLIKE_FROM
 from serpentail.model.sizes import disparity
-from stress import drops, poses, scene_fuzz
-from stress.subjects import Subject, changed, errors, exact_of, judged, state
+from stress import drops, scene_fuzz
+from stress.subjects import Subject, changed, exact_of, state
 from tests.references.metrics import mass_matrix_error
 from tests.support import zoo
 from tests.support.rows import row
@@ -96,17 +96,6 @@ def test_bodies_without_the_warning_keep_their_digits(name):
             other, quiet = Subject("", of.model.with_parameters(**change), None), quiet + 1
             for bends in (np.zeros(of.model.nv - 6), rng.uniform(-1, 1, of.model.nv - 6)):
                 assert error_of_mass_matrix(other, rng, bends) < 1e-12
-
-
-def test_coiled_tails_keep_the_limits_of_their_compiler():
-    """Without optimisation the error of H is twice that of fused operations."""
-    model, rng = zoo.model("arcs3"), np.random.default_rng(2)
-    of = Subject("arcs", model, exact_of(model))
-    coiled = {name: bends for name, bends in poses.folds(of).items() if "coiled" in name}
-    assert len(coiled) == 2
-    for name, bends in coiled.items():
-        figures = judged(of, name, [errors(of, *state(of, rng, bends))])
-        assert all(figure.passed for figure in figures), figures
 
 
 def test_vjp_of_a_model_with_contacts_is_that_of_flight():

@@ -1,4 +1,4 @@
-"""Studies and examples: their models and figures, parts that are made once, and the gallery."""
+"""Studies and examples: parts that are made once, whatever happens, and the gallery."""
 
 import ast
 import os
@@ -14,64 +14,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from filelock import FileLock
-from scipy.integrate import quad
-from scipy.spatial.transform import Rotation
 
 import serpentail as st
-from examples import learning
-from examples.studies import morphology_study as study
 from examples.studies.parts import Part, as_flight, as_lists, digest, made
 from tests.support import tiny_study, zoo
 from tests.support.rows import row
 
 ROOT = Path(__file__).parents[2]
 PATIENCE = 60  # s
-
-
-def test_links_of_a_cone_are_those_of_its_integrals():
-    length, mass, taper = 0.15, 0.004, 0.1
-    links = study.cone(length, mass, taper)
-    base = np.sqrt(mass / (study.DENSITY * np.pi * length * (1 + taper + taper**2) / 3))
-    for k in range(study.LINKS):
-        ends = k * length / study.LINKS, (k + 1) * length / study.LINKS
-
-        def whole(f, ends=ends):
-            """The integral over the link of f(s, r^2) for each area."""
-
-            def at(s):
-                squared = (base * (1 - (1 - taper) * s / length)) ** 2
-                return study.DENSITY * np.pi * squared * f(s, squared)
-
-            return quad(at, *ends, epsabs=0, epsrel=1e-12)[0]
-
-        own = whole(lambda s, _: 1)
-        center = whole(lambda s, _: s) / own
-        # of a disc of radius r about its axis r^2 / 2, about a diameter r^2 / 4, for each kilogram
-        axial = whole(lambda _, squared: squared / 2)
-        across = whole(lambda s, squared, c=center: squared / 4 + (s - c) ** 2)
-        assert links["link_masses"][k] == pytest.approx(own, rel=1e-10)
-        assert links["link_centers"][k] == pytest.approx(center - ends[0], rel=1e-8)
-        found = links["link_inertias"][3 * k : 3 * k + 3]
-        np.testing.assert_allclose(found, [across, axial, across], rtol=1e-9)
-
-
-def test_a_study_starts_with_its_attitude_and_rates():
-    model_point = {"yaw": 0.1, "pitch": 2.0, "roll": -0.2, "pitch_rate": 12.0}
-    q, v = study.start(zoo.model("m2_n2"), model_point | {"other_rates": [1.0, -2.0]})
-    turns = ([0, 0, 0.1], [2.0, 0, 0], [0, -0.2, 0])  # R = Rz(yaw) Rx(pitch) Ry(roll)
-    z, x, y = (Rotation.from_rotvec(turn).as_matrix() for turn in turns)
-    np.testing.assert_allclose(st.rotation_matrix(q[3:7]), z @ x @ y, atol=1e-12)
-    np.testing.assert_array_equal(v[3:6], [12.0, 1.0, -2.0])
-
-
-@pytest.mark.slow
-def test_a_policy_learns_to_right_the_rat():
-    worlds = st.environments(zoo.model("m1_n3"), "righting", 512, step=2e-3, substeps=3)
-    _, tilts = learning.learn(worlds, rounds=60)
-    assert np.mean(tilts[:10]) > 35 and np.mean(tilts[-10:]) < 0.8 * np.mean(tilts[:10])
-
-
-# Parts of studies.
 
 
 def one(folder, of, make, files=()):
@@ -110,45 +60,24 @@ def test_a_part_that_fails_is_told_and_none_is_made_while_another_process_writes
     assert np.isnan(one(tmp_path, {}, tiny_study.lost)["lost"])  # JSON has no NaN of its own
 
 
-def started(folder, threads="3", **settings):
-    """Start the tiny study in processes."""
-    folder.mkdir(exist_ok=True)
+def started(folder):
+    """Start the tiny study in a process; one of its parts has begun, when another ends."""
     return subprocess.Popen(
         [sys.executable, "-m", "tests.support.tiny_study", str(folder)],
         cwd=ROOT,
-        env=os.environ | {"SERPENTAIL_THREADS": threads},
+        env=os.environ | {"SERPENTAIL_THREADS": "1"},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        **settings,
+        start_new_session=True,
     )
 
 
-def test_a_study_that_is_killed_goes_on_side_by_side_and_makes_no_part_twice(tmp_path):
-    folder = tmp_path / "many"
-    store, process = folder / "parts" / "tiny.db", started(folder)
-    while len(tiny_study.titles(store)) < 3:
-        time.sleep(0.02)
-    process.kill()
-    process.communicate(timeout=PATIENCE)  # ends when the workers have, which hold its pipes
-    counts = ended(folder)
-    kept = {k: counts[k] for k in (int(title.split()[1]) for title in tiny_study.titles(store))}
-    process = started(folder)
-    printed, errors = process.communicate(timeout=PATIENCE)
-    parts = range(tiny_study.PARTS)
-    results = [(f"part {k}", {"number": k, "square": k**2, "third": k / 3}) for k in parts]
-    assert printed == f"{results}\n", errors
-    counts = ended(folder)
-    assert {k: counts[k] for k in kept} == kept and len(counts) == tiny_study.PARTS
-    assert f" {process.pid}\n" not in (folder / "ended").read_text()  # it is for workers
-
-
 @pytest.mark.parametrize("whole", [True, pytest.param(False, marks=pytest.mark.slow)])
-def test_ctrl_c_ends_all_in_one_line(tmp_path, whole):
+def test_ctrl_c_ends_all_in_one_line_and_the_same_command_goes_on(tmp_path, whole):
     """From a terminal all processes hear it, from another program the parent alone."""
-    folder = tmp_path / "many"
-    process = started(folder, "1", start_new_session=True)  # one that has begun, when parts end
-    while not tiny_study.titles(folder / "parts" / "tiny.db"):
+    store, process = tmp_path / "parts" / "tiny.db", started(tmp_path)
+    while not tiny_study.titles(store):
         time.sleep(0.02)
     (os.killpg if whole else os.kill)(process.pid, signal.SIGINT)
     printed, errors = process.communicate(timeout=PATIENCE)
@@ -156,6 +85,12 @@ def test_ctrl_c_ends_all_in_one_line(tmp_path, whole):
     *told, last = errors.splitlines()
     assert last == "interrupted: the same command goes on from here"
     assert [line for line in told if not line.startswith("sweep")] == []
+    counts, kept = ended(tmp_path), [int(title.split()[1]) for title in tiny_study.titles(store)]
+    printed, _ = started(tmp_path).communicate(timeout=PATIENCE)
+    parts = range(tiny_study.PARTS)
+    results = [(f"part {k}", {"number": k, "square": k**2, "third": k / 3}) for k in parts]
+    assert printed == f"{results}\n"
+    assert all(ended(tmp_path)[k] == counts[k] for k in kept) and {*ended(tmp_path)} == {*parts}
 
 
 def test_digests_follow_the_sources(tmp_path):

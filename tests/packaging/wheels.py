@@ -152,19 +152,10 @@ def tried(wheel: Path, python: str, home: Path, cache: Path) -> list[str]:
     return told + [f"{name}: was not written" for name in MADE if not (empty / name).exists()]
 
 
-def run(
-    words: Sequence[str | Path], folder: Path, own: dict[str, str] | None = None
-) -> subprocess.CompletedProcess[str]:
+def run(words: Sequence[str | Path], folder: Path, own: dict | None = None):
     """Return the finished command; without an environment of its own it must succeed."""
-    return subprocess.run(
-        words,
-        cwd=folder,
-        env=own,
-        capture_output=own is not None,
-        text=True,
-        check=own is None,
-        timeout=PATIENCE_S,
-    )
+    told = {"capture_output": own is not None, "text": True, "timeout": PATIENCE_S}
+    return subprocess.run(words, cwd=folder, env=own, check=own is None, **told)
 
 
 if __name__ == "__main__":

@@ -44,15 +44,15 @@ def _digest(*arrays) -> str:
     return hashlib.sha256(b"".join(np.array(a, float).tobytes() for a in arrays)).hexdigest()
 
 
-def _starts(model, count):
+def starts(model, count):
+    """Return states that are near to it."""
     random = np.random.default_rng(7)
-    q, v = (np.tile(each, (count, 1)) for each in start(model))
-    return q + 0.01 * random.normal(size=q.shape), v + 0.1 * random.normal(size=v.shape)
+    return [each + 0.01 * random.normal(size=(count, len(each))) for each in start(model)]
 
 
 def batch(model) -> str:
     """Evaluate states that threads share, one by one and in lanes."""
-    q, v = _starts(model, STATES)
+    q, v = starts(model, STATES)
     found = model.forward_dynamics(q, v, np.zeros(model.nv - 6))
     return _digest(found, model.mass_matrix(q), *model.energy(q, v))
 
@@ -64,7 +64,7 @@ def simulate(model) -> str:
 
 def rollouts(model) -> str:
     """Make runs that threads take up in turn."""
-    found = st.simulate(model, *_starts(model, 12), t_span=0.1, output_step=0.02)
+    found = st.simulate(model, *starts(model, 12), t_span=0.1, output_step=0.02)
     return _digest(found.q, found.v, found.kinetic)
 
 
@@ -196,9 +196,6 @@ MOMENTS = {
     "beside a plan": partial(beside, plan),
     "beside the compiler": beside_the_compiler,
 }
-
-
-# All ways.
 
 
 def by_executor(make: Callable, model: st.Model) -> Iterator[list[str]]:

@@ -94,8 +94,6 @@ def test_what_takes_long_ends_and_keeps_what_there_is(child, threads):
     assert (process.returncode, said, errors) == (0, "", "")
 
 
-# The command line.
-
 COMMAND = """
 import sys
 from serpentail.cli import main

@@ -12,7 +12,6 @@ import subprocess
 import sys
 from contextlib import suppress
 
-import numpy as np
 import pytest
 
 import serpentail as st
@@ -20,7 +19,7 @@ from serpentail.model import cores, workers
 from tests.support import zoo
 from tests.support.rows import row
 
-from .elsewhere import JOBS, MOMENTS, WAYS, start
+from .elsewhere import JOBS, MOMENTS, WAYS, start, starts
 
 LIMIT = 500.0  # s, then all processes of a test are killed
 QUICK = ("fork", "threads", "at rest", "beside rollouts", "beside the compiler")
@@ -135,9 +134,6 @@ def test_workers_of_process_pools_use_one_thread():
         assert json.loads(done.stdout) == expected
 
 
-# What is asked for is used, and changes no digit.
-
-
 @pytest.fixture
 def crews(monkeypatch):
     """Sizes of the pools that batches were shared among."""
@@ -146,14 +142,9 @@ def crews(monkeypatch):
     return found
 
 
-def _states(model, count):
-    random = np.random.default_rng(3)
-    return [each + 1e-3 * random.normal(size=(count, len(each))) for each in start(model)]
-
-
 def test_a_model_and_runs_keep_to_their_threads_and_digits(crews):
     models = [st.load(zoo.folder("m1_n3"), threads=k) for k in (1, 2, 3)]
-    q, v = _states(models[0], 5001)
+    q, v = starts(models[0], 5001)
     found = [model.forward_dynamics(q, v, [0.0, 0.0]) for model in models]
     assert crews == [2, 2, 3, 3, 3]
     assert found[0].tobytes() == found[1].tobytes() == found[2].tobytes()
@@ -168,7 +159,7 @@ def test_a_model_and_runs_keep_to_their_threads_and_digits(crews):
 
 def test_a_number_of_threads_that_is_none_is_refused(monkeypatch):
     model = zoo.model("m1_n3")
-    q, v = _states(model, 2000)
+    q, v = starts(model, 2000)
     for value in (0, -1, 2.0, "4", True, 1025, [2]):
         words = rf"threads: value .*{re.escape(str(value))}.* 1 to 1024"
         with row(value):
