@@ -175,9 +175,10 @@ def test_a_name_that_cannot_be_given_leaves_the_old_file(names, monkeypatch, tmp
             with row(name, error), mock.patch.object(os, "replace", replace):
                 refused(name, tmp_path, error.strerror)
         (tmp_path / name).write_bytes(OLD)
-        monkeypatch.setattr(os, "replace", mock.Mock(side_effect=KeyboardInterrupt))
-        with row(name), pytest.raises(KeyboardInterrupt):
-            WRITERS[name](flight(samples=20), tmp_path / name)
+        for stop in (KeyboardInterrupt, ZeroDivisionError):
+            monkeypatch.setattr(os, "replace", mock.Mock(side_effect=stop))
+            with row(name, stop), pytest.raises(stop):
+                WRITERS[name](flight(samples=20), tmp_path / name)
         unchanged(tmp_path, name)
         (tmp_path / name).unlink()
 
