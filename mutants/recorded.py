@@ -18,11 +18,7 @@ from .processes import run
 NO_JUDGES = {
     "tests/docs/test_names.py",
     "tests/house/test_architecture.py",
-    "tests/house/test_benchmarks.py",
-    "tests/house/test_equations.py",
-    "tests/house/test_functions_document.py",
     "tests/house/test_golden.py",
-    "tests/house/test_make.py",
     "tests/house/test_mutants.py",
 }
 LONGEST = 1200.0  # s that one file of tests may take

@@ -1,14 +1,21 @@
-"""Runs the blocks of a document, in order, in one namespace and one folder."""
+"""Reads the fenced blocks of documents, and runs them in order, in one namespace and one folder.
+
+The words behind a block's language say what it is:
+
+- ```` ```python ````: it runs, after the blocks above it on the page.
+- ```` ```c fall.c ````: its text is the file ``fall.c``, which blocks below it use.
+- ```` ```sh not-run: it needs a cluster ````: nobody runs it here, for a reason.
+"""
 
 import io
 import os
+import re
 import shutil
 import subprocess
 import sys
 import tomllib
 from contextlib import ExitStack, chdir, redirect_stdout
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from unittest import mock
 
@@ -16,13 +23,50 @@ from jsonschema import Draft7Validator
 
 from serpentail.scenes.schema import scene_schema
 from serpentail_codegen.scene.parse import parse_scene
-from tests.docs.blocks import ROOT, Block, blocks
 from tests.support.makes import away_from_make, stand_in
 
+ROOT = Path(__file__).parents[2]
+ABOVE = ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md")
+PAGES = {Path(name).stem: ROOT / name for name in ABOVE}
+PAGES |= {
+    path.relative_to(ROOT / "docs").as_posix().removesuffix(".md"): path
+    for path in sorted((ROOT / "docs").rglob("*.md"))
+}
+DIRECTIVE = re.compile(r"\{[\w-]+\}")  # of the site: a list of pages, an included document
+FENCE = re.compile(r"^```([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+NOT_RUN = "not-run:"
 STRICT = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror")
 LINKED = ("runtime", "codegen", "scenes", "tests", "embedded", "benchmarks", "docs", "stress")
 LINKED += ("Makefile", "pyproject.toml", "hatch_build.py", "viewer", "mutants")
 OF_RUNTIME = ("simulate", "plan", "identify", "sweep", "phase")  # tables that the runtime reads
+
+
+@dataclass(frozen=True)
+class Block:
+    """A fenced block; name: of the file that it is; reason: why it is not run."""
+
+    page: Path
+    line: int
+    language: str
+    text: str
+    name: str
+    reason: str
+
+    def __str__(self) -> str:
+        return f"{self.page.name}, line {self.line}"
+
+
+def blocks(page: Path) -> list[Block]:
+    """Return the blocks of a document in order, those of the site left out."""
+    document = page.read_text(encoding="utf-8")
+    found = []
+    for fence in FENCE.finditer(document):
+        language, _, words = fence[1].partition(" ")
+        if not DIRECTIVE.match(language):
+            line = document.count("\n", 0, fence.start()) + 1
+            name, _, reason = words.partition(NOT_RUN)
+            found.append(Block(page, line, language, fence[2], name.strip(), reason.strip()))
+    return found
 
 
 @dataclass(frozen=True)
@@ -36,7 +80,10 @@ class Ran:
 
 def run_page(page: Path, folder: Path) -> Ran:
     """Run the blocks of a page in a folder like a checkout; raise what fails."""
-    like_a_checkout(folder)
+    for name in LINKED:
+        (folder / name).symlink_to(ROOT / name)
+    shutil.copytree(ROOT / "examples", folder / "examples")  # scripts write beside themselves
+    stand_in(folder)
     names: dict = {"__name__": "page"}
     printed = io.StringIO()
     own = away_from_make()
@@ -54,63 +101,39 @@ def run_page(page: Path, folder: Path) -> Ran:
     return Ran(names, printed.getvalue(), folder)
 
 
-def like_a_checkout(folder: Path) -> None:
-    """Fill a folder with what commands of a checkout use; results stay in it."""
-    for name in LINKED:
-        (folder / name).symlink_to(ROOT / name)
-    shutil.copytree(ROOT / "examples", folder / "examples")  # scripts write beside themselves
-    stand_in(folder)
-
-
 def _do(block: Block, names: dict) -> None:
-    """Do what a block says."""
     if block.name:
         Path(block.name).write_text(block.text, encoding="utf-8")
     if block.language == "python":
         exec(compile("\n" * block.line + block.text, str(block.page), "exec"), names)
-    elif block.language == "sh":
-        _shell(block, names)
+    elif block.language == "sh":  # whose FOLDER is what Python calls ``folder``
+        own = {"FOLDER": names["folder"]} if "folder" in names else {}
+        _command(block, ["bash", "-euc", block.text], os.environ | own)
     elif block.language == "toml":
         _scene(block)
 
 
-def _shell(block: Block, names: dict) -> None:
-    """Run commands; FOLDER of the shell is what Python calls ``folder``."""
-    own = {"FOLDER": names["folder"]} if "folder" in names else {}
-    done = subprocess.run(
-        ["bash", "-euc", block.text],
-        env=os.environ | own,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+def _command(block: Block, command: list[str], own: dict | None = None) -> None:
+    """Run a command, which must succeed, and print what it does."""
+    done = subprocess.run(command, env=own, capture_output=True, text=True, check=False)
     assert done.returncode == 0, f"{block}: {done.stdout[-2000:]}{done.stderr[-2000:]}"
     print(done.stdout, end="")
 
 
 def _scene(block: Block) -> None:
-    """Parse a scene as the generator does, and compare all of it with the schema."""
+    """Parse a scene as the generator does, and compare all of it with the schema of editors."""
     tables = tomllib.loads(block.text)
     parse_scene({k: v for k, v in tables.items() if k not in OF_RUNTIME}, "example")
-    faults = [error.message for error in schema().iter_errors(tables)]
+    faults = [error.message for error in Draft7Validator(scene_schema()).iter_errors(tables)]
     assert faults == [], f"{block}: {faults}"
 
 
-@cache
-def schema() -> Draft7Validator:
-    """Return what checks a scene with all its tables, as editors do."""
-    return Draft7Validator(scene_schema())
-
-
 def _compile(block: Block) -> None:
-    """Compile a C file without warnings against the models that are there; run it if it can."""
-    folders = list(Path("generated").glob("*/manifest.json"))
-    flags = [f"-I{manifest.parent}/include" for manifest in folders]
-    sources = [str(path) for path in Path("generated").glob("*/src/*.c")] if folders else []
-    sources = [path for path in sources if Path(path).stem == Path(path).parents[1].name]
-    command = ["cc", *STRICT, *flags, block.name, *sources, "-lm", "-o", "checked"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, f"{block}: {done.stderr}"
-    done = subprocess.run(["./checked"], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, f"{block}: {done.stderr}"
-    print(done.stdout, end="")
+    """Compile a C file without warnings against the models that are there, and run it."""
+    flags = [
+        f"-I{manifest.parent}/include" for manifest in Path().glob("generated/*/manifest.json")
+    ]
+    sources = [path for path in Path().glob("generated/*/src/*.c") if path.stem == path.parts[1]]
+    own = ["-lm", "-o", "checked"]
+    _command(block, ["cc", *STRICT, *flags, block.name, *map(str, sources), *own])
+    _command(block, ["./checked"])

@@ -5,17 +5,18 @@ import re
 import shutil
 import subprocess
 import sys
-from html.parser import HTMLParser
+from html import unescape
 from urllib.parse import unquote
 
 import pytest
 
 import serpentail as st
-from tests.docs.blocks import ROOT
+from tests.docs.running import ROOT
 from tests.support.rows import row
 
 CLASSES = (st.Model, st.Trajectory, st.Plan, st.Rollouts, st.Mpc, st.Sweep, st.Identification)
-FETCHED = {"script": "src", "img": "src", "iframe": "src", "source": "src", "video": "src"}
+LINK = r'<link\b(?=[^>]*\srel="([^"]*)")[^>]*\shref="([^"]*)"'
+RELATED = {"next", "prev", "search", "index"}
 BESIDE = ("CHANGELOG.md", "CONTRIBUTING.md", "LICENSE", "README.md", "SECURITY.md")
 BESIDE += ("examples", "hatch_build.py", "scenes", "tests", "viewer")  # what pages link to
 
@@ -36,24 +37,13 @@ def site(tmp_path_factory):
     return tree / "html"
 
 
-class Page(HTMLParser):
+def parts(page):
     """What a page fetches, where it leads, and the anchors that it has."""
-
-    def __init__(self, path):
-        super().__init__()
-        self.fetched, self.links, self.anchors = [], [], set()
-        self.feed(path.read_text(encoding="utf-8"))
-
-    def handle_starttag(self, tag, attrs):
-        """Note what a tag refers to."""
-        given = dict(attrs)
-        self.anchors.add(given.get("id"))
-        if tag in FETCHED:
-            self.fetched.append(given.get(FETCHED[tag]) or "")
-        elif tag == "link" and not {"next", "prev", "search", "index"} & set(given["rel"].split()):
-            self.fetched.append(given["href"])
-        elif tag == "a":
-            self.links.append(given.get("href") or "")
+    text = unescape(page.read_text(encoding="utf-8"))
+    fetched = re.findall(r'<(?:script|img|iframe|source|video)\b[^>]*\ssrc="([^"]*)"', text)
+    fetched += [href for rel, href in re.findall(LINK, text) if rel not in RELATED]
+    links = re.findall(r'<a\b[^>]*\shref="([^"]*)"', text)
+    return fetched, links, set(re.findall(r'\sid="([^"]*)"', text))
 
 
 def of_class(member) -> bool:
@@ -62,7 +52,7 @@ def of_class(member) -> bool:
 
 
 @pytest.mark.slow
-def test_every_name_and_method_has_its_place(site):
+def test_the_site_has_every_name_fetches_nothing_from_elsewhere_and_leads_somewhere(site):
     from sphinx.util.inventory import InventoryFile
 
     with (site / "objects.inv").open("rb") as file:
@@ -73,42 +63,35 @@ def test_every_name_and_method_has_its_place(site):
         members = inspect.getmembers(each, of_class)
         wanted |= {f"serpentail.{each.__name__}.{name}" for name, _ in members if name[0] != "_"}
     assert wanted - names == set()
-
-
-@pytest.mark.slow
-def test_pages_fetch_nothing_from_elsewhere_and_links_lead_somewhere(site):
-    pages = {path: Page(path) for path in site.rglob("*.html")}
-    for path, found in pages.items():
+    pages = {path: parts(path) for path in site.rglob("*.html")}
+    for path, (fetched, links, _) in pages.items():
         with row(path):
-            outside = [x for x in found.fetched if "//" in x.split("?")[0] or x.startswith("/")]
-            assert outside == []
-            for target in filter(None, [*found.links, *found.fetched]):
+            assert fetched and links
+            assert [x for x in fetched if "//" in x.split("?")[0] or x.startswith("/")] == []
+            for target in filter(None, [*links, *fetched]):
                 place, _, anchor = target.partition("#")
                 other = (path.parent / unquote(place.split("?")[0])).resolve() if place else path
                 assert re.match(r"[a-z]+:", target) or other.exists(), target
                 if anchor and other in pages:
-                    assert unquote(anchor) in pages[other].anchors, target
+                    assert unquote(anchor) in pages[other][2], target
     for sheet in site.rglob("*.css"):
         text = sheet.read_text(encoding="utf-8")
         assert re.findall(r"@import[^;]*//|url\([\"']?(?:https?:)?//", text) == [], sheet
 
 
-def test_links_lead_somewhere_from_any_page():
-    sys.path.insert(0, str(ROOT / "docs"))
-    try:
-        from _site.links import links_of_page, links_of_root
-    finally:
-        sys.path.pop(0)
+def test_links_lead_somewhere_from_any_page(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "docs")
+    from _site.links import links_of_page, links_of_root
 
-    def seen(change, *place, text):
+    for change, place, text, found in [
+        (links_of_page, ["a"], "[x](../CHANGELOG.md#y)", "[x](changelog.md#y)"),
+        (links_of_page, ["a/b"], "[x](../../SECURITY.md)", "[x](../security.md)"),
+        (links_of_page, ["a/b"], "[x](../a.md), [y](#y)", "[x](../a.md), [y](#y)"),
+        (links_of_page, ["a"], "[x](../scenes/kick.toml)", "[x](../scenes/kick.toml)"),
+        (links_of_page, ["a"], "[x](../viewer)", "/tree/main/viewer)"),
+        (links_of_root, [ROOT, "a"], "[x](docs/a.md#b)", "[x](a.md#b)"),
+        (links_of_root, [ROOT, "a"], "[x](CHANGELOG.md)", "[x](changelog.md)"),
+    ]:
         source = [text]
         change(None, *place, source)
-        return source[0]
-
-    assert seen(links_of_page, "a", text="[x](../CHANGELOG.md#y)") == "[x](changelog.md#y)"
-    assert seen(links_of_page, "a/b", text="[x](../../SECURITY.md)") == "[x](../security.md)"
-    assert seen(links_of_page, "a/b", text="[x](../a.md), [y](#y)") == "[x](../a.md), [y](#y)"
-    assert seen(links_of_page, "a", text="[x](../scenes/kick.toml)") == "[x](../scenes/kick.toml)"
-    assert seen(links_of_page, "a", text="[x](../viewer)").endswith("/tree/main/viewer)")
-    assert seen(links_of_root, ROOT, "a", text="[x](docs/a.md#b)") == "[x](a.md#b)"
-    assert seen(links_of_root, ROOT, "a", text="[x](CHANGELOG.md)") == "[x](changelog.md)"
+        assert source[0].endswith(found), text

@@ -26,29 +26,21 @@ CHANGED = {
 
 
 def tails():
-    """Return names and tails, each with its scene's parameters and with others."""
-    found = []
+    """Yield names and tails, each with its scene's parameters and with others."""
     for name in TAILS:
         model = zoo.model(name)
         if name == "own_links":  # inertias of the zoo's are not all those of a body
             model = model.with_parameters(link_inertias=np.linspace([3, 2, 4], [2, 1, 2], 7) * 1e-8)
         independent = {parameter["name"] for parameter in model.manifest["parameters"]}
         changes = {key: value for key, value in CHANGED.items() if key in independent}
-        found += [(name, model), (f"{name}, changed", model.with_parameters(**changes))]
-    return found
-
-
-def links(model):
-    """The segment and the number, from 1, of each link."""
-    return [(i + 1, j + 1) for i, count in enumerate(model.joints_each) for j in range(count)]
+        yield name, model
+        yield f"{name}, changed", model.with_parameters(**changes)
 
 
 def configurations(model, count=5):
-    """Random configurations, their quaternions of any norm."""
-    return np.random.default_rng(7).normal(size=(count, model.nq))
-
-
-# Pinocchio
+    """Random configurations, their quaternions of any norm, and what these are as unit ones."""
+    for q in np.random.default_rng(7).normal(size=(count, model.nq)):
+        yield q, q[3:7] / np.linalg.norm(q[3:7])
 
 
 def pinocchio_model(model, folder):
@@ -56,26 +48,26 @@ def pinocchio_model(model, folder):
     return pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer(), True)
 
 
-def pinocchio_state(model, read, q):
+def pinocchio_state(model, read, q, turned):
     """Pinocchio's configuration, and T of its velocity T v: its torso moves in the body's axes."""
-    w, x, y, z = q[3:7] / np.linalg.norm(q[3:7])
+    w, *xyz = turned
     state, turn = np.zeros(read.nq), np.eye(read.nv)
-    state[:3], state[3:7] = q[:3], (x, y, z, w)
-    turn[:3, :3] = pin.Quaternion(w, x, y, z).toRotationMatrix().T
-    for i in range(model.segments):
-        for k, axis in enumerate(("alpha", "beta")):
-            joint = read.joints[read.getJointId(f"{axis}_{i + 1}_1")]
-            state[joint.idx_q] = q[7 + 2 * i + k]
-            turn[joint.idx_v, 6:] = np.eye(model.nv - 6)[2 * i + k]
+    state[:3], state[3:7] = q[:3], (*xyz, w)
+    turn[:3, :3] = pin.Quaternion(*turned).toRotationMatrix().T
+    for k in range(model.nv - 6):
+        joint = read.joints[read.getJointId(f"{('alpha', 'beta')[k % 2]}_{k // 2 + 1}_1")]
+        state[joint.idx_q] = q[7 + k]
+        turn[joint.idx_v, 6:] = np.eye(model.nv - 6)[k]
     return state, turn
 
 
 def check_pinocchio(model, folder):
     read = pinocchio_model(model, folder)
-    data, names = read.createData(), [f"link_{i}_{j}" for i, j in links(model)]
+    links = [(i + 1, j + 1) for i, count in enumerate(model.joints_each) for j in range(count)]
+    data, names = read.createData(), [f"link_{i}_{j}" for i, j in links]
     assert (read.nq, read.nv) == (model.nq, model.nv)
-    for q in configurations(model):
-        state, turn = pinocchio_state(model, read, q)
+    for q, turned in configurations(model):
+        state, turn = pinocchio_state(model, read, q, turned)
         upper = np.triu(pin.crba(read, read.createData(), state, pin.Convention.LOCAL))
         H = turn.T @ (upper + np.triu(upper, 1).T) @ turn
         expected = model.mass_matrix(q)
@@ -92,30 +84,26 @@ def test_pinocchio_finds_inertia_and_points_of_the_model(tmp_path):
             check_pinocchio(model, tmp_path)
 
 
-# MuJoCo
-
-
 def mujoco_model(model, folder):
     return mujoco.MjModel.from_xml_path(str(st.export(model, "mjcf", folder / "rat.xml")))
 
 
-def mujoco_positions(model, q):
-    """Positions of the free chain; each link of a segment turns as the segment's first."""
-    angles = np.repeat(np.reshape(q[7:], (-1, 2)), model.joints_each, axis=0)
-    return np.concatenate([q[:3], q[3:7] / np.linalg.norm(q[3:7]), angles.ravel()])
+def of_links(model, angles):
+    """Angles or rates of the free chain; each link of a segment turns as the segment's first."""
+    return np.repeat(np.reshape(angles, (-1, 2)), model.joints_each, axis=0).ravel()
 
 
 def check_mujoco(model, folder):
     """Inertia, points, and the free chain's work at the motors, which is that of the torques."""
     read = mujoco_model(model, folder)
     data, tau = mujoco.MjData(read), np.random.default_rng(3).normal(size=model.nv - 6)
-    of_segments = np.repeat(np.eye(model.segments), model.joints_each, axis=0)
-    tie = np.kron(of_segments, np.eye(2))
-    tie = np.block([[np.eye(6), np.zeros((6, tie.shape[1]))], [np.zeros((len(tie), 6)), tie]])
+    tie = np.zeros((read.nv, model.nv))
+    tie[:6, :6] = np.eye(6)
+    tie[6:, 6:] = np.array([of_links(model, unit) for unit in np.eye(model.nv - 6)]).T
     first = np.cumsum([0, *model.joints_each[:-1]])
     data.ctrl[:] = tau
-    for q in configurations(model):
-        data.qpos[:] = mujoco_positions(model, q)
+    for q, turned in configurations(model):
+        data.qpos[:] = np.concatenate([q[:3], turned, of_links(model, q[7:])])
         mujoco.mj_forward(read, data)
         assert np.abs(data.site_xpos - model.tail_points(q)).max() < 1e-12
         assert np.abs(data.efc_pos).max(initial=0) < 1e-12  # the equalities hold
@@ -131,12 +119,6 @@ def check_mujoco(model, folder):
     assert read.body_subtreemass[1] == pytest.approx(p["torso_mass"] + tail, rel=1e-14)
 
 
-def test_mujoco_finds_inertia_points_motors_and_gravity_of_the_model(tmp_path):
-    for name, model in tails():
-        with row(name):
-            check_mujoco(model, tmp_path)
-
-
 def check_flight(model, folder):
     """MuJoCo's equalities are soft, and its integrator is of first order: 0.2 mm in 50 ms."""
     read = mujoco_model(model, folder)
@@ -146,22 +128,20 @@ def check_flight(model, folder):
     v[3:] = np.linspace(1, 2, model.nv - 3)
     flight = st.simulate(model, q, v, t_span=span)
     read.opt.timestep = 1e-4
-    data.qpos[:] = mujoco_positions(model, q)
-    rates = np.repeat(np.reshape(v[6:], (-1, 2)), model.joints_each, axis=0)
-    data.qvel[:] = np.concatenate([v[:6], rates.ravel()])
+    data.qpos[:] = np.concatenate([q[:7], of_links(model, q[7:])])
+    data.qvel[:] = np.concatenate([v[:6], of_links(model, v[6:])])
     for _ in range(round(span / read.opt.timestep)):
         mujoco.mj_step(read, data)
     mujoco.mj_forward(read, data)
     assert np.abs(data.site_xpos - model.tail_points(flight.q[-1])).max() < 2e-4
 
 
-def test_mujoco_flies_as_the_model_does(tmp_path):
-    for name, model in tails()[::2]:
+def test_mujoco_finds_inertia_points_motors_and_gravity_and_flies_as_the_model(tmp_path):
+    for name, model in tails():
         with row(name):
-            check_flight(model, tmp_path)
-
-
-# Shapes and texts
+            check_mujoco(model, tmp_path)
+            if "changed" not in name:
+                check_flight(model, tmp_path)
 
 
 def test_torso_and_tail_are_capsules_of_the_models_size(tmp_path):
@@ -179,13 +159,10 @@ def test_torso_and_tail_are_capsules_of_the_models_size(tmp_path):
         radius, half = read.geom_size[link, :2]
         assert radius == model.parameters["link_radius"]
         assert 2 * half == pytest.approx(model.parameters["tail_length"] / 3)
-
-
-def test_a_torso_as_wide_as_long_is_a_ball(tmp_path):
-    model = zoo.model("m1_n1").with_parameters(torso_inertia=(5e-5, 5e-5, 5e-5))
-    read = mujoco_model(model, tmp_path)
+    ball = model.with_parameters(torso_inertia=(5e-5, 5e-5, 5e-5))  # as wide as long
+    pinocchio_model(ball, tmp_path)
+    read = mujoco_model(ball, tmp_path)
     assert read.geom_type[0] == int(mujoco.mjtGeom.mjGEOM_SPHERE)
-    pinocchio_model(model, tmp_path)
 
 
 def test_files_are_the_same_twice_and_say_what_they_lack(tmp_path):

@@ -11,7 +11,6 @@ from tests.support.models import model_folder
 
 pytest.importorskip("fmpy")
 import fmpy
-from fmpy.fmi2 import FMU2Model, FMU2Slave
 from fmpy.validation import validate_fmu
 
 FLIGHTS = ("m2_n2", "arcs2")
@@ -19,107 +18,79 @@ LEGS = np.array([3.7, -0.7, 3.7, -0.7, 0, -0.5, 0, -0.5])  # rad, rad/s: crouche
 SPAN, STEP = 0.05, 5e-4  # s, of a landing
 
 
-@pytest.fixture
-def opened(tmp_path):
-    """Return a function from a path and a kind of interface to an initialised unit and the
-    references of its variables.
-    """
-    units = []
-
-    def made(path, kind):
-        described = fmpy.read_model_description(str(path))
-        folder = tmp_path / path.stem
-        if not folder.exists():
-            fmpy.extract(str(path), str(folder))
-        found = kind(
-            guid=described.guid,
-            unzipDirectory=str(folder),
-            modelIdentifier=described.modelExchange.modelIdentifier,
-            instanceName="rat",
-        )
-        found.instantiate()
-        found.setupExperiment(startTime=0.0)
-        found.enterInitializationMode()
-        found.exitInitializationMode()
-        units.append(found)
-        return found, {each.name: each.valueReference for each in described.modelVariables}
-
-    yield made
-    for each in units:
-        each.terminate()
-        each.freeInstance()
+def named(**vectors):
+    """Entries of vectors by the names of their variables."""
+    return {f"{x}[{k + 1}]": each for x, row in vectors.items() for k, each in enumerate(row)}
 
 
 def names(model):
     """Names of the states."""
-    sizes = {"q": model.nq, "v": model.nv, "bristle": 2 * sum((model.contacts or {}).values())}
-    return [f"{x}[{k + 1}]" for x, n in sizes.items() for k in range(n)]
+    bristles = range(2 * sum((model.contacts or {}).values()))
+    return list(named(q=range(model.nq), v=range(model.nv), bristle=bristles))
 
 
 def state(model, scale=1.0):
-    """A state (q, v) that tumbles, its quaternion of any norm, and torques."""
+    """A state that tumbles, its quaternion of any norm, and torques."""
     rng = np.random.default_rng(1)
     q = rng.normal(scale=0.3, size=model.nq)
     q[3:7] = scale * np.array([0.9, 0.1, -0.2, 0.3]) / np.sqrt(0.95)
-    return q, rng.normal(size=model.nv), rng.normal(scale=1e-5, size=model.nv - 6)
-
-
-def values_of(model, q, v, tau):
-    """A state and torques by the names of their variables."""
-    torques = {f"tau[{k + 1}]": value for k, value in enumerate(tau)}
-    return dict(zip(names(model), [*q, *v], strict=True)) | torques
+    v, tau = rng.normal(size=model.nv), rng.normal(scale=1e-5, size=model.nv - 6)
+    return {"q": q, "v": v, "tau": tau}
 
 
 def put(unit, references, values):
     unit.setReal([references[name] for name in values], list(values.values()))
 
 
+def simulated(path, interface, start, span, step, **more):
+    """Rows that FMPy finds."""
+    more |= {"fmi_type": interface, "start_values": start}
+    return fmpy.simulate_fmu(str(path), stop_time=span, output_interval=step, **more)
+
+
+def rates(one, known, model):
+    return one.getReal([known[f"der(v[{k + 1}])"] for k in range(model.nv)])
+
+
 @pytest.mark.parametrize("name", FLIGHTS)
 def test_it_flies_as_the_model_does(name, fmu):
     path, model = fmu(name), zoo.model(name)
     assert validate_fmu(str(path)) == []
-    q, v, tau = state(model)
-    settings = {"t_span": 0.2, "output_step": 0.01}
-    run = st.simulate(model, q, v, controller=lambda *_: tau, rtol=1e-11, **settings)
+    start, settings = state(model), {"t_span": 0.2, "output_step": 0.01, "rtol": 1e-11}
+    held = {"controller": lambda *_: start["tau"]}
+    run = st.simulate(model, start["q"], start["v"], **held, **settings)
     exchange = ("ModelExchange", 1e-5, {"solver": "CVode"})  # the limit is its own tolerance's
-    for kind, most, more in (("CoSimulation", 1e-7, {}), exchange):
-        rows = fmpy.simulate_fmu(
-            str(path),
-            fmi_type=kind,
-            start_values=values_of(model, q, v, tau),
-            stop_time=0.2,
-            output_interval=0.01,
-            relative_tolerance=1e-9,
-            **more,
-        )
+    for interface, most, more in (("CoSimulation", 1e-7, {}), exchange):
+        more |= {"relative_tolerance": 1e-9}
+        rows = simulated(path, interface, named(**start), 0.2, 0.01, **more)
         assert rows["time"] == pytest.approx(run.t)
         flown = np.array([rows[each] for each in names(model)]).T
-        assert np.abs(flown - np.hstack([run.q, run.v])).max() < most, kind
+        assert np.abs(flown - np.hstack([run.q, run.v])).max() < most, interface
 
 
 @pytest.mark.parametrize("name", FLIGHTS)
 def test_accelerations_and_directional_derivatives_are_exact(name, fmu, opened):
     """At a quaternion that is no unit one; derivatives by differences of the rates themselves."""
     model = zoo.model(name)
-    q, v, tau = state(model, scale=1.3)
-    one, known = opened(fmu(name), FMU2Model)
-    put(one, known, values_of(model, q, v, tau))
-    found = one.getReal([known[f"der(v[{k + 1}])"] for k in range(model.nv)])
-    assert found == pytest.approx(model.forward_dynamics(q, v, tau), rel=1e-11, abs=1e-9)
+    start = state(model, scale=1.3)
+    one, known, _ = opened(fmu(name), "Model")
+    put(one, known, named(**start))
+    found = rates(one, known, model)
+    assert found == pytest.approx(model.forward_dynamics(**start), rel=1e-11, abs=1e-9)
 
-    knowns = [known[each] for each in values_of(model, q, v, tau)]
+    knowns = [known[each] for each in named(**start)]
     unknowns = [known[f"der({each})"] for each in names(model)]
-    at, rng, n = np.concatenate([q, v, tau]), np.random.default_rng(5), len(tau)
+    at, rng = np.concatenate([*start.values()]), np.random.default_rng(5)
     for torques in (0.0, 1e-4):
         along = rng.normal(size=len(at))
-        along[-n:] *= torques
+        along[model.nq + model.nv :] *= torques
         one.setReal(knowns, list(at))
         exact = np.array(one.getDirectionalDerivative(unknowns, knowns, list(along)))
-        rates = []
+        near = []
         for step in (-2, -1, 1, 2):
             one.setReal(knowns, list(at + 1e-4 * step * along))
-            rates.append(np.array(one.getReal(unknowns)))
-        differences = (rates[0] - 8 * rates[1] + 8 * rates[2] - rates[3]) / 12e-4
+            near.append(np.array(one.getReal(unknowns)))
+        differences = (near[0] - 8 * near[1] + 8 * near[2] - near[3]) / 12e-4
         np.testing.assert_allclose(exact, differences, atol=1e-8 * np.abs(exact).max())
     # states are outputs, of which the derivative is the identity
     assert one.getDirectionalDerivative([0, 3, 5], [3, 5], [2.0, 7.0]) == [0.0, 2.0, 7.0]
@@ -127,8 +98,8 @@ def test_accelerations_and_directional_derivatives_are_exact(name, fmu, opened):
 
 def test_a_state_is_kept_stored_and_restored(fmu, opened):
     model = zoo.model("m2_n2")
-    one, known = opened(fmu("m2_n2"), FMU2Slave)
-    put(one, known, values_of(model, *state(model)))
+    one, known, _ = opened(fmu("m2_n2"), "Slave")
+    put(one, known, named(**state(model)))
     one.doStep(0.0, 0.01)
     kept = one.getFMUstate()
     stored = one.serializeFMUstate(kept)
@@ -140,7 +111,7 @@ def test_a_state_is_kept_stored_and_restored(fmu, opened):
     first = flown(one)
     one.setFMUstate(kept)
     assert flown(one) == first
-    another, _ = opened(fmu("m2_n2"), FMU2Slave)
+    another, *_ = opened(fmu("m2_n2"), "Slave")
     restored = another.deSerializeFMUstate(stored)
     another.setFMUstate(restored)
     assert flown(another) == first
@@ -154,17 +125,15 @@ def test_parameters_are_those_of_the_model_and_can_be_tuned(name, opened, tmp_pa
     path = st.export(model, "fmu", tmp_path / "rat.fmu")
     described = fmpy.read_model_description(str(path))
     start = {each.name: float(each.start) for each in described.modelVariables if each.start}
-    assert start["torso_mass"] == 0.11
+    assert (start["torso_mass"], start["q[4]"], start["q[5]"]) == (0.11, 1.0, 0.0)
     assert [start[f"torso_inertia[{k}]"] for k in (1, 2, 3)] == [7e-5, 4e-5, 6e-5]
-    q, v, tau = state(model)
-    one, known = opened(path, FMU2Model)
+    one, known, _ = opened(path, "Model")
     changed = {"gravity": 1.6, "tail_mass": 0.005}
-    put(one, known, values_of(model, q, v, tau) | changed)
+    put(one, known, named(**state(model)) | changed)
     if model.links:  # the FMU has no link_radius, from which this would follow
         changed["link_inertia"] = model.parameters["link_inertia"]
-    expected = model.with_parameters(**changed).forward_dynamics(q, v, tau)
-    found = one.getReal([known[f"der(v[{k + 1}])"] for k in range(model.nv)])
-    assert found == pytest.approx(expected, rel=1e-11, abs=1e-9)
+    expected = model.with_parameters(**changed).forward_dynamics(**state(model))
+    assert rates(one, known, model) == pytest.approx(expected, rel=1e-11, abs=1e-9)
     one.reset()
     assert one.getReal([known["gravity"], known["q[4]"], known["q[1]"]]) == [9.8, 1.0, 0.0]
 
@@ -193,9 +162,6 @@ def test_the_description_has_units_and_parts(fmu, tmp_path):
     assert rows["v[3]"][-1] == pytest.approx(-0.98, rel=1e-9)
 
 
-# On the ground.
-
-
 def legs_of(model):
     """The argument of functions that know of legs."""
     return (LEGS,) if "feet" in model.contacts else ()
@@ -217,28 +183,17 @@ def landing(model):
 
 def start_values(model, run):
     """The start of a motion, and what moves the legs."""
-    values = {"q": run.q[0], "v": run.v[0], "legs": LEGS if legs_of(model) else []}
-    return {f"{name}[{k + 1}]": x for name, row in values.items() for k, x in enumerate(row)}
+    return named(q=run.q[0], v=run.v[0], legs=LEGS if legs_of(model) else [])
 
 
-def landed(kind, model, path, run, **more):
+def landed(interface, model, path, run, **more):
     """Rows that FMPy finds; the legs' angles are straight lines."""
-    moves = None
     if legs_of(model):
-        columns = [("time", float), *((f"legs[{k + 1}]", float) for k in range(8))]
+        columns = [("time", float), *((name, float) for name in named(legs=LEGS))]
         end = LEGS + np.append(SPAN * LEGS[4:], np.zeros(4))
-        moves = np.array([(0.0, *LEGS), (SPAN, *end)], columns)
-    return fmpy.simulate_fmu(
-        str(path),
-        fmi_type=kind,
-        start_values=start_values(model, run),
-        input=moves,
-        stop_time=SPAN,
-        output_interval=STEP,
-        relative_tolerance=1e-8,
-        output=names(model),
-        **more,
-    )
+        more["input"] = np.array([(0.0, *LEGS), (SPAN, *end)], columns)
+    more |= {"relative_tolerance": 1e-8, "output": names(model)}
+    return simulated(path, interface, start_values(model, run), SPAN, STEP, **more)
 
 
 def check_landing(model, path):
@@ -279,7 +234,7 @@ def test_a_tail_without_feet_and_implicit_method_lands_as_the_model_does(tmp_pat
 
 def test_event_indicators_are_heights_and_the_start_is_clear(fmu, opened):
     path, model = fmu("ground"), zoo.model("ground")
-    unit, references = opened(path, FMU2Model)
+    unit, references, _ = opened(path, "Model")
     described, count = fmpy.read_model_description(str(path)), sum(model.contacts.values())
     assert described.numberOfEventIndicators == count
     heights = np.zeros(count)

@@ -4,7 +4,6 @@ import ctypes
 import re
 import subprocess
 import zipfile
-from pathlib import Path
 from xml.etree import ElementTree as Xml
 
 import pytest
@@ -34,48 +33,6 @@ def test_what_no_fmu_can_be_of(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_sources_have_names_that_no_model_has_and_all_are_described(fmu):
-    assert all("-" in path.name for path in NATIVE.iterdir())
-    with zipfile.ZipFile(fmu("m1_n1")) as archive:
-        there = {Path(name).name for name in archive.namelist() if name.endswith(".c")}
-        described = Xml.fromstring(archive.read("modelDescription.xml"))
-    for kind in ("ModelExchange", "CoSimulation"):
-        files = described.findall(f"{kind}/SourceFiles/File")
-        assert {each.get("name") for each in files} == there
-
-
-@pytest.fixture
-def unit(fmu, tmp_path):
-    """Return a unit of a kind by its interface, as made, and what it tells."""
-    fmpy = pytest.importorskip("fmpy")
-    path = str(fmu("m1_n1"))
-    guid, folder = (
-        fmpy.read_model_description(path).guid,
-        fmpy.extract(path, str(tmp_path / "unit")),
-    )
-
-    def made(kind, guid=guid):
-        told = []
-        found = getattr(fmpy.fmi2, kind)(
-            guid=guid,
-            unzipDirectory=folder,
-            modelIdentifier="m1_n1",
-            instanceName="rat",
-        )
-        callbacks = fmpy.fmi2.fmi2CallbackFunctions()
-        logger = fmpy.fmi2.fmi2CallbackLoggerTYPE(
-            lambda _, name, status, category, message: told.append(message.decode())
-        )
-        callbacks.logger = logger
-        callbacks.allocateMemory = fmpy.fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
-        callbacks.freeMemory = fmpy.fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
-        found.instantiate(callbacks=callbacks)
-        found.kept = logger, callbacks
-        return found, told
-
-    return made
-
-
 def status_of(call, *arguments):
     """The status that a call is refused with."""
     from fmpy.fmi1 import FMICallException
@@ -85,10 +42,10 @@ def status_of(call, *arguments):
     return refused.value.status
 
 
-def test_calls_that_make_no_sense_are_refused_and_told(unit):
+def test_calls_that_make_no_sense_are_refused_and_told(fmu, opened):
     with pytest.raises(Exception, match="Failed to instantiate"):
-        unit("FMU2Model", guid="0")
-    one, told = unit("FMU2Model")
+        opened(fmu("m1_n1"), "Model", guid="0")
+    one, _, told = opened(fmu("m1_n1"), "Model")
     for call, *arguments in (
         (one.getReal, [10**6]),
         (one.setReal, [20], [0.0]),
@@ -111,11 +68,10 @@ def test_calls_that_make_no_sense_are_refused_and_told(unit):
     status_of(one.getDirectionalDerivative, [20], [0], [1.0])
     one.setReal([3], [1.0])
     assert one.getReal([28]) == pytest.approx([-9.8], rel=1e-12)
-    one.freeInstance()
 
 
-def test_a_step_that_cannot_be_made_leaves_the_state(unit):
-    one, told = unit("FMU2Slave")
+def test_a_step_that_cannot_be_made_leaves_the_state(fmu, opened):
+    one, _, told = opened(fmu("m1_n1"), "Slave")
     references = list(range(17))
     before = one.getReal(references)
     one.setReal([34], [1e300])
@@ -128,7 +84,6 @@ def test_a_step_that_cannot_be_made_leaves_the_state(unit):
     last = ctypes.c_double()
     one.fmi2GetRealStatus(one.component, 2, ctypes.byref(last))
     assert last.value == 0.25
-    one.freeInstance()
 
 
 def shown(library):
@@ -140,14 +95,22 @@ def shown(library):
 
 def test_libraries_show_the_interface_alone_and_sources_compile_without_a_warning(fmu, tmp_path):
     """Several units in one process share no function; with a prefix the names have it."""
+    fmi2 = pytest.importorskip("fmpy.fmi2")
     with zipfile.ZipFile(fmu("ground_m1_n1")) as archive:
         archive.extractall(tmp_path)
     own = shown(tmp_path / "binaries" / "linux64" / "ground_m1_n1.so")
     assert len(own) == 44 and all(name.startswith("fmi2") for name in own)
+    asked = dir(fmi2.FMU2Model) + dir(fmi2.FMU2Slave)
+    assert {name for name in asked if name.startswith("fmi2")} <= own
+    sources = sorted((tmp_path / "sources").glob("*.c"))
+    described = Xml.parse(tmp_path / "modelDescription.xml")
+    for kind in ("ModelExchange", "CoSimulation"):
+        files = described.findall(f"{kind}/SourceFiles/File")
+        assert {each.get("name") for each in files} == {path.name for path in sources}
+    assert all("-" in path.name for path in NATIVE.iterdir())  # as in no model's name
     library = tmp_path / "unit.so"
     strict = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-fPIC", "-shared"]
     options = ["-fvisibility=hidden", "-DFMI2_FUNCTION_PREFIX=rat_", "-o", library, "-lm"]
-    sources = sorted((tmp_path / "sources").glob("*.c"))
     command = list(map(str, ["cc", *strict, *sources, *options]))
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
@@ -155,12 +118,3 @@ def test_libraries_show_the_interface_alone_and_sources_compile_without_a_warnin
     read = ctypes.CDLL(str(library))
     read.rat_fmi2GetVersion.restype = ctypes.c_char_p
     assert read.rat_fmi2GetVersion() == b"2.0"
-
-
-def test_libraries_show_all_that_fmpy_asks_for(fmu, tmp_path):
-    fmi2 = pytest.importorskip("fmpy.fmi2")
-    with zipfile.ZipFile(fmu("m1_n1")) as archive:
-        archive.extractall(tmp_path)
-    asked = dir(fmi2.FMU2Model) + dir(fmi2.FMU2Slave)
-    own = shown(tmp_path / "binaries" / "linux64" / "m1_n1.so")
-    assert {name for name in asked if name.startswith("fmi2")} <= own

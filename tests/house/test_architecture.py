@@ -1,10 +1,11 @@
 """The house rules that a machine can check: who imports what, how large things are, what the
-project says of itself.
+project says of itself; and make, which builds what is asked for, once.
 """
 
-import ast
 import json
 import re
+import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +15,8 @@ import pytest
 import serpentail
 import serpentail_codegen
 from tests.house import file_lengths
+from tests.house.test_golden import MODELS
+from tests.support.makes import away_from_make, stand_in
 from tests.support.rows import row
 
 CODEGEN, RUNTIME = (Path(package.__file__).parent for package in (serpentail_codegen, serpentail))
@@ -29,40 +32,27 @@ def test_import_contracts_hold():
     assert re.search(r"Contracts: [4-9] kept, 0 broken", done.stdout)
 
 
-def imported(path):
-    """Names of the top-level packages that a module imports anywhere in it."""
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Import):
-            yield from (alias.name.split(".")[0] for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.level == 0:
-            yield node.module.split(".")[0]
-
-
 def test_only_the_mechanics_import_sympy_and_only_templating_jinja2():
-    uses = [(path, {*imported(path)}) for p in (CODEGEN, RUNTIME) for path in p.rglob("*.py")]
-    assert {path.parent for path, names in uses if "sympy" in names} == {CODEGEN / "mechanics"}
-    assert {path.stem for path, names in uses if "jinja2" in names} == {"templating"}
+    def importing(library):
+        lines = re.compile(rf"^ *(?:import|from) {library}\b", re.MULTILINE)
+        paths = (path for package in (CODEGEN, RUNTIME) for path in package.rglob("*.py"))
+        return [path for path in paths if lines.search(path.read_text())]
+
+    assert {path.parent for path in importing("sympy")} == {CODEGEN / "mechanics"}
+    assert [path.stem for path in importing("jinja2")] == ["templating"]
 
 
-def test_files_are_short_and_a_longer_one_is_refused(tmp_path):
-    (tmp_path / "room").mkdir()
-    (tmp_path / "room" / "long.py").write_text("x = 1\n" * (file_lengths.MOST_LINES + 1))
-    (tmp_path / "room" / "short.py").write_text("x = 1\n" * file_lengths.MOST_LINES)
-    (complaint,) = file_lengths.too_long(tmp_path)
-    assert "long.py: 301 lines" in complaint
+def test_files_are_short():
     assert file_lengths.main() == 0
     for path in [VIEWER / "build.js", *(VIEWER / "src").iterdir()]:
         lines = path.read_text(encoding="utf-8").splitlines()
         assert len(lines) <= file_lengths.MOST_LINES and max(map(len, lines)) <= 100, path.name
-
-
-def test_templates_are_short_and_print_no_numbers_of_their_own():
     for path in CODEGEN.rglob("*.jinja"):
         with row(path.name):
             lines = path.read_text().splitlines()
             assert len(lines) <= 120
-            printed = [line for line in lines if re.search(r"%\.\d+[feg]", line)]
-            assert all("printf" in line for line in printed)
+            numbers = [line for line in lines if re.search(r"%\.\d+[feg]", line)]
+            assert all("printf" in line for line in numbers)
 
 
 def test_the_pages_lock_file_has_versions_and_no_addresses():
@@ -75,13 +65,20 @@ def test_the_pages_lock_file_has_versions_and_no_addresses():
         assert "://" not in path.read_text(encoding="utf-8")
 
 
-def test_what_is_built_is_not_kept():
+def test_what_is_built_is_not_kept_but_the_golden_models():
+    def git(*words):
+        done = subprocess.run(
+            ["git", *words], cwd=ROOT, capture_output=True, text=True, check=False
+        )
+        if done.returncode == 128:
+            pytest.skip("this is no checkout")
+        return done.stdout.split()
+
     built = ["viewer/node_modules/", "runtime/serpentail/viewer/page.html"]
-    command = ["git", "check-ignore", *built]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    if done.returncode == 128:
-        pytest.skip("this is no checkout")
-    assert done.stdout.split() == built
+    assert git("check-ignore", *built) == built
+    kept = git("ls-files", "--", "generated")
+    assert {name.split("/")[1] for name in kept} == {"README.md", *MODELS}
+    assert sum((ROOT / name).stat().st_size for name in kept) < 400_000
 
 
 def test_package_changelog_and_citation_have_one_version():
@@ -94,15 +91,96 @@ def test_package_changelog_and_citation_have_one_version():
     notes = f"docs/release_notes/{version}.md"
     assert f"({notes})" in text and (ROOT / notes).exists()
     citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
-    told = {k: re.search(rf"^{k}: \"?(.*?)\"?$", citation, re.MULTILINE)[1] for k in RELEASED}
-    assert tuple(told.values()) == releases[1]
-
-
-RELEASED = ("version", "date-released")  # keys of the citation
-
-
-def test_sdist_has_the_citation():
+    keys = ("version", "date-released")
+    told = [re.search(rf"^{k}: \"?(.*?)\"?$", citation, re.MULTILINE)[1] for k in keys]
+    assert tuple(told) == releases[1]
     builder = pytest.importorskip("hatchling.builders.sdist").SdistBuilder(str(ROOT))
     files = {file.distribution_path for file in builder.recurse_included_files()}
-    notes = f"docs/release_notes/{serpentail.__version__}.md"
     assert {"CITATION.cff", "CHANGELOG.md", notes} <= files
+
+
+# Make.
+
+NAME = "articulated_m1_n1_fc4a05d"  # of these functions
+ORDER = ("TAIL=articulated", "M=1", "N=1", "FUNCTIONS=mass_matrix")
+
+
+@pytest.fixture
+def tree(tmp_path):
+    """A copy of what make builds from, with a stand-in for .venv that is ready."""
+    for name in ("Makefile", "pyproject.toml"):
+        shutil.copy2(ROOT / name, tmp_path)
+    for name in ("codegen", "scenes"):
+        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+    stand_in(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def make(tree):
+    """Return a function that runs make there, away from a make that runs these tests."""
+
+    def run(*arguments, **more):
+        own = {name: value for name, value in away_from_make().items() if name != "CC"}
+        own |= {"PYTHONPATH": str(tree / "codegen"), "LC_ALL": "C", "UV": "", **more}
+        return subprocess.run(
+            ["make", *arguments], cwd=tree, env=own, capture_output=True, text=True, check=False
+        )
+
+    return run
+
+
+def test_options_of_make_are_those_of_the_generator(tree, make):
+    options = ("REAL=float", "EMISSION=loops", "BAKED=1", "FUNCTIONS=energy,momentum")
+    told = "--real float --emission loops --baked --functions energy,momentum"
+    for given, wanted in [
+        (("TAIL=continuum", "M=2"), "--tail continuum --segments 2"),
+        (options, f"{told} --tail articulated --segments 1 --links 3"),
+        (("SCENE=my scenes/it's.toml",), "-- my scenes/it's.toml"),
+    ]:
+        with row(*given):
+            done = make("-n", "model", *given)
+            command = done.stdout.split(" && ")[0].replace("$(", " ").replace(")", " ")
+            assert done.returncode == 0 and wanted in " ".join(shlex.split(command))
+    assert not (tree / "generated").exists()
+
+
+def test_a_wrong_option_is_one_readable_line_and_nothing_is_made(tree, make):
+    for options, words in [
+        (["M=0"], r"segments: value 0"),
+        (["N=abc"], r"--links: .*'abc'"),
+        (["SCENE=--help"], r"scene file: value '--help'"),
+    ]:
+        with row(*options):
+            done = make("model", *options)
+            assert done.returncode == 2 and "Traceback" not in done.stderr
+            (line,) = (line for line in done.stderr.splitlines() if re.search(words, line))
+            assert len(line) < 130 and not list((tree / "generated").glob("[a-z]*"))
+
+
+@pytest.mark.slow
+def test_what_is_there_is_not_made_again_and_what_was_lost_is(tree, make):
+    failed = make("model", *ORDER, CC="no-such-cc", SERPENTAIL_CACHE=str(tree / "cache"))
+    assert failed.returncode == 2 and "CC='no-such-cc'" in failed.stderr
+    first = make("model", *ORDER)
+    assert first.returncode == 0 and f"{NAME}: 1 x 1 links" in first.stdout
+    folder = tree / "generated" / NAME
+    manifest = json.loads((folder / "manifest.json").read_text())
+    assert manifest["prefix"] == NAME and manifest["real"] == "double"
+    before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
+    again = make("model", *ORDER)
+    assert re.fullmatch(rf"generated/{NAME}: up to date, \d+\.\d\d s\n", again.stdout)
+    assert {path: path.stat().st_mtime_ns for path in folder.rglob("*")} == before
+    readme = (folder / "README.md").read_bytes()
+    (folder / "README.md").unlink()
+    assert "1 files written" in make("model", *ORDER).stdout
+    assert (folder / "README.md").read_bytes() == readme
+
+
+def test_clean_removes_what_was_made(tree, make):
+    kept = ("generated/README.md", "generated/golden_loops/src")  # part of the checkout
+    for name in ("generated/x", "generated/.stamps", "output", *kept):
+        (tree / name).mkdir(parents=True)
+    assert make("clean").returncode == 0
+    assert {path.name for path in (tree / "generated").iterdir()} == {"README.md", "golden_loops"}
+    assert not (tree / "output").exists() and (tree / "generated/golden_loops/src").is_dir()

@@ -29,9 +29,9 @@ FILES |= {f"include/{NAME}_unchecked.h", f"include/{NAME}_simulation.h"}
 FILES |= {f"src/{NAME}_simulation.c", "Makefile", "CMakeLists.txt", "LICENSE", "README.md"}
 
 
-def scene(**options):
-    """The scene of these tests, with other options."""
-    return scene_for("articulated", 2, 2, **OPTIONS | options)
+def made_in(root, **options):
+    """Generate the scene of these tests with other options; return what was written."""
+    return generate(scene_for("articulated", 2, 2, **OPTIONS | options), root)
 
 
 def texts(folder):
@@ -40,20 +40,17 @@ def texts(folder):
     return {str(path.relative_to(folder)): path.read_bytes() for path in files}
 
 
+def states(folder):
+    return {path: (path.stat().st_mtime_ns, path.stat().st_ino) for path in folder.rglob("*")}
+
+
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     """What the scene generates, made once: no test writes to it."""
     root = tmp_path_factory.mktemp("made")
-    changed = generate(scene(), root)
+    changed = made_in(root)
     assert set(changed) == FILES and len(changed) == len(FILES)
     return root / NAME
-
-
-@pytest.fixture
-def root(made, tmp_path):
-    """A copy of it to write to."""
-    shutil.copytree(made, tmp_path / NAME)
-    return tmp_path
 
 
 def test_same_bytes_under_another_hash_seed_and_from_another_folder(made, tmp_path):
@@ -66,26 +63,11 @@ def test_same_bytes_under_another_hash_seed_and_from_another_folder(made, tmp_pa
     printed = subprocess.check_output(command, cwd=tmp_path, env=env, text=True)
     assert f"made/here/{NAME}: {len(FILES)} files written" in printed
     assert texts(tmp_path / "made" / "here" / NAME) == texts(made)
-
-
-def test_texts_tell_nothing_of_where_and_when(made):
-    for name, text in texts(made).items():
+    for name, text in texts(made).items():  # which tell nothing of where and when
         with row(name):
             assert str(made.parent).encode() not in text
             assert str(Path.home()).encode() + b"/" not in text
             assert not re.search(rb"\b20\d\d-\d\d-\d\d|\b\d\d:\d\d:\d\d\b", text)
-
-
-def test_second_generation_writes_only_what_is_lost_or_edited(root, made):
-    folder = root / NAME
-    before = {path: (path.stat().st_mtime_ns, path.stat().st_ino) for path in folder.rglob("*")}
-    assert generate(scene(), root) == []
-    after = {path: (path.stat().st_mtime_ns, path.stat().st_ino) for path in folder.rglob("*")}
-    assert after == before and texts(folder) == texts(made)
-    (folder / MODEL).write_text("edited")
-    (folder / HEADER).unlink()
-    assert set(generate(scene(), root)) == {MODEL, HEADER}
-    assert texts(folder) == texts(made)
 
 
 def differing_lines(some, other):
@@ -94,11 +76,18 @@ def differing_lines(some, other):
     return [pair for pair in zip(*lines, strict=True) if pair[0] != pair[1]]
 
 
-def test_a_parameter_changes_only_its_value_and_the_hash(root, made):
-    expected = texts(made)
-    changed = generate(scene(parameters={"gravity": 1.62}), root)
+def test_only_what_is_lost_edited_or_changed_is_written(made, tmp_path):
+    expected, root, folder = texts(made), tmp_path, tmp_path / NAME
+    shutil.copytree(made, folder)
+    before = states(folder)
+    assert made_in(root) == [] and states(folder) == before and texts(folder) == expected
+    (folder / MODEL).write_text("edited")
+    (folder / HEADER).unlink()
+    assert set(made_in(root)) == {MODEL, HEADER} and texts(folder) == expected
+    # a parameter changes only its value and the hash
+    changed = made_in(root, parameters={"gravity": 1.62})
     assert set(changed) == {HEADER, MODEL, CASADI, MANIFEST}
-    now = texts(root / NAME)
+    now = texts(folder)
     assert differing_lines(expected[MODEL], now[MODEL]) == [
         ("  parameters->gravity = 9.8;", "  parameters->gravity = 1.62;")
     ]
@@ -106,52 +95,41 @@ def test_a_parameter_changes_only_its_value_and_the_hash(root, made):
     for name in (HEADER, CASADI):
         pairs = differing_lines(expected[name], now[name])
         assert pairs and all(old.replace(before, after) == new for old, new in pairs)
-    generate(scene(baked=True), root)
-    changed = generate(scene(baked=True, parameters={"gravity": 1.62}), root)
+    made_in(root, baked=True)
+    changed = made_in(root, baked=True, parameters={"gravity": 1.62})
     assert set(changed) == {HEADER, MODEL, BATCH, FLIGHTS, CASADI, MANIFEST}
 
 
-def test_manifest_describes_the_files(made):
+def test_the_manifest_describes_the_files_and_its_hashes_tell_what_changed(made, tmp_path):
     expected = texts(made)
     manifest = json.loads(expected[MANIFEST])
+    content, abi = manifest["content_hash"], manifest["abi_hash"]
     assert manifest["files"] == {
         name: digest(expected[name].decode()) for name in sorted(FILES - {MANIFEST})
     }
-    for name in (HEADER, CASADI):
-        assert manifest["content_hash"] in expected[name].decode()
-    assert f'return "{manifest["abi_hash"]}";' in expected[HOST].decode()
-
-
-def test_hashes_tell_what_changed(made, tmp_path):
-    def hashes(**options):
-        generate(scene(**options), tmp_path)
-        manifest = json.loads((tmp_path / NAME / MANIFEST).read_text())
-        return manifest["content_hash"], manifest["abi_hash"]
-
-    manifest = json.loads((made / MANIFEST).read_text())
-    content, abi = manifest["content_hash"], manifest["abi_hash"]
-    other, same = hashes(parameters={"gravity": 1.62})
-    assert other != content and same == abi
-    changes = ({"real": "float"}, {"functions": ["energy"]}, {"emission": "straight"})
-    contents, abis = zip(*(hashes(**change) for change in changes), strict=True)
-    assert len({content, other, *contents}) == 5 and len({abi, *abis}) == 4
+    assert all(content in expected[name].decode() for name in (HEADER, CASADI))
+    assert f'return "{abi}";' in expected[HOST].decode()
+    changes = [{"parameters": {"gravity": 1.62}}, {"real": "float"}, {"functions": ["energy"]}]
+    contents, abis = [content], [abi]
+    for change in (*changes, {"emission": "straight"}):
+        made_in(tmp_path, **change)
+        now = json.loads((tmp_path / NAME / MANIFEST).read_text())
+        contents.append(now["content_hash"])
+        abis.append(now["abi_hash"])
+    assert len({*contents}) == 5 and abis[1] == abi and len({*abis}) == 4
 
 
 def test_files_of_an_earlier_generation_go_and_others_stay(tmp_path):
     folder = tmp_path / "folder"
     write_folder(folder, {"a.txt": "a\n", "deep/b.txt": "b"}, {})
     (folder / "mine.txt").write_text("mine")
-    now = {"a.txt": "a\n", "c.txt": "c"}
+    now = {"a.txt": "a\n", "c.txt": "\u00e4"}
     assert set(write_folder(folder, now, {})) == {"c.txt", "manifest.json"}
     assert set(texts(folder)) == {"a.txt", "c.txt", "manifest.json", "mine.txt"}
+    assert (folder / "c.txt").read_bytes() == "\u00e4".encode()
     (folder / "a.txt").write_bytes(b"a\r\n")  # compared byte by byte
     assert write_folder(folder, now, {}) == ["a.txt"] and not write_folder(folder, now, {})
-    assert write_folder(folder, now | {"c.txt": "\u00e4"}, {}) == ["c.txt", "manifest.json"]
-    assert (folder / "c.txt").read_bytes() == "\u00e4".encode()
-
-
-def test_damaged_manifest_does_no_harm(tmp_path):
-    outside = tmp_path / "outside.txt"
+    outside = tmp_path / "outside.txt"  # which a damaged manifest does not harm
     outside.write_text("outside")
     away = '{"files": {"../outside.txt": "", "/outside.txt": "", "lost": ""}}'
     for k, manifest in enumerate(["", "{", "[]", "{}", '{"files": 3}', "null", away]):

@@ -1,16 +1,27 @@
-"""Importing is light: a package is loaded only by those who use it."""
+"""Importing is light: a package is loaded only by those who use it; what needs a library of an
+extra names the extra before it works, and all else does without.
+"""
 
 import importlib
 import pkgutil
+import re
 import subprocess
 import sys
+import tomllib
+from pathlib import Path
 
 import pytest
 
 import serpentail as st
+from serpentail import cli
+from serpentail.building import build as building
+from serpentail.scenes.plan import planned
+from serpentail.verification import report
 from tests.support import zoo
+from tests.support.drawn_flight import flight
 from tests.support.rows import row
 
+ROOT = Path(__file__).parents[2]
 HEAVY = ["casadi", "jinja2", "matplotlib", "mpmath", "numpy", "scipy", "serpentail_codegen"]
 HEAVY += ["serpentail.viewer", "sympy"]
 FLIGHT = """
@@ -42,18 +53,11 @@ def loaded(program, *arguments):
 
 def test_heavy_packages_are_loaded_by_those_who_use_them():
     generator = "import serpentail_codegen.scene.parse, serpentail_codegen.__main__"
-    for program, wanted, arguments in [
-        ("import serpentail", set(), []),
-        (generator, {"serpentail_codegen"}, []),
-        (FLIGHT, {"numpy"}, [zoo.folder("m1_n1")]),
-    ]:
-        with row(program):
-            assert loaded(program, *arguments) == wanted
+    assert loaded("import serpentail") == set()
+    assert loaded(generator) == {"serpentail_codegen"}
+    assert loaded(FLIGHT, zoo.folder("m1_n1")) == {"numpy"}
     assert "serpentail.viewer" not in loaded(PICTURES_LATER)
-
-
-def test_importing_the_runtime_loads_few_modules():
-    """Instead of its time, which hangs on the machine: typing, contextlib and importlib."""
+    # instead of its time, which hangs on the machine: typing, contextlib and importlib
     program = "import sys; old = set(sys.modules); import serpentail; print(len({*sys.modules} - "
     assert int(fresh(f"{program} old))")) < 20
 
@@ -65,23 +69,90 @@ def test_tape_programs_and_printers_work_without_sympy_and_a_derivation_does_not
     assert "sympy" in fresh("\n".join(lines))
 
 
-def test_names_are_the_contract():
+def test_names_are_the_contract_and_no_module_hides_one():
+    """Importing a submodule makes it an attribute of the package, in place of what is there."""
     assert {"load", "Model", "simulate", "Damping", "TorqueTable", "Trajectory"} <= set(dir(st))
     assert sorted(st.__all__) == dir(st)
     for name in st.__all__:
         assert getattr(st, name).__name__ == name and getattr(st, name).__doc__
-
-
-def test_no_module_hides_a_public_name():
-    """Importing a submodule makes it an attribute of the package, in place of what is there."""
     modules = {module.name for module in pkgutil.iter_modules(st.__path__)}
     assert "motion" in modules and not modules & set(st.__all__)
     assert fresh("import serpentail as st; st.Damping; print(st.simulate.__name__)") == "simulate\n"
-
-
-def test_unknown_name_lists_the_public_ones():
     with pytest.raises(AttributeError, match="'simulat'") as caught:
         _ = st.simulat
     assert all(name in str(caught.value) for name in st.__all__)
     with pytest.raises(ImportError, match="simulat"):
         importlib.import_module("serpentail.simulat")
+
+
+# Extras.
+
+BROUGHT_ALONG = {"trimesh": "viser"}  # by a library of the extra
+HOMES = {  # where alone a library of an extra may be imported, behind the room's gates
+    "casadi": ("model/casadi.py", "model/nodes/", "planning/"),
+    "matplotlib": ("pictures/",),
+    "PIL": ("pictures/",),
+    "imageio_ffmpeg": ("pictures/encode.py",),
+    "ezc3d": ("identification/readers.py",),
+    "gymnasium": ("learning/environments.py",),
+    "jax": ("differentiable/jax_calls.py", "differentiable/jax_functions.py"),
+    "torch": ("differentiable/torch_functions.py",),
+}
+
+
+def missing(extra):
+    return pytest.raises(st.ExtraMissing, match=rf'pip install "serpentail\[{extra}\]"')
+
+
+def names(requirements):
+    return {re.match(r"[\w-]+", text)[0] for text in requirements}
+
+
+def test_libraries_of_extras_are_imported_in_their_rooms_behind_gates_that_name_the_extra():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert names(project["dependencies"]) == {"filelock", "jinja2", "numpy", "scipy", "sympy"}
+    runtime, gates = ROOT / "runtime" / "serpentail", set()
+    for path in runtime.rglob("*.py"):
+        text = path.read_text(encoding="utf-8")
+        gates |= {*re.findall(r'\bneeded\("(\w+)", "(\w+)"\)', text)}
+        for library, homes in HOMES.items():
+            if re.search(rf"^ *(?:import|from) {library}\b", text, re.MULTILINE):
+                assert path.relative_to(runtime).as_posix().startswith(homes), (library, path)
+    assert len(gates) >= 7
+    for module, extra in gates:
+        brought = names(project["optional-dependencies"][extra])
+        assert BROUGHT_ALONG.get(module, module) in brought
+
+
+def test_casadi_names_the_extra_before_a_model_is_made(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "casadi", None)
+    model = st.load(zoo.folder("m1_n1"))
+    with missing("plan"):
+        _ = model.casadi
+    with missing("plan"):
+        st.plan(model, start=None, duration=None)
+    assert model.energy([0, 0, 0, 1, 0, 0, 0, 0, 0], [0] * 8)[0] == 0
+    checks = report.laws(st.load(zoo.folder("bare")))
+    skipped = {check.name for check in checks if "serpentail[plan]" in check.omitted}
+    assert skipped == {"casadi functions agree", "casadi externals are the compiled code"}
+    assert all(check.passed for check in checks)
+    monkeypatch.setattr(building, "generated", lambda *_: pytest.fail("it was generated"))
+    with missing("plan"):
+        planned("righting_m1_n3")
+    assert cli.main(["plan", "righting_m1_n3"]) == 2
+    out, error = capsys.readouterr()
+    assert out == "" and error.count("\n") == 1 and 'pip install "serpentail[plan]"' in error
+
+
+def test_pictures_name_the_extra(tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    for kind in ("png", "gif", "svg"):
+        with row(kind), missing("plot"):
+            st.film(flight(), tmp_path / f"film.{kind}")
+    assert list(tmp_path.iterdir()) == []
+    for draw in (st.filmstrip, st.plot):
+        with missing("plot"):
+            draw(flight())
+    monkeypatch.setattr(cli, "run", lambda _: pytest.fail("it ran"))
+    assert cli.main(["simulate", "kick", "--film", "kick.png"]) == 2
+    assert 'pip install "serpentail[plot]"' in capsys.readouterr().err

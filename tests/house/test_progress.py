@@ -1,7 +1,11 @@
-"""Long work tells how far it is: a function, the log, a terminal, a pipe, and nobody by default."""
+"""What is told of things and of long work: reprs of six lines for a REPL; progress for a function,
+the log, a terminal and a pipe, and for nobody by default.
+"""
 
+import dataclasses
 import io
 import logging
+from functools import cache
 
 import numpy as np
 import pytest
@@ -9,6 +13,9 @@ import pytest
 import serpentail as st
 from serpentail.stages import Stage, Told
 from tests.support import zoo
+from tests.support.rows import row
+
+MOST_LINES, MOST_CHARACTERS = 6, 600  # a terminal of 100 columns wraps what is one line
 
 
 class Terminal(io.StringIO):
@@ -26,39 +33,44 @@ def clock(monkeypatch):
     return lambda seconds: now.__setitem__(0, now[0] + seconds)
 
 
+def enough(now):
+    """End the work."""
+    raise ZeroDivisionError(now.stage)
+
+
+def told_of(work):
+    """What a function is told of some work."""
+    told = []
+    with st.progress(told.append):
+        work()
+    return told
+
+
+def start(model):
+    """A tumble: q, v."""
+    q, v = np.zeros(model.nq), np.zeros(model.nv)
+    q[3], v[3] = 1, 9
+    return q, v
+
+
 def test_a_function_is_told_each_stage_and_ends_the_work_by_what_it_raises(tmp_path, monkeypatch):
     monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path))
     # made anew, because its making is what is told
     tiny = {"tail": "articulated", "segments": 1, "links": 1, "functions": ["energy", "momentum"]}
     with pytest.raises(ZeroDivisionError), st.progress(enough):
         st.build(**tiny)
-    told = []
-    with st.progress(told.append):
-        st.build(**tiny)  # nothing is left in the way
+    told = told_of(lambda: st.build(**tiny))  # nothing is left in the way
     ends = [now for now in told if now.ended]
     assert [now.stage for now in ends] == ["derive", "compile"]
     assert ends[0].what == "articulated_m1_n1" and ends[0].left == 0
     parts = [now.done for now in told if now.stage == "derive" and now.done is not None]
     assert parts == sorted(parts) and all(0 <= part < 1 for part in parts)
-    count = len(told)
-    st.build(**tiny)
-    assert len(told) == count
-
-
-def enough(now):
-    """End the work."""
-    raise ZeroDivisionError(now.stage)
-
-
-def test_the_estimate_is_of_what_is_left():
-    assert st.Progress("plan", "", 0.25, 10.0).left == 30.0
-    assert st.Progress("plan", "", None, 10.0).left is None
-    assert str(st.Progress("plan", "rat", 0.25, 10.0)) == "plan rat: 25%, 10 s, 30 s left"
-    assert str(st.Progress("plan", "rat", 0.25, 10.0, ended=True)) == "plan rat: 10.0 s"
+    assert told_of(lambda: st.build(**tiny)) == []
 
 
 def test_a_pipe_has_few_lines_and_a_terminal_one_that_ends_empty(clock):
     """Of a stage of half a second, and one of a minute."""
+    assert st.Progress("plan", "", None, 10.0).left is None
     texts = []
     for stream in (io.StringIO(), Terminal()):
         with st.progress(Told(stream)):
@@ -101,34 +113,16 @@ def test_nobody_is_told_by_default_and_the_log_of_the_ends(clock, caplog, capsys
     assert capsys.readouterr() == ("", "")
 
 
-def start(model):
-    """A tumble: q, v."""
-    q, v = np.zeros(model.nq), np.zeros(model.nv)
-    q[3], v[3] = 1, 9
-    return q, v
-
-
-def told_of(stage, work):
-    """What a function is told of a stage of some work, by the part that is done."""
-    told = []
-    with st.progress(told.append):
-        work()
-    told = [now for now in told if now.stage == stage]
-    parts = [now.done for now in told]
-    assert parts == sorted(parts) and parts[-1] == 1.0 and told[-1].ended
-    return told
-
-
 def test_runs_and_a_long_run_are_told_by_the_part_that_is_done():
     rat = zoo.model("m1_n1")
     q, v = start(rat)
     many = {"q0": np.tile(q, (400, 1)), "v0": v, "t_span": 0.2, "method": "rk4"}
-    for threads in (1, 2):
-        told = told_of("simulate", lambda t=threads: st.simulate(rat, threads=t, **many))
-        assert "400 runs" in told[0].what
-    long = {"t_span": 300, "method": "rk4", "output_step": 1.0, "step": 1e-3}
-    told = told_of("simulate", lambda: st.simulate(rat, q, v, **long))
-    assert len(told) > 2 and told[0].done < 1
+    long = {"q0": q, "v0": v, "t_span": 300, "method": "rk4", "output_step": 1.0, "step": 1e-3}
+    for settings in (many | {"threads": 1}, many | {"threads": 2}, long):
+        told = told_of(lambda settings=settings: st.simulate(rat, **settings))
+        parts = [now.done for now in told if now.stage == "simulate"]
+        assert parts == sorted(parts) and parts[-1] == 1.0 and told[-1].ended
+        assert "400 runs" in told[0].what or (len(told) > 2 and parts[0] < 1)
 
 
 def test_what_the_function_raises_ends_long_work():
@@ -152,3 +146,78 @@ def test_a_plan_tells_its_rounds():
     rounds = {now.what for now in plans if "after round" in now.what}
     assert len(rounds) == plan.report["rounds"] and plans[-1].ended
     assert len(plans) > plan.report["iterations"]
+
+
+# Reprs.
+
+
+def flown(runs=None, **settings):
+    """Drops of a rat from 0.3 m, or of many."""
+    q = np.array([0, 0, 0.3, 1, 0, 0, 0, 0.1, 0])
+    q = q if runs is None else np.tile(q, (runs, 1))
+    settings = {"legs": st.Legs.fixed(3.6, -0.3), "t_span": 0.05, "rtol": 1e-6} | settings
+    return st.simulate(zoo.model("feet"), q, np.zeros(8), **settings)
+
+
+def tired(t, q, v):
+    """A controller that gives up at 0.02 s, above 0.29 m."""
+    if 0.02 < t < 0.022 and q[2] > 0.29:
+        raise st.SimulationError("it is tired")
+    return np.zeros(2)
+
+
+@cache
+def planned():
+    begin = np.array([0, 0, 0, 1, 0.1, 0, 0, 0, 0]), np.zeros(8)
+    free = st.Goal(attitude=None, torso_rate=None)
+    settings = {"tolerance": None, "intervals": 4, "track": False}
+    return st.plan(zoo.model("m1_n3"), start=begin, goal=free, duration=0.1, **settings)
+
+
+def test_nothing_that_the_package_gives_fills_the_screen():
+    rat, motion, runs, plan = zoo.model("feet"), flown(), flown(300), planned()
+    times = np.linspace(0, 1, 500)
+    table = st.TorqueTable(times, np.zeros((500, 2)))
+    reference = st.Reference(times, np.zeros((500, 2)))
+    legs = st.Legs(times, 3 + 0 * times, -0.3 + 0 * times)
+    scenario = st.Scenario(rat, motion.q[0], motion.v[0], 1.0, table, legs, {"rtol": 1e-6})
+    phases = st.Phases([(0.0, table), (0.5, table), (0.7, None)])
+    things = [motion, motion.contact, runs, runs.audit, plan, table, reference, legs, scenario]
+    things += [plan.trajectory, plan.problem, plan.curve, plan.mesh, plan.rule, plan.solution]
+    things += [rat, rat.casadi, reference.curve, st.Damping(), st.Goal(), st.Bounds(), phases]
+    for thing in [*things, st.Pfl(rat, reference)]:
+        with row(type(thing).__name__):
+            text = repr(thing)
+            assert text.count("\n") < MOST_LINES and len(text) <= MOST_CHARACTERS
+            assert max(map(len, text.splitlines())) <= 100 or "\n" not in text
+    assert repr(rat.casadi).startswith("<CasadiFunctions of feet, SX and compiled:\n  ")
+    assert repr(st.Legs([0.0], 3.5, -0.25)).startswith("Legs(times=[0.0], gamma=3.5, delta=-0.25,")
+
+
+def test_a_motion_says_what_it_is_what_failed_why_and_a_plan_whether_it_succeeded(tmp_path):
+    motion = flown(output_step=0.001)
+    lines = repr(motion).splitlines()
+    assert "articulated, 1 x 3 links" in lines[0] and "51 samples, 0 to 0.05 s" in lines[0]
+    assert "q (51, 9), v (51, 8), tau (51, 2)" in lines[1]
+    assert "by points: 6 of the feet; 0 events" in lines[2]
+    assert lines[3].startswith("  by ros34pw2: ") and "steps" in lines[3]
+    assert "forces=array of 51 x 6 x 3" in repr(motion.contact)
+    loaded = st.Trajectory.load(motion.save(tmp_path / "run.npz"))
+    assert "without its model" in repr(loaded).splitlines()[0]
+    warned = dataclasses.replace(motion, info=motion.info | {"warnings": ["word " * 99, "b"]})
+    last = repr(warned).splitlines()[-1]
+    assert "2 warnings, the first: word word" in last and len(last) <= 100 and last[-4:] == "...>"
+    with pytest.raises(st.SimulationError) as caught:
+        flown(controller=tired)
+    text = repr(caught.value.trajectory)
+    assert "failed: it is tired" in text and text.count("\n") == 4
+    runs = flown(3, parameters={"gravity": [90.0, 90.0, 9.8]}, controller=tired)
+    lines = repr(runs).splitlines()
+    assert "3 runs of 201 samples, 0 to 0.05 s" in lines[0]
+    assert "1 failed, the first run 2: it is tired" in lines[3]
+    plan = planned()
+    lines = repr(plan).splitlines()
+    assert lines[0].endswith(": success") and f"{plan.mesh.intervals} intervals" in lines[1]
+    report = plan.report | {"status": "Infeasible", "effort": None}
+    failed = repr(dataclasses.replace(plan, success=False, report=report))
+    assert "no success (Infeasible)" in failed and "effort no finite" in failed

@@ -1,4 +1,4 @@
-"""Bad calls and scenes are answered or refused, drops gain no energy, and what once broke stays
+"""Bad scenes and calls are answered or refused, drops gain no energy, and what once broke stays
 mended.
 """
 
@@ -11,73 +11,21 @@ import pytest
 import serpentail as st
 from serpentail.model.sizes import UNLIKE as UNLIKE_FROM
 from serpentail.model.sizes import disparity
-from stress import call_fuzz, drops, poses, scene_fuzz, stress_plots
-from stress.call_fuzz import Fault, Target
-from stress.figures import Figure, table
-from stress.poses import Point
-from stress.subjects import Errors, Subject, changed, errors, exact_of, judged, state
+from stress import drops, scene_fuzz
+from stress.subjects import Subject, changed, exact_of, state
 from tests.references.metrics import mass_matrix_error
 from tests.support import zoo
 from tests.support.rows import row
 
 ROOT = Path(__file__).parents[2]
 SCENES = sorted((ROOT / "scenes").glob("*.toml"))
-KINDS = {"links": "feet_tail", "arcs": "ground_arcs"}  # models of the zoo
 
 
-def numbers(few, many):
-    """Two sizes of a test, the larger of them slow."""
-    return pytest.mark.parametrize("count", [few, pytest.param(many, marks=pytest.mark.slow)])
-
-
-@numbers(150, 4000)
-def test_random_calls_are_answered_or_refused(count, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    for seed, model in enumerate(map(zoo.model, KINDS.values())):
-        assert call_fuzz.fuzz(call_fuzz.targets(model, tmp_path), count, seed) == []
-
-
-def test_the_fuzz_sees_bare_errors_and_results_that_are_no_numbers():
-    for result in (np.array([1.0, np.nan]), (1.0, (np.inf,))):
-        found = call_fuzz.fuzz([Target("it", lambda x, r=result: r, {"x": 1.0})], 5, 1)
-        assert [fault.kind for fault in found] == ["no number"]
-    found = call_fuzz.fuzz([Target("it", lambda x: {}["absent"], {"x": 1.0})], 5, 1)
-    assert [(fault.kind, fault.target) for fault in found] == [("bare error", "it")]
-    assert isinstance(found[0], Fault)
-
-
-@numbers(100, 1000)
+@pytest.mark.parametrize("count", [100, pytest.param(1000, marks=pytest.mark.slow)])
 def test_mutated_scene_files_are_read_or_refused(count, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     dice, model = random.Random(count), zoo.model("ground")
     assert scene_fuzz.faults(SCENES, count, dice, tmp_path, model) == []
-
-
-def test_an_unusual_number_in_a_scene_is_no_fault(tmp_path, monkeypatch):
-    """Warnings are errors here, as in the stress test."""
-    path, standing = tmp_path / "bent.toml", zoo.model("feet_tail")
-    text = (ROOT / "scenes" / "kick.toml").read_text(encoding="utf-8")
-    assert "\nheight = " in text
-    path.write_text(text.replace("\nheight = ", "\nbends = 11.6\nheight = "), encoding="utf-8")
-    monkeypatch.chdir(tmp_path)
-    with pytest.warns(st.UnusualSize, match="bends"):
-        scene_fuzz.made_ready(standing, path)
-    monkeypatch.setattr(scene_fuzz, "mutated", lambda text, dice: text)
-    assert scene_fuzz.faults([path], 1, random.Random(1), tmp_path, standing) == []
-
-
-def test_a_figure_beyond_its_limit_fails_and_plots_are_drawn(tmp_path):
-    for found, passed in [(1.0, True), (1.1, False), (np.nan, False), (np.inf, False)]:
-        with row(found):
-            figure = Figure("it", found, 1.0)
-            assert figure.passed == figure.row()["passed"] == passed
-            assert ("**FAILED**" in table([figure])) != passed
-    found = [Errors(1e-16, 0.0, 1e-15, condition) for condition in (3.0, 1e4)]
-    swept = [Point(tail, bend, found[bend]) for tail in ("one", "two") for bend in (0, 1)]
-    figures = [Figure("v_dot", 1e-16, 5e-15, "cond(H) 1e4"), Figure("faults", 0, 0)]
-    stress_plots.draw({"Part": figures}, swept, tmp_path)
-    names = sorted(path.name for path in tmp_path.iterdir())
-    assert names == ["bends.png", "condition.png", "margins.png"]
 
 
 @pytest.mark.parametrize("one_arc", [False, pytest.param(True, marks=pytest.mark.slow)])
@@ -109,33 +57,34 @@ UNLIKE = {
 def test_bodies_of_unlike_size_are_told():
     lying = zoo.model("ground_arcs")
     for name, change in UNLIKE.items():
-        with row(name):
-            with pytest.warns(st.UnlikeBodies, match=r"factor of .*: H may be off"):
-                other = lying.with_parameters(**change)
-            with pytest.warns(st.UnlikeBodies):
-                st.load(lying.folder, parameters=change)
-            assert other.parameters["tail_mass"] == lying.parameters["tail_mass"]
+        with row(name), pytest.warns(st.UnlikeBodies, match=r"factor of .*: H may be off"):
+            lying.with_parameters(**change)
+        with row(name), pytest.warns(st.UnlikeBodies):
+            st.load(lying.folder, parameters=change)
+
+
+def error_of_mass_matrix(of, rng, bends):
+    """Error of H against 30 digits, in units of its diagonal."""
+    q, *_ = state(of, rng, bends)
+    return mass_matrix_error(of.model.mass_matrix(q), exact_of(of.model).mass_matrix(q))
 
 
 @pytest.mark.slow
 def test_the_warning_is_true():
     """It comes where H is off by more than 1e-12, and an error is never more than it says."""
-    off, lying = {}, zoo.model("ground_arcs")
-    for name, change in UNLIKE.items():
+    lying, worst = zoo.model("ground_arcs"), 0.0
+    for change in UNLIKE.values():
         of = changed(Subject("", lying, None), **change)
-        straight = [
-            errors_of_mass_matrix(of, state(of, np.random.default_rng(k), np.zeros(4))[0])
-            for k in range(5)
-        ]
-        off[name] = max(straight) / disparity(of.model.parameters)
-    assert max(off.values()) < np.finfo(float).eps
-    worst = max(off, key=lambda name: off[name] * disparity(lying.parameters | UNLIKE[name]))
-    assert off[worst] * disparity(lying.parameters | UNLIKE[worst]) > 1e-12
+        dice = map(np.random.default_rng, range(5))
+        error = max(error_of_mass_matrix(of, rng, np.zeros(4)) for rng in dice)
+        assert error < np.finfo(float).eps * disparity(of.model.parameters)
+        worst = max(worst, error)
+    assert worst > 1e-12
 
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::serpentail.errors.UnusualSize")
-@pytest.mark.parametrize("name", KINDS.values())
+@pytest.mark.parametrize("name", ["feet_tail", "ground_arcs"])
 def test_bodies_without_the_warning_keep_their_digits(name):
     """Random bodies as unlike as may be without it."""
     of, rng, quiet = Subject("", zoo.model(name), None), np.random.default_rng(4), 0
@@ -146,23 +95,7 @@ def test_bodies_without_the_warning_keep_their_digits(name):
         if 1e2 < disparity(of.model.parameters | change) < UNLIKE_FROM:
             other, quiet = Subject("", of.model.with_parameters(**change), None), quiet + 1
             for bends in (np.zeros(of.model.nv - 6), rng.uniform(-1, 1, of.model.nv - 6)):
-                assert errors_of_mass_matrix(other, state(other, rng, bends)[0]) < 1e-12
-
-
-def errors_of_mass_matrix(of, q):
-    """Error of H against 30 digits, in units of its diagonal."""
-    return mass_matrix_error(of.model.mass_matrix(q), exact_of(of.model).mass_matrix(q))
-
-
-def test_coiled_tails_keep_the_limits_of_their_compiler():
-    """Without optimisation the error of H is twice that of fused operations."""
-    model, rng = zoo.model("arcs3"), np.random.default_rng(2)
-    of = Subject("arcs", model, exact_of(model))
-    coiled = {name: bends for name, bends in poses.folds(of).items() if "coiled" in name}
-    assert len(coiled) == 2
-    for name, bends in coiled.items():
-        figures = judged(of, name, [errors(of, *state(of, rng, bends))])
-        assert all(figure.passed for figure in figures), figures
+                assert error_of_mass_matrix(other, rng, bends) < 1e-12
 
 
 def test_vjp_of_a_model_with_contacts_is_that_of_flight():

@@ -1,87 +1,149 @@
-"""Studies and the example that learns: their models, figures and tables, of made-up rows."""
+"""Studies and examples: parts that are made once, whatever happens, and the gallery."""
+
+import ast
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
-from scipy.spatial.transform import Rotation
+from filelock import FileLock
 
 import serpentail as st
-from examples import learning
-from examples.studies import morphology_study as study
-from examples.studies.righting_figures import draw_rates
-from examples.studies.righting_kinds import WAYS, is_true, table
-from tests.support import zoo
+from examples.studies.parts import Part, as_flight, as_lists, digest, made
+from tests.support import tiny_study, zoo
+from tests.support.rows import row
+
+ROOT = Path(__file__).parents[2]
+PATIENCE = 60  # s
 
 
-@pytest.mark.parametrize("taper", [0.1, 1.0])
-def test_links_of_a_cone_are_those_of_its_integrals(taper):
-    length, mass = 0.15, 0.004
-    links = study.cone(length, mass, taper)
-    base = np.sqrt(mass / (study.DENSITY * np.pi * length * (1 + taper + taper**2) / 3))
-
-    def radius(s):
-        return base * (1 - (1 - taper) * s / length)
-
-    assert links["link_masses"].sum() == pytest.approx(mass, rel=1e-12)
-    for k in range(study.LINKS):
-        ends = k * length / study.LINKS, (k + 1) * length / study.LINKS
-
-        def whole(f, ends=ends):
-            return quad(lambda s: study.DENSITY * np.pi * f(s), *ends, epsabs=0, epsrel=1e-12)[0]
-
-        own = whole(lambda s: radius(s) ** 2)
-        center = whole(lambda s: radius(s) ** 2 * s) / own
-        # of a disc of radius r about its axis r^2 / 2, about a diameter r^2 / 4, for each kilogram
-        axial = whole(lambda s: radius(s) ** 4 / 2)
-        across = whole(lambda s, c=center: radius(s) ** 2 * (radius(s) ** 2 / 4 + (s - c) ** 2))
-        assert links["link_masses"][k] == pytest.approx(own, rel=1e-10)
-        assert links["link_centers"][k] == pytest.approx(center - ends[0], rel=1e-8)
-        found = links["link_inertias"][3 * k : 3 * k + 3]
-        np.testing.assert_allclose(found, [across, axial, across], rtol=1e-9)
+def one(folder, of, make, files=()):
+    """The result of a part called "one"."""
+    return made("study", folder, {"one": Part(make, of, files)})["one"]
 
 
-def test_tails_of_all_numbers_of_segments_take_the_links():
-    links = study.cone(0.2, 0.005, 0.4)
-    shape = {"tail": "articulated", "segments": 2, "links": study.LINKS // 2}
-    model = st.build(**shape, taper=study.TAPERED, functions=["mass_matrix"], compiled=False)
-    own = model.with_parameters(**links).parameters
-    assert own["tail_mass"] == pytest.approx(0.005) and own["tail_length"] == pytest.approx(0.2)
-    model_point = {"yaw": 0.1, "pitch": 2.0, "roll": -0.2, "pitch_rate": 12.0}
-    q, v = study.start(model, model_point | {"other_rates": [1.0, -2.0]})
-    turns = ([0, 0, 0.1], [2.0, 0, 0], [0, -0.2, 0])  # R = Rz(yaw) Rx(pitch) Ry(roll)
-    z, x, y = (Rotation.from_rotvec(turn).as_matrix() for turn in turns)
-    np.testing.assert_allclose(st.rotation_matrix(q[3:7]), z @ x @ y, atol=1e-12)
-    np.testing.assert_array_equal(v[3:6], [12.0, 1.0, -2.0])
+def ended(folder):
+    """How often each part ended."""
+    path = folder / "ended"
+    lines = path.read_text().splitlines() if path.exists() else []
+    return Counter(int(line.split()[0]) for line in lines)
 
 
-def solved(cpu_s, converged=True, error=1e-3):
-    return {"cpu_s": cpu_s, "converged": converged, "open_loop_attitude_error_deg": error}
+def test_parts_are_made_once_and_again_where_inputs_change_or_files_are_gone(tmp_path):
+    make, picture = partial(tiny_study.square, 3, tmp_path), tmp_path / "picture.png"
+    for starts, gone, count in [(2, False, 1), (2, False, 1), (3, False, 2), (3, True, 3)]:
+        if gone:
+            picture.unlink()
+        found = one(tmp_path / "parts", {"starts": (1, starts)}, make, (picture,))
+        assert found == {"number": 3, "square": 9, "third": 1.0} and ended(tmp_path) == {3: count}
+        picture.touch()
+    flight = st.simulate(zoo.model("m1_n1"), [0, 0, 0, 1, 0, 0, 0, 0, 0], np.ones(8), t_span=0.01)
+    again = as_flight(as_lists(flight))
+    for name in as_lists(flight):
+        np.testing.assert_array_equal(getattr(again, name), getattr(flight, name))
 
 
-FAILED = solved(5.0, converged=False, error=np.nan)
+def test_a_part_that_fails_is_told_and_none_is_made_while_another_process_writes(tmp_path):
+    with pytest.raises(st.SerpentailError, match="one: ZeroDivisionError: no such part"):
+        one(tmp_path, {}, tiny_study.wrong)
+    assert tiny_study.titles(tmp_path / "study.db") == []
+    lock = FileLock(tmp_path / ".study.db.lock")
+    with lock, pytest.raises(st.SerpentailError, match="another process is writing"):
+        one(tmp_path, {}, tiny_study.ones)
+    assert np.isnan(one(tmp_path, {}, tiny_study.lost)["lost"])  # JSON has no NaN of its own
 
 
-def test_a_plan_is_true_if_it_converged_and_ends_where_it_should():
-    assert is_true(solved(1.0)) and not is_true(solved(1.0, error=0.011))
-    assert not is_true(solved(1.0, converged=False)) and not is_true(FAILED)
+def started(folder):
+    """Start the tiny study in a process; one of its parts has begun, when another ends."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "tests.support.tiny_study", str(folder)],
+        cwd=ROOT,
+        env=os.environ | {"SERPENTAIL_THREADS": "1"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
 
 
-def test_rates_are_drawn_for_each_kind_however_few_have_a_plan(tmp_path):
-    few = {"IPOPT": [solved(0.2), solved(0.1), solved(0.4, error=3.0), solved(0.3)]}
-    few |= {"FATROP": [solved(0.1)] * 4, "paper": [solved(1.0, error=2.0)] * 4}
-    rates = {"several": few, "none": {way: [FAILED] for way in WAYS}}
-    _, (shares, times, errors) = draw_rates(rates, tmp_path / "rates.png")
-    found = [line.get_xdata().tolist() for line in shares.get_lines()]
-    assert found == [[75, 0], [100, 0], [0, 0]]
-    np.testing.assert_allclose(times.get_lines()[0].get_xdata(), [0.25, 5.0])
-    np.testing.assert_allclose(errors.get_lines()[2].get_xdata(), [2.0, np.nan])
-    several, none = table(rates)[2:]
-    assert several.startswith("| several | 4 | 3 | 0.25, 0.39 | ") and "nan" in none
+@pytest.mark.parametrize("whole", [True, pytest.param(False, marks=pytest.mark.slow)])
+def test_ctrl_c_ends_all_in_one_line_and_the_same_command_goes_on(tmp_path, whole):
+    """From a terminal all processes hear it, from another program the parent alone."""
+    store, process = tmp_path / "parts" / "tiny.db", started(tmp_path)
+    while not tiny_study.titles(store):
+        time.sleep(0.02)
+    (os.killpg if whole else os.kill)(process.pid, signal.SIGINT)
+    printed, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130 and printed == ""
+    *told, last = errors.splitlines()
+    assert last == "interrupted: the same command goes on from here"
+    assert [line for line in told if not line.startswith("sweep")] == []
+    counts, kept = ended(tmp_path), [int(title.split()[1]) for title in tiny_study.titles(store)]
+    printed, _ = started(tmp_path).communicate(timeout=PATIENCE)
+    parts = range(tiny_study.PARTS)
+    results = [(f"part {k}", {"number": k, "square": k**2, "third": k / 3}) for k in parts]
+    assert printed == f"{results}\n"
+    assert all(ended(tmp_path)[k] == counts[k] for k in kept) and {*ended(tmp_path)} == {*parts}
+
+
+def test_digests_follow_the_sources(tmp_path):
+    found = []
+    for name, text in [("a.py", "1"), ("notes.md", "words"), ("a.py", "2"), ("native.c", "int x;")]:
+        (tmp_path / name).write_text(text)
+        found.append(digest(tmp_path))
+    assert found[0] == found[1] and len(set(found)) == 3
+
+
+# The gallery.
+
+SCRIPTS = {path.stem: path for path in sorted((ROOT / "examples/gallery").glob("*.py"))}
+MOST = 60  # lines must be fewer: all that are not blank, of code, text and comments together
+FREE = {"matplotlib.pyplot", "numpy", "pathlib", "serpentail", "subprocess", "tempfile"}
+EXTRAS = {"casadi": "plan", "jax": "jax", "jax.numpy": "jax"}
+OF_NAMES = {"plan": "plan", "Mpc": "plan", "environments": "gym", "jax_functions": "jax"}
+# What scripts print where their story is true: `make docs` runs all, and looks at no numbers.
+SAID = {
+    "plot_03_sequence": "landed on its feet: True",
+    "plot_06_mpc": r"(?s)PFL: tilted by \d\d.* deg.*MPC: tilted by [01]\.\d deg",
+    "plot_12_sweep": "121 of 121 points done, 0 of them failed",
+}
+
+
+def test_scripts_of_the_gallery_are_short_of_public_names_and_tell_their_extras():
+    assert len(SCRIPTS) >= 12
+    for name, path in SCRIPTS.items():
+        text = path.read_text(encoding="utf-8")
+        tree = ast.parse(text)
+        nodes = list(ast.walk(tree))
+        modules = {alias.name for n in nodes if isinstance(n, ast.Import) for alias in n.names}
+        modules |= {n.module or "." for n in nodes if isinstance(n, ast.ImportFrom)}
+        attributes = [n for n in nodes if isinstance(n, ast.Attribute)]
+        names = {n.attr for n in attributes if isinstance(n.value, ast.Name) and n.value.id == "st"}
+        needed = {EXTRAS[name] for name in modules & EXTRAS.keys()}
+        needed |= {OF_NAMES[name] for name in names & OF_NAMES.keys()}
+        told = " ".join(ast.get_docstring(tree).split())
+        with row(name):
+            assert sum(bool(line.strip()) for line in text.splitlines()) < MOST
+            assert modules <= FREE | EXTRAS.keys() and names <= {*st.__all__}
+            assert not [n.attr for n in attributes if n.attr.startswith("_")]
+            assert [x for x in needed if f'"serpentail[{x}]"' not in told] == []
 
 
 @pytest.mark.slow
-def test_a_policy_learns_to_right_the_rat(capsys):
-    worlds = st.environments(zoo.model("m1_n3"), "righting", 512, step=2e-3, substeps=3)
-    _, tilts = learning.learn(worlds, rounds=60)
-    assert np.mean(tilts[:10]) > 35 and np.mean(tilts[-10:]) < 0.8 * np.mean(tilts[:10])
-    assert "round  60: the backs are tilted by" in capsys.readouterr().out
+@pytest.mark.parametrize("name", SAID)
+def test_a_script_of_the_gallery_runs_anywhere_and_is_true(name, tmp_path):
+    (tmp_path / "here").mkdir()
+    own = os.environ | {"MPLBACKEND": "agg", "TMPDIR": str(tmp_path)}
+    command = [sys.executable, "-P", "-W", "ignore:FigureCanvasAgg", SCRIPTS[name]]
+    done = subprocess.run(
+        command, cwd=tmp_path / "here", env=own, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "") and re.search(SAID[name], done.stdout)
+    assert list((tmp_path / "here").iterdir()) == []

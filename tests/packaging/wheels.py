@@ -1,17 +1,29 @@
-"""Builds the sdist, of it the wheel, and uses that as strangers do, for each Python here."""
+"""Builds the sdist, of it the wheel, tells what that lacks or has too much, and uses it as
+strangers do, for each Python here.
+"""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+import zipfile
+from collections.abc import Sequence
+from email import message_from_bytes
 from pathlib import Path
 
 from examples import front
-from tests.packaging.contents import ROOT, faults
 
+ROOT = Path(__file__).parents[2]
+PAGE = "serpentail/viewer/page.html"
+PARTS = {  # where the sources of a wheel's folders are, and which files of them it has
+    "serpentail_codegen": (ROOT / "codegen" / "serpentail_codegen", ("*.py", "*.jinja", "*.typed")),
+    "serpentail": (ROOT / "runtime" / "serpentail", ("*.py", "*.[ch]", "*.cc", "*.typed")),
+    "serpentail/examples": (ROOT / "scenes", ("*.toml",)),
+}
+LICENCES = ("MIT License", "three.js authors", "Leon Sorokin")  # ours, and of the page's libraries
 VERSIONS = ("3.11", "3.12", "3.13")
 PATIENCE_S = 300.0
 PROGRAM = """
@@ -60,6 +72,31 @@ def main(folder: Path) -> int:
     return 1 if tell_all else 0
 
 
+def faults(wheel: Path, page: bool) -> list[str]:
+    """Return what is wrong with a wheel, a line each; page: whether it should have the page."""
+    with zipfile.ZipFile(wheel) as archive:
+        names = set(archive.namelist())
+        (metadata,) = (name for name in names if name.endswith(".dist-info/METADATA"))
+        text = message_from_bytes(archive.read(metadata)).get_payload()
+        licences = [archive.read(name).decode() for name in names if name.endswith("/LICENSE")]
+        licences += [archive.read(PAGE).decode()] if PAGE in names else []
+    wanted = {PAGE} if page else set()
+    for place, (folder, patterns) in PARTS.items():
+        found = (path for pattern in patterns for path in folder.rglob(pattern))
+        wanted |= {f"{place}/{path.relative_to(folder).as_posix()}" for path in found}
+    told = [f"lacks {name}" for name in sorted(wanted - names)]
+    own = re.compile(r"serpentail-[^/]*\.dist-info/")  # of the package, though no source
+    told += [f"has {n}" for n in sorted(names - wanted) if n != PAGE and not own.match(n)]
+    told += [f"its text has a relative link: {link}" for link in relative_links(text)]
+    of_wheel = LICENCES if page else LICENCES[:1]
+    return told + [f"lacks a licence: {x}" for x in of_wheel if x not in "".join(licences)]
+
+
+def relative_links(text: str) -> list[str]:
+    """Return the targets of pictures and links that lead nowhere outside a checkout."""
+    return [target for target in re.findall(r"\]\(([^)\s]+)\)", text) if "://" not in target]
+
+
 def build(folder: Path) -> Path:
     """Return the wheel of the sdist of the checkout, both of which twine accepts."""
     shutil.rmtree(folder, ignore_errors=True)
@@ -73,27 +110,20 @@ def build(folder: Path) -> Path:
 
 def interpreter(version: str) -> str | None:
     """Return a Python of a version that can make environments: of PATH, pyenv or uv."""
+    candidates = [shutil.which(f"python{version}")]
+    if "PYENV_ROOT" in os.environ:
+        found = Path(os.environ["PYENV_ROOT"]).glob(f"versions/{version}.*/bin/python")
+        candidates += map(str, sorted(found))
+    if UV:
+        command = [UV, "python", "find", "--no-python-downloads", version]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        candidates.append(done.stdout.strip())
     question = "import ensurepip, sys; print('%d.%d' % sys.version_info[:2])"
-    for candidate in candidates(version):
+    for candidate in filter(None, candidates):
         done = subprocess.run([candidate, "-c", question], capture_output=True, check=False)
         if done.stdout.decode().strip() == version:
             return candidate
     return None
-
-
-def candidates(version: str) -> Iterator[str]:
-    """Yield programs that may be a Python of a version."""
-    on_path = shutil.which(f"python{version}")
-    if on_path:
-        yield on_path
-    if "PYENV_ROOT" in os.environ:
-        found = Path(os.environ["PYENV_ROOT"]).glob(f"versions/{version}.*/bin/python")
-        yield from map(str, sorted(found))
-    if UV:
-        command = [UV, "python", "find", "--no-python-downloads", version]
-        done = subprocess.run(command, capture_output=True, check=False)
-        if done.returncode == 0:
-            yield done.stdout.decode().strip()
 
 
 def tried(wheel: Path, python: str, home: Path, cache: Path) -> list[str]:
@@ -122,19 +152,10 @@ def tried(wheel: Path, python: str, home: Path, cache: Path) -> list[str]:
     return told + [f"{name}: was not written" for name in MADE if not (empty / name).exists()]
 
 
-def run(
-    words: Sequence[str | Path], folder: Path, own: dict[str, str] | None = None
-) -> subprocess.CompletedProcess[str]:
+def run(words: Sequence[str | Path], folder: Path, own: dict | None = None):
     """Return the finished command; without an environment of its own it must succeed."""
-    return subprocess.run(
-        words,
-        cwd=folder,
-        env=own,
-        capture_output=own is not None,
-        text=True,
-        check=own is None,
-        timeout=PATIENCE_S,
-    )
+    told = {"capture_output": own is not None, "text": True, "timeout": PATIENCE_S}
+    return subprocess.run(words, cwd=folder, env=own, check=own is None, **told)
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
-"""Ctrl-C: each thing that takes long ends within a second, in one line from the command line, with
-what is finished kept and nothing else left behind.
+"""Ctrl-C: what takes long ends within a second, in one line from the command line, and keeps what
+is finished; nothing else is left behind.
 """
 
 import json
@@ -16,17 +16,17 @@ import pytest
 
 import serpentail as st
 from tests.support import zoo
-from tests.support.tiny_study import titles
 from tests.support.told import besides_progress
 
 PROMPT = 1.0  # s
 AFTER = (0.3, 1.0, 3.0)  # s of work; one try must be prompt: other work may hold up a process
 PATIENCE = 60.0  # s to begin, and to end at the latest
+# a shell's background may not hear Ctrl-C
 HEAR = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
 # does what each line of stdin tells until Ctrl-C, and tells what is kept
 SERVES = """
 import sys, time, numpy as np, scipy.integrate, serpentail as st
-from tests.processes.jobs import start
+from tests.processes.elsewhere import start
 say = lambda *words: print(*words, flush=True)
 model = st.load(sys.argv[1], threads=int(sys.argv[2]))
 q, v = start(model)
@@ -53,34 +53,27 @@ LONG = {
 }
 
 
-def child(program, *arguments, **settings) -> subprocess.Popen:
-    """Start a program of Python; it hears Ctrl-C, though a shell's background may not."""
-    return subprocess.Popen(
-        [sys.executable, "-c", HEAR + program, *map(str, arguments)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-        **settings,
-    )
+@pytest.fixture
+def child():
+    """Return a function that starts a program of Python, which does not outlive its test."""
+    begun = []
 
+    def started(program, *arguments, **settings):
+        command = [sys.executable, "-c", HEAR + program, *map(str, arguments)]
+        pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
+        settings |= {"text": True, "start_new_session": True}
+        begun.append(subprocess.Popen(command, **pipes, **settings))
+        return begun[-1]
 
-def ended(process, after: float) -> tuple[str, str, float]:
-    """Return stdout, stderr of a process, and when it was sent Ctrl-C (s)."""
-    time.sleep(after)
-    asked = time.monotonic()
-    process.send_signal(signal.SIGINT)
-    try:
-        return *process.communicate(timeout=PATIENCE), asked
-    finally:
+    yield started
+    for process in begun:
         with suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
         process.wait()
 
 
 @pytest.mark.parametrize("threads", [1, pytest.param(2, marks=pytest.mark.slow)])
-def test_what_takes_long_ends_and_keeps_what_there_is(threads):
+def test_what_takes_long_ends_and_keeps_what_there_is(child, threads):
     process = child(SERVES, zoo.model("m1_n3").folder, threads)
     for call, told in LONG.items():
         expected, found = [] if told is None else ["True", "True"], []
@@ -101,12 +94,12 @@ def test_what_takes_long_ends_and_keeps_what_there_is(threads):
     assert (process.returncode, said, errors) == (0, "", "")
 
 
-# The command line.
-
-COMMAND = (
-    "import sys; from serpentail.cli import main; print('ready', file=sys.stderr, flush=True); "
-)
-COMMAND += "sys.exit(main(sys.argv[1:]))"
+COMMAND = """
+import sys
+from serpentail.cli import main
+print("ready", file=sys.stderr, flush=True)
+sys.exit(main(sys.argv[1:]))
+"""
 SCENE = """
 name = "m1_n3"
 kind = "articulated"
@@ -133,14 +126,16 @@ v = [0, -0.3, 2.4, 1, 2, 1, 0, 0]
 
 
 @pytest.mark.parametrize("verb", ["simulate", "plan"])
-def test_a_command_ends_in_one_line_and_writes_what_there_is(tmp_path, verb):
+def test_a_command_ends_in_one_line_and_writes_what_there_is(child, tmp_path, verb):
     scene, saved = tmp_path / "scene.toml", tmp_path / "motion.npz"
     scene.write_text(SCENE)
     folder = zoo.model("m1_n3").folder
     process = child(COMMAND, verb, scene, "--folder", folder, "--json", "-", "--save", saved)
     while not process.stderr.readline().startswith(verb):  # it tells of itself after a second
         assert process.poll() is None
-    said, errors, _ = ended(process, after=0.5)
+    time.sleep(0.5)
+    process.send_signal(signal.SIGINT)
+    said, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
     assert besides_progress(errors) == "serpentail: interrupted; this is the result until then\n"
     assert json.loads(said)["stopped"] == "interrupt"
@@ -157,7 +152,7 @@ exec cc "$@"
 
 
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, -15)])
-def test_a_compile_leaves_no_compiler_and_no_half_file(tmp_path, number, status):
+def test_a_compile_leaves_no_compiler_and_no_half_file(child, tmp_path, number, status):
     folder = zoo.folder("bare")
     compiler, pids, cache = tmp_path / "cc", tmp_path / "pids", tmp_path / "cache"
     compiler.write_text(SLOW_CC.format(pids=pids))
@@ -199,30 +194,3 @@ def alive(pid: int) -> bool:
     with suppress(OSError):
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     return False
-
-
-# Studies.
-
-STUDY = """
-import sys
-from pathlib import Path
-from examples.front import GOES_ON, run
-from examples.studies.parts import made
-from tests.support.tiny_study import plans_without_end
-
-def main(folder):
-    made("study", folder, plans_without_end(folder))
-
-run(main, Path(sys.argv[1]), after=GOES_ON)
-"""
-
-
-@pytest.mark.slow
-def test_a_study_keeps_its_parts_and_no_plan_that_was_stopped(tmp_path):
-    process = child(STUDY, tmp_path, env=os.environ | {"SERPENTAIL_THREADS": "1"})
-    until((tmp_path / "ready").exists)
-    _, errors, _ = ended(process, after=1.0)
-    assert process.returncode == 130
-    assert errors.splitlines()[-1] == "interrupted: the same command goes on from here"
-    assert "Traceback" not in errors
-    assert titles(tmp_path / "study.db") == ["first"]

@@ -1,7 +1,12 @@
-"""Batches, runs, CasADi's functions and plans give the same digits in children, pools, threads."""
+"""Elsewhere all is the same: in children, pools and threads, of which there are as many as asked,
+as the environment says, as machine and container allow; and on systems without what POSIX has.
+"""
 
 import json
+import math
 import os
+import pickle
+import re
 import signal
 import subprocess
 import sys
@@ -9,11 +14,12 @@ from contextlib import suppress
 
 import pytest
 
+import serpentail as st
+from serpentail.model import cores, workers
 from tests.support import zoo
+from tests.support.rows import row
 
-from .forks import MOMENTS
-from .jobs import JOBS
-from .ways import WAYS
+from .elsewhere import JOBS, MOMENTS, WAYS, start, starts
 
 LIMIT = 500.0  # s, then all processes of a test are killed
 QUICK = ("fork", "threads", "at rest", "beside rollouts", "beside the compiler")
@@ -25,7 +31,7 @@ BESIDE = [name for name in MOMENTS if name.startswith("beside")]  # where chance
 )
 def test_every_job_is_the_same_elsewhere(ways):
     zoo.model("m1_n3")  # compiled
-    command = [sys.executable, "-m", "tests.processes.ways", zoo.folder("m1_n3"), *ways]
+    command = [sys.executable, "-m", "tests.processes.elsewhere", zoo.folder("m1_n3"), *ways]
     environment = os.environ | {"SERPENTAIL_THREADS": "2"}  # in workers of pools, too
     running = subprocess.Popen(
         command, env=environment, stdout=subprocess.PIPE, text=True, start_new_session=True
@@ -42,3 +48,199 @@ def test_every_job_is_the_same_elsewhere(ways):
         way: dict.fromkeys(JOBS, ["same"] if way in MOMENTS else ["same", "same"]) for way in ways
     }
     assert found == [{way: expected[way]} for way in ways]
+
+
+# How many threads a process uses.
+
+V1, V2 = "4:cpu,cpuacct:{}\n0::/\n", "0::{}\n"
+
+
+def tree(root, group, files, lines):
+    """A root of a file system with control groups, of which the process is in one."""
+    (root / "proc/self").mkdir(parents=True)
+    (root / "proc/self/cgroup").write_text(lines.format(group))
+    for name, text in files.items():
+        path = root / "sys/fs/cgroup" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    return root
+
+
+def v1(quota, period, at="cpu,cpuacct/"):
+    """The files of the first version of control groups."""
+    return {f"{at}cpu.cfs_quota_us": quota, f"{at}cpu.cfs_period_us": period}
+
+
+POD = "cpu,cpuacct/pod/"
+LIMITS = [
+    ("2, its own", V2, "/pod/job", {"pod/job/cpu.max": "250000 100000\n"}, 2.5),
+    ("2, a parent's", V2, "/pod/job", {"pod/job/cpu.max": "max 1\n", "pod/cpu.max": "3 2\n"}, 1.5),
+    ("2, the least", V2, "/pod/job", {"pod/job/cpu.max": "5 10", "pod/cpu.max": "80 10"}, 0.5),
+    ("2, a container's root", V2, "/", {"cpu.max": "300000 100000\n"}, 3.0),
+    ("2, the host's path in a container", V2, "/docker/abc", {"cpu.max": "30 10\n"}, 3.0),
+    ("2, none", V2, "/pod", {"pod/cpu.max": "max 100000\n"}, math.inf),
+    ("2, no files", V2, "/pod", {}, math.inf),
+    ("2, damaged", V2, "/pod", {"pod/cpu.max": "\x00 -3 many\n"}, math.inf),
+    ("2, nothing granted", V2, "/pod", {"pod/cpu.max": "0 100000\n"}, math.inf),
+    ("1, its own", V1, "/pod", v1("40000", "10000", POD), 4.0),
+    ("1, a parent's", V1, "/pod/job", v1("-1\n", "9\n", f"{POD}job/") | v1("9\n", "2\n", POD), 4.5),
+    ("1, mounted as cpu", V1, "/", v1("60000", "30000", "cpu/"), 2.0),
+]
+
+
+def test_quotas_of_control_groups_are_found(tmp_path):
+    for case, lines, group, files, expected in LIMITS:
+        with row(case):
+            assert cores.quota(tree(tmp_path / case, group, files, lines)) == expected
+    assert cores.quota(tmp_path) == math.inf
+
+
+def test_an_argument_comes_before_the_environment_and_that_before_the_machine(monkeypatch):
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(6)), raising=False)
+    monkeypatch.delenv("SERPENTAIL_THREADS", raising=False)
+    for quota, expected in ((math.inf, 6), (0.2, 1), (9.0, 6), (2.1, 3)):
+        monkeypatch.setattr(cores, "_own_quota", lambda quota=quota: quota)
+        assert cores.threads() == expected, quota
+    for chosen, expected in ((" 2 ", 2), ("", 3)):
+        monkeypatch.setenv("SERPENTAIL_THREADS", chosen)
+        assert (cores.threads(), cores.threads(4)) == (expected, 4)
+
+
+WORKERS = """
+import json, multiprocessing, sys
+from concurrent.futures import ProcessPoolExecutor
+import joblib
+from serpentail.model.cores import threads
+if __name__ == "__main__":
+    found = [threads()]
+    with multiprocessing.get_context("fork").Pool(1) as pool:
+        found.append(pool.apply(threads))
+    if sys.argv[1:]:
+        with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+            found.append(pool.submit(threads).result(60))
+        found += joblib.Parallel(2, timeout=60)([joblib.delayed(threads)()])
+    print(json.dumps(found))
+"""
+
+
+def test_workers_of_process_pools_use_one_thread():
+    """Unless the environment says how many."""
+    for chosen, more, expected in (("", ["spawn"], [cores.cores(), 1, 1, 1]), ("3", [], [3, 3])):
+        command = [sys.executable, "-c", WORKERS, *more]
+        environment = os.environ | {"SERPENTAIL_THREADS": chosen}
+        done = subprocess.run(
+            command, env=environment, capture_output=True, text=True, timeout=100, check=True
+        )
+        assert json.loads(done.stdout) == expected
+
+
+@pytest.fixture
+def crews(monkeypatch):
+    """Sizes of the pools that batches were shared among."""
+    found, pool = [], workers.pool
+    monkeypatch.setattr(workers, "pool", lambda size: found.append(size) or pool(size))
+    return found
+
+
+def test_a_model_and_runs_keep_to_their_threads_and_digits(crews):
+    models = [st.load(zoo.folder("m1_n3"), threads=k) for k in (1, 2, 3)]
+    q, v = starts(models[0], 5001)
+    found = [model.forward_dynamics(q, v, [0.0, 0.0]) for model in models]
+    assert crews == [2, 2, 3, 3, 3]
+    assert found[0].tobytes() == found[1].tobytes() == found[2].tobytes()
+    crews.clear()
+    for twin in (pickle.loads(pickle.dumps(models[1])), models[1].with_parameters(tail_mass=0.01)):
+        twin.mass_matrix(q)
+    assert crews == [2, 2, 2, 2]
+    runs = {"q0": q[:8], "v0": v[:8], "t_span": 0.01}
+    found = [st.simulate(models[2], threads=k, **runs) for k in (None, 1, 2, 50)]
+    assert [each.info["threads"] for each in found] == [3, 1, 2, 8]
+
+
+def test_a_number_of_threads_that_is_none_is_refused(monkeypatch):
+    model = zoo.model("m1_n3")
+    q, v = starts(model, 2000)
+    for value in (0, -1, 2.0, "4", True, 1025, [2]):
+        words = rf"threads: value .*{re.escape(str(value))}.* 1 to 1024"
+        with row(value):
+            with pytest.raises(st.ModelError, match=words):
+                st.load(model.folder, threads=value)
+            with pytest.raises(st.SimulationError, match=words):
+                st.simulate(model, q[:2], v[:2], threads=value)
+    st.load(model.folder, threads=1024, compiled=False)
+    for value in ("0", "-2", "many", "2.5", "1e2", "1025"):
+        monkeypatch.setenv("SERPENTAIL_THREADS", value)
+        with row(value), pytest.raises(st.SerpentailError, match=f"SERPENTAIL_THREADS.*{value}"):
+            model.mass_matrix(q)
+    with pytest.raises(st.SimulationError, match="threads: value 2"):
+        st.simulate(model, *start(model), threads=2)
+
+
+# Systems.
+
+# This system takes the part of another one, from which these names are gone before serpentail is
+# imported.
+SYSTEMS = {
+    "windows": """
+import os
+import filelock, numpy  # which know by other signs where they are
+filelock.FileLock = filelock.SoftFileLock
+for name in ("geteuid", "killpg", "uname", "confstr", "register_at_fork", "sched_getaffinity",
+             "O_CLOEXEC", "O_DIRECTORY", "O_NONBLOCK"):
+    delattr(os, name)
+os.supports_dir_fd.clear()
+""",
+    "macos": """
+import os
+del os.sched_getaffinity
+""",
+}
+PROGRAM = """
+import json, os, sys, time
+from pathlib import Path
+import serpentail as st
+from serpentail.model import toolchain
+from serpentail.model.bound import contents, empty
+from serpentail.model.cache import cache_folder
+from serpentail.model.commands import run_all
+told = {}
+
+def stop():
+    raise KeyboardInterrupt
+
+folder, *places = sys.argv[1:]
+for _ in range(2):
+    model = st.load(folder)
+told["z"] = round(st.simulate(model, [0, 0, 0, 1, 0, 0, 0, 0, 0], [0] * 8, t_span=0.1).q[-1, 2], 6)
+held = contents(cache_folder(None))
+empty(cache_folder(None))
+told["cache"] = [held["libraries"], held["models"], contents(cache_folder(None))["libraries"]]
+told["refused"] = []
+for place in places:
+    try:
+        st.load(place)
+    except st.ModelError as error:
+        told["refused"].append("manifest.json" in str(error) and place in str(error))
+begun = time.monotonic()
+try:
+    run_all([[sys.executable, "-c", "import time; time.sleep(60)"]], os.environ, stop)
+except KeyboardInterrupt:
+    told["ended"] = time.monotonic() - begun < 30
+Path.read_text = lambda *_, **__: open("/no/such/file")
+told["named"] = bool(toolchain._processor())
+print(json.dumps(told))
+"""
+
+
+def test_a_model_is_loaded_compiled_run_and_refused_and_a_command_is_ended(tmp_path):
+    (tmp_path / "file").touch()
+    (tmp_path / "empty").mkdir()
+    places = [tmp_path / name for name in ("none", "file", "empty")]
+    expected = {"z": -0.049, "cache": [1, 1, 0], "refused": [True] * 3, "ended": True}
+    for system, part in SYSTEMS.items():
+        own = os.environ | {"SERPENTAIL_CACHE": str(tmp_path / system)}
+        words = [sys.executable, "-W", "error", "-c", part + PROGRAM, zoo.folder("m1_n1"), *places]
+        done = subprocess.run(words, env=own, capture_output=True, text=True, check=False)
+        with row(system):
+            assert (done.returncode, done.stderr) == (0, "")
+            assert json.loads(done.stdout) == expected | {"named": True}

@@ -11,7 +11,6 @@ import time
 from functools import partial
 from pathlib import Path
 
-import serpentail as st
 from examples.front import GOES_ON, run
 from examples.studies.parts import Part, made
 
@@ -44,21 +43,6 @@ def lost() -> dict:
 def wrong() -> list:
     """Fail."""
     raise ZeroDivisionError("no such part")
-
-
-def endless(folder: Path) -> None:
-    """Plan forever, by a search that does not end."""
-    from tests.support.tumbling import AGAIN, rat, start
-
-    (folder / "ready").touch()
-    stubborn = {"ipopt.tol": 1e-300, "ipopt.acceptable_iter": 0, "ipopt.max_iter": 10**6}
-    while True:
-        st.plan(rat(), start=start(rat()), intervals=30, options=stubborn, **AGAIN)
-
-
-def plans_without_end(folder: Path) -> dict[str, Part]:
-    """Return a part that ends, and one that does not."""
-    return {"first": Part(ones, {}), "second": Part(partial(endless, folder), {})}
 
 
 def titles(store: Path) -> list[str]:
