@@ -18,14 +18,13 @@ from serpentail.model.toolchain import candidates
 from tests.support import zoo
 
 from ...support.rows import row
-from .calls import ARGUMENTS, CALLS, FORMS, assert_same, call, state, states
+from .conftest import ARGUMENTS, CALLS, FORMS, assert_same, call, state, states
 
 HEADERS = Path(sysconfig.get_path("include"))
 WARNINGS = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
 
 
 def by_ctypes(model):
-    """The model with the extension left out."""
     plain = copy.copy(model)
     for each in plain.kernels.values():
         each.fast = calls.declined
@@ -102,7 +101,6 @@ def test_calls_leave_nothing_in_memory(model):
 
 
 def pages():
-    """How many pages of memory this process has."""
     return int(Path("/proc/self/statm").read_text().split()[1])
 
 
