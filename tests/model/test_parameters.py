@@ -23,6 +23,7 @@ TOTAL = 4  # links of "m2_n2"
 INERTIA = (2.5e-07, 3.9e-09, 2.6e-07)
 GIVEN = {"link_inertia": list(INERTIA), "gravity": 1.6, "tail_mount": [0.01, -0.05, 0.002]}
 Q = [0, 0, 0, 1, 0.2, 0, 0, 0.3, -0.2]
+STATE = Q, np.arange(8.0), [0.1, 0.2]
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +38,6 @@ def given():
 
 
 def refusal(manifest, changes):
-    """The message that refuses changes."""
     with pytest.raises(st.ModelError) as caught:
         resolve(manifest, changes)
     return str(caught.value)
@@ -148,8 +148,8 @@ def test_parameters_change_without_a_compiler(monkeypatch):
 
 
 def test_parameters_given_late_are_those_of_a_scene(given):
-    late, state = zoo.model("bare").with_parameters(**GIVEN), (Q, np.arange(8.0), [0.1, 0.2])
-    found, expected = (each.forward_dynamics(*state) for each in (late, given))
+    late = zoo.model("bare").with_parameters(**GIVEN)
+    found, expected = (each.forward_dynamics(*STATE) for each in (late, given))
     assert late.parameters == given.parameters and np.array_equal(found, expected)
 
 
@@ -172,9 +172,7 @@ def test_changes_add_up_and_the_first_model_keeps_its_own():
 
 def test_baked_model_has_the_same_values_and_refuses_others():
     baked, model = zoo.model("baked"), zoo.model("m1_n3")
-    found, expected = (
-        each.forward_dynamics(Q, np.arange(8.0), [0.1, 0.2]) for each in (baked, model)
-    )
+    found, expected = (each.forward_dynamics(*STATE) for each in (baked, model))
     np.testing.assert_allclose(found, expected, rtol=1e-9)
     assert baked.with_parameters().parameters == model.parameters
     assert dict(resolve(baked.manifest, {})) == dict(resolve_parameters({}, 3))
