@@ -39,7 +39,6 @@ ARGUMENTS = {name: arguments.split() for name, (arguments, _) in CALLS.items()}
 
 
 def sizes(segments, links):
-    """Return sizes by name for a tail of equal links."""
     tail, points = 2 * segments, segments * links + 1
     found = dict.fromkeys(("v", "v_dot", "dq", "dv", "multiplier"), 6 + tail)
     found |= dict.fromkeys(("tau", "dtau", "accelerations"), tail)
@@ -48,12 +47,10 @@ def sizes(segments, links):
 
 
 SIZES = sizes(2, 2)  # of the zoo's "m2_n2"
-NQ, NV, NT, POINTS = (SIZES[name] for name in ("q", "v", "tau", "points"))
+NV, POINTS = SIZES["v"], SIZES["points"]
 
 
 def shapes(name):
-    """Return the shapes of a function's outputs."""
-
     def shape(words):
         return () if words == "-" else tuple(SIZES.get(n) or int(n) for n in words.split("*"))
 
@@ -67,7 +64,6 @@ def states(count, seed=1, sizes=SIZES):
 
 
 def state(seed=1, sizes=SIZES):
-    """Return arguments of one state by name."""
     return {name: rows[0] for name, rows in states(1, seed, sizes).items()}
 
 
@@ -89,11 +85,7 @@ def assert_close(found, expected, rtol, atol):
         np.testing.assert_allclose(one, other, rtol=rtol, atol=atol * np.abs(other).max())
 
 
-# Forms of arrays
-
-
 def apart(array):
-    """The numbers of an array with gaps between them."""
     wide = np.full((*array.shape, 3), np.nan, array.dtype)
     wide[..., 1] = array
     return wide[..., 1]

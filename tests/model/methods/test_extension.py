@@ -58,7 +58,8 @@ def test_both_ways_give_the_same_bits_and_words(model):
                             assert answer(each, name, arguments) == answer(plain, name, arguments)
 
 
-def test_neither_results_nor_arguments_are_held(model):
+def test_calls_hold_neither_results_nor_arguments_and_leave_nothing_in_memory(model):
+    """Not those that pass, are declined or fail, nor those of models that come and go."""
     given = state()
     counts = [sys.getrefcount(array) for array in given.values()]
     for name in CALLS:
@@ -66,14 +67,9 @@ def test_neither_results_nor_arguments_are_held(model):
             outputs = call(model, name, given)
         assert all(not np.ndim(o) or o.base is None for o in outputs), name
     assert [sys.getrefcount(array) for array in given.values()] == counts
-
-
-def test_calls_leave_nothing_in_memory(model):
-    """Not those that pass, are declined or fail, nor those of models that come and go."""
     s, other = state(), state()["q"].astype("datetime64[s]")
 
     def work(times):
-        """Do so much, and return the bytes and pages that are in use then."""
         for _ in range(times):
             model.forward_dynamics(s["q"], s["v"], s["tau"])
             model.energy(s["q"], s["v"])
