@@ -40,7 +40,6 @@ TINY = {"tail": "articulated", "segments": 1, "links": 1, "functions": ["energy"
 
 @pytest.fixture
 def cache(tmp_path, monkeypatch):
-    """Return an empty cache."""
     monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path / "cache"))
     return tmp_path / "cache"
 
@@ -80,7 +79,6 @@ def test_the_second_call_generates_nothing(generations):
 
 
 def test_parameters_that_shape_the_code_make_another_model(generations):
-    """Those of baked models, of the passive tail and of single links; the rest do not."""
     light, heavy = (made(**TINY, baked=True, torso_mass=mass) for mass in (0.05, 0.1))
     assert [m.parameters["torso_mass"] for m in (light, heavy)] == [0.05, 0.1]
     assert light.manifest["content_hash"] != heavy.manifest["content_hash"]

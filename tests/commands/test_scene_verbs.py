@@ -50,12 +50,6 @@ def test_a_scene_is_a_model_to_tell_about_and_a_wrong_name_is_told_what_is_like_
         assert status and "did you mean 'kick_and_land'?" in err
 
 
-def test_an_option_that_cannot_write_names_its_file_once(run):
-    err = run("simulate", "cat", "--set", "duration=0.02", "--view", "/proc/x.html")[2]
-    (told,) = [line for line in err.splitlines() if "--view" in line]
-    assert told.count("x.html") == 1 and "could not be written: " in told
-
-
 NEW = {  # options by a model of the zoo that the scene suits
     "m2_n2": ("--segments 2 --links 2", ("articulated", 2, 2, ())),
     "arcs2": ("--tail continuum --segments 2", ("continuum", 2, 1, ())),

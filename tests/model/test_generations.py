@@ -43,7 +43,6 @@ def agree(model):
 
 @pytest.fixture
 def cache(tmp_path, monkeypatch):
-    """An empty cache."""
     monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path / "cache"))
     return tmp_path / "cache"
 

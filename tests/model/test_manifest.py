@@ -40,12 +40,6 @@ def refused(folder, *words):
         assert word in str(caught.value)
 
 
-def test_intact_copy_loads(folder):
-    assert st.load(folder).name == st.load(str(folder)).name == "bare"
-    edit(folder, lambda manifest: dict(sorted(manifest.items())))  # the same, laid out anew
-    assert st.load(folder).name == "bare"
-
-
 def test_folder_without_manifest_says_how_to_make_one(folder, tmp_path):
     for place in ("nowhere", "bare/src", "bare/manifest.json"):
         with row(place):
@@ -54,7 +48,10 @@ def test_folder_without_manifest_says_how_to_make_one(folder, tmp_path):
         st.load(3)
 
 
-def test_settings_of_load(folder):
+def test_intact_copy_and_settings_of_load(folder):
+    assert st.load(folder).name == st.load(str(folder)).name == "bare"
+    edit(folder, lambda manifest: dict(sorted(manifest.items())))  # the same, laid out anew
+    assert st.load(folder).name == "bare"
     for name, value in (("compiled", 1), ("threads", 0), ("threads", True)):
         with row(name), pytest.raises(st.ModelError, match=f"{name}: value {value}"):
             st.load(folder, **{name: value})

@@ -115,7 +115,7 @@ def test_upgrade_behind_a_wrapper_reaches_the_next_key(model, script, tmp_path):
     assert compiler.describe_compiler()["version"] == "mycc 2"
 
 
-def test_native_flag_falls_back(model, script):
+def test_native_flag_falls_back_and_flags_are_told(model, script, monkeypatch):
     refusal = 'case "$*" in *{}*) echo "unknown argument" >&2; exit 1;; esac'
     script(refusal.format("-march=native"))
     assert "-march=native" not in compiler.describe_compiler()["flags"]
@@ -123,9 +123,6 @@ def test_native_flag_falls_back(model, script):
     flags = compiler.describe_compiler()["flags"]
     assert not [flag for flag in flags if flag.endswith("=native")]
     assert call_twice(compiler.compile_library(*model)) == 42.0
-
-
-def test_description_tells_flags_and_no_folder(monkeypatch):
     monkeypatch.setenv("CC", f"{shutil.which('cc')} -pipe")
     fast, exact = map(compiler.describe_compiler, ("fast", "reproducible"))
     assert fast["command"] == "cc -pipe" and fast["version"]
@@ -198,7 +195,6 @@ def test_damaged_library_is_compiled_again(model, cache):
 
 
 def test_entry_of_another_process_stays(tmp_path):
-    """Who comes second throws his own away."""
     place, part = tmp_path / "kind" / "entry", tmp_path / "part"
     for path in (place, part):
         path.mkdir(parents=True)
@@ -211,7 +207,6 @@ def test_entry_of_another_process_stays(tmp_path):
 
 
 def built(model, number):
-    """The library of a text of its own."""
     (source,), include = model
     source.write_text(f"{TWICE}int number = {number};\n")
     return compiler.compile_library([source], include)
@@ -222,7 +217,7 @@ def used(path, hours):
     os.utime(path, (time.time() - hours * HOUR,) * 2)
 
 
-def test_what_was_not_used_for_longest_goes(model, cache, monkeypatch):
+def test_what_was_not_used_for_longest_goes_and_what_is_in_use_stays(model, cache, monkeypatch):
     entries = [built(model, number).parent for number in range(4)]
     for hours, entry in zip((20, 9, 2, 5), entries, strict=True):
         used(entry, hours)
@@ -232,15 +227,12 @@ def test_what_was_not_used_for_longest_goes(model, cache, monkeypatch):
     last = built(model, 4).parent
     assert [entry.exists() for entry in entries] == [True, False, True, True] and last.exists()
     assert not list((cache / "parts").iterdir())
-
-
-def test_what_is_in_use_stays(model, monkeypatch):
-    monkeypatch.setenv("SERPENTAIL_CACHE_SIZE", "1")
-    libraries = [built(model, number) for number in range(3)]
+    monkeypatch.setenv("SERPENTAIL_CACHE_SIZE", "1")  # what is in use stays
+    libraries = [built(model, number) for number in range(5, 8)]
     assert [call_twice(library) for library in libraries] == [42.0] * 3
     for library in libraries:
         used(library.parent, 1)
-    assert built(model, 4).exists() and not any(library.exists() for library in libraries)
+    assert built(model, 8).exists() and not any(library.exists() for library in libraries)
 
 
 def test_parts_of_killed_builds_go(model, cache):

@@ -53,7 +53,9 @@ def test_no_compiler_names_what_was_tried(model, monkeypatch, tmp_path):
         assert words in str(caught.value)
 
 
-def test_broken_compiler_on_path_gives_way_to_the_next(model, monkeypatch, tmp_path):
+def test_broken_compiler_on_path_gives_way_to_the_next_and_ziglang_comes_last(
+    model, monkeypatch, tmp_path
+):
     programs = tmp_path / "bin"
     programs.mkdir()
     real = f'PATH={os.environ["PATH"]} exec {shutil.which("cc")} "$@"'
@@ -64,9 +66,6 @@ def test_broken_compiler_on_path_gives_way_to_the_next(model, monkeypatch, tmp_p
     assert call_twice(library) == 42.0
     forbid_processes(monkeypatch)
     assert compiler.compile_library(*model) == library
-
-
-def test_ziglang_wheel_comes_last(monkeypatch, tmp_path):
     package = tmp_path / "ziglang"
     package.mkdir()
     (package / "__init__.py").touch()
@@ -198,12 +197,10 @@ COMPILE = (
 LOAD = "import sys, serpentail as st; print(st.load(sys.argv[1]).library._name)"
 
 
-def started(program, *arguments, **options):
+def started(text, *arguments, **options):
     """A process of its own that runs a program."""
-    command = [sys.executable, "-c", program, *map(str, arguments)]
-    return subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options
-    )
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    return subprocess.Popen([sys.executable, "-c", text, *map(str, arguments)], **pipes, **options)
 
 
 def test_processes_with_a_cold_cache_compile_once(cache, script):
@@ -252,13 +249,9 @@ def test_without_locks_or_patience_it_compiles_anyway(model, cache, monkeypatch)
     name = compiler.digest([compiler._text_of([source], include), "fast"])
     with locks.alone(compiler.cache_folder(None), name):
         assert call_twice(compiler.compile_library(*model)) == 42.0
-
-
-def test_warm_cache_takes_no_lock(model):
-    compiler.compile_library(*model)
-    (source,), include = model
-    program = f"{COMPILE}; assert 'filelock' not in sys.modules"
-    out, err = started(program, source, include).communicate()
+    compiler.compile_library(*model)  # a warm cache takes no lock
+    text = f"{COMPILE}; assert 'filelock' not in sys.modules"
+    out, err = started(text, source, include).communicate()
     assert err == "" and out
 
 

@@ -1,5 +1,5 @@
-"""Steps against SciPy, which knows nothing of them: by classical Runge-Kutta in flight, implicit on
-the ground, where they are also those of `simulate`.
+"""Steps against what knows nothing of them: classical Runge-Kutta in flight, SciPy on the ground,
+where they are also those of `simulate`.
 """
 
 import numpy as np
@@ -45,22 +45,6 @@ def test_a_step_in_flight_is_one_of_runge_kutta():
                 found = stepped(each, {name: array[:runs] for name, array in values.items()}, h)
                 np.testing.assert_allclose(found, expected[:runs], rtol=1e-12, atol=1e-12)
 
-
-def test_many_short_steps_are_the_flight():
-    model = zoo.model(AIR)
-    values = runs_of(model)
-    found, starts = stepped(model, values, 2.5e-4, steps=40), np.hstack([values["q"], values["v"]])
-    for k in (0, RUNS - 1):
-
-        def rates(_, y, tau=values["tau"][k]):
-            return rate(model, y, tau)
-
-        expected = solve_ivp(rates, (0, 0.01), starts[k], "DOP853", rtol=1e-12, atol=1e-12).y[:, -1]
-        expected[3:7] /= np.linalg.norm(expected[3:7])
-        np.testing.assert_allclose(found[k], expected, rtol=1e-9, atol=1e-9)
-
-
-# On the ground
 
 FINE, STEPS = 5e-5, 60  # s
 
