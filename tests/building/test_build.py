@@ -1,22 +1,37 @@
-"""`build` makes a model once, whoever asks and however often, and never imports the generator."""
+"""`build` makes a model once, whoever asks and however often, and never imports the generator.
 
+Its tables survive the way through a scene file, and its options are those of the generator.
+"""
+
+import math
 import os
 import shutil
 import subprocess
 import sys
+import tomllib
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as some
 
 import serpentail as st
 from serpentail import cli
 from serpentail.building import build as building
-from serpentail_codegen.scene.parse import load_scene
+from serpentail.building.fewer_contacts import FUNCTIONS, NEEDED, with_contacts
+from serpentail.building.options import Parameters, SceneKeys
+from serpentail.building.scene_text import scene_text
+from serpentail_codegen.scene.parameters import PARAMETERS
+from serpentail_codegen.scene.parse import load_scene, parse_scene
+from serpentail_codegen.scene.passive import PASSIVE
+from serpentail_codegen.scene.scene import KEYS
+from serpentail_codegen.scene.signatures.table import NEEDS
 from tests.support import zoo
 from tests.support.models import folder_of
+from tests.support.scenes import SCENES
 
 from ..support.rows import row
 
@@ -25,7 +40,6 @@ TINY = {"tail": "articulated", "segments": 1, "links": 1, "functions": ["energy"
 
 @pytest.fixture
 def cache(tmp_path, monkeypatch):
-    """Return an empty cache."""
     monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path / "cache"))
     return tmp_path / "cache"
 
@@ -44,7 +58,6 @@ def generations(cache, monkeypatch):
 
 
 def made(scene=None, **options):
-    """A model that is built but not compiled."""
     return st.build(*([scene] if scene else []), compiled=False, **options)
 
 
@@ -66,7 +79,6 @@ def test_the_second_call_generates_nothing(generations):
 
 
 def test_parameters_that_shape_the_code_make_another_model(generations):
-    """Those of baked models, of the passive tail and of single links; the rest do not."""
     light, heavy = (made(**TINY, baked=True, torso_mass=mass) for mass in (0.05, 0.1))
     assert [m.parameters["torso_mass"] for m in (light, heavy)] == [0.05, 0.1]
     assert light.manifest["content_hash"] != heavy.manifest["content_hash"]
@@ -79,7 +91,8 @@ def test_parameters_that_shape_the_code_make_another_model(generations):
     assert len(generations) == 5
 
 
-def test_a_scene_file_is_built_by_its_content(generations, tmp_path):
+def test_a_scene_file_is_built_by_its_content(generations, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     scene = tmp_path / "own.toml"
     text = 'kind = "articulated"\nsegments = 1\nlinks = 1\nfunctions = ["energy"]\n'
     for duration in (1, 2):
@@ -91,12 +104,8 @@ def test_a_scene_file_is_built_by_its_content(generations, tmp_path):
     assert made(scene, functions=["momentum"]).generated == ("momentum",)
     scene.write_text(text.replace("links = 1", "links = 3"))
     assert made(scene).links == 3 and len(generations) == 3
-
-
-def test_an_example_is_a_scene_too(cache, generations, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert made("righting_m1_n3", functions=["energy"]).name == "righting_m1_n3"
-    assert not [path for path in tmp_path.iterdir() if path != cache]
+    assert made("righting_m1_n3", functions=["energy"]).name == "righting_m1_n3"  # an example
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["cache", "own.toml"]
     assert st.examples()["kick"]
 
 
@@ -118,10 +127,13 @@ REFUSED = [
 ]
 
 
-def test_what_cannot_be_built_is_refused_by_name(cache):
+def test_what_cannot_be_built_is_refused_by_name(cache, monkeypatch):
     for scene, options, words in REFUSED:
         with row(scene, options), pytest.raises(st.SerpentailError, match=words):
             made(scene, **options)
+    monkeypatch.setattr("serpentail.building.generator.find_spec", lambda name: None)
+    with pytest.raises(st.ModelError, match="without the package serpentail_codegen"):
+        made(**TINY)
 
 
 def test_neither_the_generator_nor_what_lies_in_the_working_folder_is_imported(cache, tmp_path):
@@ -137,12 +149,6 @@ def test_neither_the_generator_nor_what_lies_in_the_working_folder_is_imported(c
     command = [sys.executable, "-P", "-c", program]
     said = subprocess.run(command, capture_output=True, check=True, cwd=tmp_path).stdout
     assert said == b"[]\n"
-
-
-def test_without_a_generator_it_says_so(cache, monkeypatch):
-    monkeypatch.setattr("serpentail.building.generator.find_spec", lambda name: None)
-    with pytest.raises(st.ModelError, match="without the package serpentail_codegen"):
-        made(**TINY)
 
 
 DAMAGES = {
@@ -176,7 +182,6 @@ def test_a_cache_that_others_write_or_nobody_can_is_told(cache, generations, mon
 
 
 def _built(wanted):
-    """Build a model; return its name and a parameter."""
     links, mass = wanted
     model = made(**TINY | {"links": links}, torso_mass=mass)
     return model.name, model.parameters["torso_mass"]
@@ -190,3 +195,66 @@ def test_processes_build_each_model_once(cache):
     assert len(list((cache / "builds").iterdir())) == len(list((cache / "models").iterdir())) == 2
     locks = [path.name for path in (cache / "locks").iterdir()]
     assert len(locks) == 2 and not list((cache / "parts").iterdir())
+
+
+# The text of a scene
+
+TEXTS = some.text(some.characters(codec="utf-8"))
+VALUES = some.recursive(
+    some.booleans() | some.integers(-(2**63) + 1, 2**63 - 1) | some.floats(allow_nan=False) | TEXTS,
+    lambda inner: some.lists(inner, max_size=4) | some.dictionaries(TEXTS, inner, max_size=4),
+    max_leaves=20,
+)
+
+
+@given(some.dictionaries(TEXTS, VALUES, max_size=5))
+def test_tables_survive(tables):
+    assert tomllib.loads(scene_text(tables)) == tables
+
+
+def test_numbers_of_numpy_are_numbers_and_what_toml_cannot_say_is_named():
+    tables = {"a": np.float32(0.5), "b": np.int64(3), "c": np.eye(2), "d": (1, 2.5)}
+    back = tomllib.loads(scene_text(tables))
+    assert back == {"a": 0.5, "b": 3, "c": [[1.0, 0.0], [0.0, 1.0]], "d": [1, 2.5]}
+    assert math.isnan(tomllib.loads(scene_text({"a": math.nan}))["a"])
+    deep = []
+    for _ in range(5000):
+        deep = [deep]
+    rows = [({"b": x}, r"^a\.b: value ") for x in (None, 1j, object(), {1}, b"x", 2**63, -(2**63))]
+    for value, words in [*rows, ("\ud800", "has no UTF-8"), (deep, "nested too deeply")]:
+        with row(type(value)), pytest.raises(st.ModelError, match=words):
+            scene_text({"a": value})
+
+
+def test_options_are_what_the_generator_knows():
+    keys = {"tail" if key == "kind" else key for key in KEYS}
+    left = {"description", "parameters", "plan", "simulate", "phase", "identify", "sweep"}
+    assert set(SceneKeys.__annotations__) == keys - left
+    names = [parameter.name for parameter in (*PARAMETERS, *PASSIVE)]
+    assert list(Parameters.__annotations__) == names
+    wanted = {group: [p.name for p in PARAMETERS if p.needs == group] for group in NEEDED}
+    assert {group: [*names] for group, names in NEEDED.items()} == wanted
+    assert {p.needs for p in PARAMETERS} == {"", *NEEDED}
+    of_functions = {name: group for group, names in FUNCTIONS.items() for name in names}
+    assert of_functions == NEEDS
+
+
+def test_a_robot_file_serves_with_fewer_contacts():
+    path = SCENES / "contact_m1_n3.toml"
+    tables = tomllib.loads(path.read_text())
+    tables["functions"] = [*NEEDS, "energy"]
+    tables["functions"].remove("contact_rates")
+    for contacts in ([], ["feet"], ["tail"], ["torso"], ["feet", "tail", "torso"]):
+        with row(contacts):
+            scene = parse_scene(with_contacts(tables, contacts), "robot")
+            assert list(scene.contacts) == contacts
+            assert ("mu" in dict(scene.parameters)) == bool(contacts)
+            assert ("hip" in dict(scene.parameters)) == ("feet" in contacts)
+            assert ("torso_semi_axes" in dict(scene.parameters)) == ("torso" in contacts)
+            assert ("contact_points" in scene.functions) == bool(contacts)
+            assert ("leg_points" in scene.functions) == ("feet" in contacts)
+    assert with_contacts(tables, 3)["contacts"] == 3  # which the generator refuses
+    options = {"contacts": [], "functions": ["energy"], "compiled": False}
+    assert not st.build(path, **options).contacts
+    with pytest.raises(st.ModelError, match="mu: no such parameter"):
+        st.build(path, **options, mu=0.5)

@@ -32,19 +32,16 @@ def actions(rounds, count, seed=1):
     return np.random.default_rng(seed).uniform(-1.2, 1.2, (rounds, count, 2))
 
 
-def test_the_checker_of_gymnasium_finds_nothing():
-    for task, name in TASKS.items():
-        with row(task):
-            check_env(st.environment(zoo.model(name), task, **SHORT), skip_render_check=True)
-
-
 def test_many_are_what_gymnasium_makes_of_single_ones():
-    """Seeds, observations, rewards, ends and new beginnings, step by step."""
-    for task, name in TASKS.items():
-        ours = many(task, 9, **SHORT)
-        theirs = SyncVectorEnv(
-            [lambda t=task, n=name: st.environment(zoo.model(n), t, **SHORT)] * 9
-        )
+    """Seeds, observations, rewards and ends; its checker is content."""
+
+    def single():
+        return st.environment(zoo.model(TASKS[task]), task, **SHORT)
+
+    for task in TASKS:
+        with row(task):
+            check_env(single(), skip_render_check=True)
+        ours, theirs = many(task, 9, **SHORT), SyncVectorEnv([single] * 9)
         assert ours.metadata["autoreset_mode"] == theirs.metadata["autoreset_mode"]
         assert ours.metadata["autoreset_mode"] == AutoresetMode.NEXT_STEP
         for space in ("observation_space", "action_space", "single_observation_space"):
@@ -57,7 +54,7 @@ def test_many_are_what_gymnasium_makes_of_single_ones():
                     np.testing.assert_allclose(one, other, rtol=1e-5, atol=1e-5)
 
 
-def test_seeds_choose_the_starts():
+def test_seeds_choose_the_starts_and_the_state_what_is_seen_and_rewarded():
     for task in TASKS:
         with row(task):
             worlds = many(task, 5, **SHORT)
@@ -67,11 +64,6 @@ def test_seeds_choose_the_starts():
             assert np.array_equal(worlds.reset(seed=3)[0], first)
             assert np.array_equal(worlds.reset(seed=[3, 4, 5, 6, 7])[0], first)
             assert np.array_equal(worlds.reset(seed=[3] * 5)[0][1:], np.tile(first[0], (4, 1)))
-
-
-def test_what_is_seen_and_rewarded_is_of_the_state():
-    for task in TASKS:
-        with row(task):
             worlds = many(task, 6, **SHORT)
             worlds.reset(seed=0)
             action = actions(1, 6)[0]
@@ -107,7 +99,6 @@ def test_episodes_end_by_their_time_and_by_the_tail(flyer):
     assert all(not t[:2].any() for t, _ in ends)
     assert [bool(o[0]) for _, o in ends] == [False] * 9 + [True]
     bent = [bool(t[2]) for t, _ in ends]
-    assert any(bent)
     # the step after an end begins anew, without reward
     worlds.reset(seed=0)
     for _ in range(bent.index(True) + 1):
@@ -152,8 +143,6 @@ def test_settings_may_be_texts_with_units(flyer):
     np.testing.assert_array_equal(first.step(actions)[0], second.step(actions)[0])
 
 
-# What is refused
-
 REFUSED = [
     *(("task", "cooking", "'righting' or"), ("task", "rihgting", "did you mean 'righting'?")),
     *(("count", 0, "count: value 0"), ("count", 2.5, "count: value 2.5")),
@@ -185,7 +174,7 @@ def test_what_is_wrong_is_named(flyer):
             assert "\n" not in str(raised.value)
 
 
-def test_actions_seeds_options_and_order_are_checked(flyer):
+def test_actions_seeds_options_and_order_are_checked(flyer, monkeypatch):
     worlds = st.environments(flyer, "righting", 3)
     with pytest.raises(st.SimulationError, match=r"call reset\(\) first"):
         worlds.step(np.zeros((3, 2)))
@@ -203,9 +192,6 @@ def test_actions_seeds_options_and_order_are_checked(flyer):
     for made in (worlds, st.environment(flyer, "righting")):
         with pytest.raises(st.SimulationError, match="options: value"):
             made.reset(options={"height": 3})
-
-
-def test_without_gymnasium_the_extra_is_named(flyer, monkeypatch):
     monkeypatch.setitem(sys.modules, "gymnasium", None)
     with pytest.raises(st.ExtraMissing, match=r'pip install "serpentail\[gym\]"'):
         st.environment(flyer, "righting")

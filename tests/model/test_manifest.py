@@ -1,14 +1,20 @@
-"""Generated folders: what does not fit together is refused with its name and the way out."""
+"""Generated folders: what does not fit together is refused with its name and the way out.
+
+Those of one target alone evaluate what is there, and refuse what is not; the zoo's have both.
+"""
 
 import json
 import os
 import shutil
 
+import casadi
+import numpy as np
 import pytest
 
 import serpentail as st
 from serpentail_codegen.targets.write import signed
 from tests.support import zoo
+from tests.support.models import folder_of
 
 from ..support.rows import row
 
@@ -34,12 +40,6 @@ def refused(folder, *words):
         assert word in str(caught.value)
 
 
-def test_intact_copy_loads(folder):
-    assert st.load(folder).name == st.load(str(folder)).name == "bare"
-    edit(folder, lambda manifest: dict(sorted(manifest.items())))  # the same, laid out anew
-    assert st.load(folder).name == "bare"
-
-
 def test_folder_without_manifest_says_how_to_make_one(folder, tmp_path):
     for place in ("nowhere", "bare/src", "bare/manifest.json"):
         with row(place):
@@ -48,29 +48,33 @@ def test_folder_without_manifest_says_how_to_make_one(folder, tmp_path):
         st.load(3)
 
 
-def test_settings_of_load_are_checked(folder):
+def test_intact_copy_and_settings_of_load(folder):
+    assert st.load(folder).name == st.load(str(folder)).name == "bare"
+    edit(folder, lambda manifest: dict(sorted(manifest.items())))  # the same, laid out anew
+    assert st.load(folder).name == "bare"
     for name, value in (("compiled", 1), ("threads", 0), ("threads", True)):
         with row(name), pytest.raises(st.ModelError, match=f"{name}: value {value}"):
             st.load(folder, **{name: value})
+    scene = json.loads((folder / "manifest.json").read_text())["scene"]
+    for profile in ("fast", "reproducible"):  # the scene's, unless one is asked for
+        edit(folder, signed, scene=scene | {"profile": profile})
+        assert st.load(folder).profile == profile
+    assert st.load(folder, profile="fast").profile == "fast"
 
 
 def test_damaged_manifest(folder):
     path = folder / "manifest.json"
-    half = path.read_text()[:-100]
-    for text in ("", "{", "[]", "{}", "null", '{"format": 2}', "\xff", half):
+    whole = path.read_text()
+    for text in ("", "{", "[]", "{}", "null", '{"format": 2}', "\xff", whole[:-100]):
         with row(text[:20]):
             path.write_text(text, encoding="latin-1")
             refused(folder, f"{path} is damaged (", "generate it again")
-
-
-def test_manifest_without_an_entry(folder):
-    whole = (folder / "manifest.json").read_text()
     for key in (
         *("format", "generator", "abi_hash", "prefix", "real", "scene", "dimensions", "parameters"),
         *("functions", "work", "batch", "files", "manifest_hash"),
     ):
         with row(key):
-            (folder / "manifest.json").write_text(whole)
+            path.write_text(whole)
             edit(folder, **{key: None})
             refused(folder, "manifest.json is damaged (", key)
 
@@ -109,14 +113,13 @@ def test_changed_missing_and_strange_files_are_named(folder):
 
 
 def larger(manifest):
-    """The tail of a segment more: what C then reads lies beyond the arrays it is given."""
+    """A segment more: what C then reads lies beyond the arrays it is given."""
     sizes = manifest["dimensions"]
     more = {"segments": 2, "nq": sizes["nq"] + 2, "nv": sizes["nv"] + 2}
     return manifest | {"dimensions": sizes | more}
 
 
 def heavier(manifest):
-    """Another default of a parameter."""
     manifest["parameters"][1]["default"] *= 2
     return manifest
 
@@ -131,26 +134,15 @@ def test_manifest_changed_by_hand_is_named(folder):
             refused(folder, f"{path} was changed after it was generated", "parameters=...")
 
 
-def test_manifest_that_leads_out_of_its_folder_is_refused(folder):
+def test_manifest_of_other_code_or_outside_its_folder_is_refused(folder):
     (folder.parent / "outside.c").write_text("")
     files = json.loads((folder / "manifest.json").read_text())["files"]
     for name in ("../outside.c", "/etc/passwd", "src/../../outside.c", "a\0"):
         with row(name):
             edit(folder, signed, files=files | {name: files["src/bare.c"]})
             refused(folder, "leads out of the folder")
-
-
-def test_manifest_of_other_code(folder):
-    edit(folder, signed, abi_hash="0123456789abcdef")
+    edit(folder, signed, files=files, abi_hash="0123456789abcdef")
     refused(folder, "the manifest 0123456789abcdef", f"delete {folder}")
-
-
-def test_profile_is_the_scene_s_unless_one_is_asked_for(folder):
-    scene = json.loads((folder / "manifest.json").read_text())["scene"]
-    for profile in ("fast", "reproducible"):
-        edit(folder, signed, scene=scene | {"profile": profile})
-        assert st.load(folder).profile == profile
-    assert st.load(folder, profile="fast").profile == "fast"
 
 
 def test_library_that_cannot_be_loaded(folder, monkeypatch):
@@ -159,3 +151,53 @@ def test_library_that_cannot_be_loaded(folder, monkeypatch):
     monkeypatch.setattr("serpentail.model.library.model_library", lambda *_: foreign)
     with pytest.raises(st.SerpentailError, match=r"foreign\.so.*set SERPENTAIL_CACHE"):
         st.load(folder)
+
+
+# Models of one target
+
+Q = [0, 0, 0, 1, 0, 0, 0, 0.3, -0.2]
+STATE = Q, [0.5] * 8, [0.1, 0.2]
+
+
+def test_a_model_without_c():
+    names = ["forward_dynamics", "rollout"]
+    symbolic = folder_of(zoo.scene("bare", functions=names, targets=["casadi"]))
+    names = sorted(path.name for path in symbolic.iterdir())
+    assert names == ["bare_casadi.py", "manifest.json"]
+    model, both = st.load(symbolic, compiled=False), zoo.model("bare")
+    assert model.generated == ("forward_dynamics",)
+    found = model.casadi.forward_dynamics(*STATE).full()[:, 0]
+    np.testing.assert_allclose(found, both.forward_dynamics(*STATE), rtol=1e-12)
+    assert isinstance(model.casadi.symbolic("forward_dynamics"), casadi.Function)
+    for call in (
+        lambda: st.load(symbolic),
+        lambda: model.forward_dynamics(*STATE),
+        lambda: model.casadi.external("forward_dynamics"),
+        lambda: st.simulate(model, *STATE[:2]),
+        lambda: st.plan(model, start=STATE[:2], duration=1.0),
+        lambda: model.step(*STATE, 1e-3),
+    ):
+        with pytest.raises(st.ModelError, match=r"bare was .*compiled=False"):
+            call()
+    with pytest.raises(st.ModelError, match=r'without C.*"c" to `targets`'):
+        st.load(symbolic)
+
+
+def test_a_model_without_casadi_functions():
+    plain = folder_of(zoo.scene("bare", targets=["c"]))
+    assert not list(plain.glob("*.py")) and "_casadi.py" not in (plain / "README.md").read_text()
+    model, expected = st.load(plain), zoo.model("bare").forward_dynamics(*STATE)
+    np.testing.assert_array_equal(model.forward_dynamics(*STATE), expected)
+    compiled = model.casadi.external("forward_dynamics", folded=True)
+    np.testing.assert_array_equal(compiled(*STATE).full()[:, 0], expected)
+    own = ("external", "nodes", "parameter_names", "parameter_vector", "symbolic")
+    assert dir(model.casadi) == [*own]
+    for call in (
+        lambda: model.casadi.forward_dynamics,
+        lambda: model.casadi.symbolic("forward_dynamics"),
+    ):
+        with pytest.raises(st.ModelError, match=r'without CasADi .*"casadi" to `targets`'):
+            call()
+    for path in plain.rglob("*.[ch]"):
+        with row(path):
+            assert path.read_text() == (zoo.folder("bare") / path.relative_to(plain)).read_text()

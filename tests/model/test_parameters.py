@@ -1,9 +1,10 @@
 """Parameters: what a caller gives reaches the model as it would from a scene, or is refused with
-what to do.
+what to do; what no animal or robot has is told.
 """
 
 import re
 import subprocess
+import warnings
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ TOTAL = 4  # links of "m2_n2"
 INERTIA = (2.5e-07, 3.9e-09, 2.6e-07)
 GIVEN = {"link_inertia": list(INERTIA), "gravity": 1.6, "tail_mount": [0.01, -0.05, 0.002]}
 Q = [0, 0, 0, 1, 0.2, 0, 0, 0.3, -0.2]
+STATE = Q, np.arange(8.0), [0.1, 0.2]
 
 
 @pytest.fixture(scope="module")
@@ -36,18 +38,14 @@ def given():
 
 
 def refusal(manifest, changes):
-    """The message that refuses changes."""
     with pytest.raises(st.ModelError) as caught:
         resolve(manifest, changes)
     return str(caught.value)
 
 
-def test_defaults_are_the_scenes(manifest):
+def test_scene_and_caller_agree_bit_for_bit(manifest):
     for changes in (None, {}):
         assert dict(resolve(manifest, changes)) == dict(resolve_parameters({}, TOTAL))
-
-
-def test_scene_and_caller_agree_bit_for_bit(manifest):
     names = ("tail_mass", "tail_length", "link_radius")
     for numbers in np.random.default_rng(5).uniform(0.001, 2, (200, 3)).tolist():
         changes = dict(zip(names, numbers, strict=True))
@@ -75,18 +73,14 @@ def test_flat_is_the_struct(manifest):
     assert flat_names(manifest)[4:6] == ("torso_inertia[2]", "tail_mount[0]")
 
 
-def test_numbers_in_any_row_and_of_any_type(manifest):
+def test_numbers_in_any_row_of_any_type_and_with_units(manifest):
     three = [1, 2, 2.5]
     for value in (three, tuple(three), np.array(three), np.float32(three)):
         assert resolve(manifest, {"torso_inertia": value})["torso_inertia"] == (1.0, 2.0, 2.5)
     for value in (2, 2.0, np.float32(2), np.int8(2), np.array(2.0)):
         mass = resolve(manifest, {"tail_mass": value})["tail_mass"]
         assert mass == 2.0 and type(mass) is float
-
-
-def test_parameters_with_units_are_those_in_si():
-    """Of one model and of many runs."""
-    model = zoo.model("m1_n1")
+    model = zoo.model("m1_n1")  # with units, of one model and of many runs
     given = model.with_parameters(torso_mass="105.7 g", tail_mount="0, -40.5, 4.5 mm")
     assert given.parameters["torso_mass"] == 0.1057
     assert given.parameters["tail_mount"] == (0.0, -0.0405, 0.0045)
@@ -103,18 +97,13 @@ WRONG = {
 }
 
 
-def test_wrong_value_is_named_with_its_unit(manifest):
+def test_wrong_value_is_named_with_its_unit_or_the_rule_that_it_breaks(manifest):
     units = {p.name: p.unit for p in PARAMETERS}
-    for name, values in WRONG.items():
-        for value in values:
-            with row(name, value):
-                message = refusal(manifest, {name: value})
-                assert message.startswith(f"parameters: {name}: value ")
-                assert f"({units[name]})" in message
-
-
-def test_what_failed_of_several_rules_is_told(manifest):
-    for name, value, told in (
+    told = [
+        (n, value, re.escape(f"({units[n]})")) for n, values in WRONG.items() for value in values
+    ]
+    for name, value, words in (
+        *told,
         ("torso_inertia", "1 g cm2", "here is 1 number$"),
         ("torso_inertia", [1e-5, 1e-5, 9e-5], "here 9e-05 is above 2e-05$"),
         ("torso_inertia", [1e-5, 1e-5, 0], "sum of the other two$"),
@@ -125,7 +114,7 @@ def test_what_failed_of_several_rules_is_told(manifest):
     ):
         with row(name, value):
             message = refusal(manifest, {name: value})
-            assert re.match(f"parameters: {name}: value .*{told}", message), message
+            assert re.match(f"(?s)parameters: {name}: value .*{words}", message), message
 
 
 def test_unknown_names_and_all_problems_come_at_once(manifest):
@@ -137,15 +126,9 @@ def test_unknown_names_and_all_problems_come_at_once(manifest):
     for line, name in zip(lines, [*wrong, "link_radius and link_inertia"], strict=True):
         assert f"{name}: " in line
     assert "did you mean 'tail_mass'?" in lines[0]
-
-
-def test_values_without_a_finite_inertia_or_weight_are_refused(manifest):
     assert "no finite link_inertia" in refusal(manifest, {"tail_length": 1e200})
     assert "no finite weight" in refusal(manifest, {"tail_mass": 1e200, "gravity": 1e200})
     assert "parameters: value 3" in refusal(manifest, 3)
-
-
-# Models
 
 
 def test_parameters_change_without_a_compiler(monkeypatch):
@@ -166,8 +149,7 @@ def test_parameters_change_without_a_compiler(monkeypatch):
 
 def test_parameters_given_late_are_those_of_a_scene(given):
     late = zoo.model("bare").with_parameters(**GIVEN)
-    v, tau = np.arange(8.0), [0.1, 0.2]
-    found, expected = (each.forward_dynamics(Q, v, tau) for each in (late, given))
+    found, expected = (each.forward_dynamics(*STATE) for each in (late, given))
     assert late.parameters == given.parameters and np.array_equal(found, expected)
 
 
@@ -181,29 +163,22 @@ def test_changes_add_up_and_the_first_model_keeps_its_own():
     assert given.with_parameters(link_radius=0.01, tail_mass=0.001).parameters == light.parameters
     assert (light.mass_matrix(Q) != expected).any()
     assert dict(model.parameters) == before and np.array_equal(model.mass_matrix(Q), expected)
+    with pytest.raises(TypeError):  # nor can they be changed in place
+        resolve(model.manifest, None)["tail_mass"] = 1.0
+    for vector in (model.parameter_vector, model.with_parameters(gravity=0).parameter_vector):
+        with pytest.raises(ValueError, match="read-only"):
+            vector[0] = 1.0
 
 
 def test_baked_model_has_the_same_values_and_refuses_others():
-    baked, model, v = zoo.model("baked"), zoo.model("m1_n3"), np.arange(8.0)
-    found, expected = (each.forward_dynamics(Q, v, [0.1, 0.2]) for each in (baked, model))
+    baked, model = zoo.model("baked"), zoo.model("m1_n3")
+    found, expected = (each.forward_dynamics(*STATE) for each in (baked, model))
     np.testing.assert_allclose(found, expected, rtol=1e-9)
     assert baked.with_parameters().parameters == model.parameters
     assert dict(resolve(baked.manifest, {})) == dict(resolve_parameters({}, 3))
     for attempt in (lambda p: baked.with_parameters(**p), lambda p: st.load(baked.folder, p)):
         with pytest.raises(st.ModelError, match="baked = false"):
             attempt({"gravity": 1.6})
-
-
-def test_values_cannot_be_changed_in_place(manifest):
-    with pytest.raises(TypeError):
-        resolve(manifest, None)["tail_mass"] = 1.0
-    model = zoo.model("m1_n1")
-    for vector in (model.parameter_vector, model.with_parameters(gravity=0).parameter_vector):
-        with pytest.raises(ValueError, match="read-only"):
-            vector[0] = 1.0
-
-
-# The passive tail
 
 
 def test_one_number_stands_for_all_tail_coordinates():
@@ -213,9 +188,9 @@ def test_one_number_stands_for_all_tail_coordinates():
     assert values["tail_rest"] == pytest.approx((0, np.pi / 6, 0, 1))
     assert values["tail_stop_upper"] == (0.6, 0.5, 0.4, 0.55)
     assert dict(resolve(elastic, None)) == dict(resolve_parameters(zoo.ELASTIC, TOTAL, segments=2))
-    for stiffness in ([0.02, 0.03, 0.04], np.outer([0.02, 0.03, 0.04], np.ones(4))):
+    expected = np.outer([0.02, 0.03, 0.04], np.ones(4))
+    for stiffness in ([0.02, 0.03, 0.04], expected):
         runs = RunParameters.checked(elastic, values, {"tail_stiffness": stiffness}, 3)
-        expected = np.outer([0.02, 0.03, 0.04], np.ones(4))
         assert (runs.changes["tail_stiffness"] == expected).all()
 
 
@@ -238,9 +213,6 @@ def test_values_of_the_passive_tail_that_cannot_be(manifest):
         RunParameters.checked(elastic, resolve(elastic, None), {"tail_stop_lower": lower}, 2)
 
 
-# Links that have values of their own
-
-
 def test_totals_and_bends_follow_from_the_links():
     model = zoo.model("own_links")
     reference = st.Reference.of_bends(model, [0.0, 0.1], [[0.3, 0.4, 0.6]] * 2)
@@ -251,10 +223,6 @@ def test_totals_and_bends_follow_from_the_links():
     assert model.parameters["tail_length"] == pytest.approx(0.135)
     lighter = model.with_parameters(link_masses=0.5 * np.array(model.parameters["link_masses"]))
     assert lighter.parameters["tail_mass"] == pytest.approx(0.0013)
-
-
-def test_moments_may_be_given_link_by_link():
-    model = zoo.model("own_links")
     moments = np.reshape(model.parameters["link_inertias"], (7, 3))
     assert model.with_parameters(link_inertias=moments).parameters == model.parameters
     for name, value, words in (
@@ -264,26 +232,60 @@ def test_moments_may_be_given_link_by_link():
     ):
         with pytest.raises(st.ModelError, match=words):
             model.with_parameters(**{name: value})
-
-
-def test_runs_have_links_of_their_own():
-    model = zoo.model("own_links")
-    masses = np.outer([1.0, 1.5], model.parameters["link_masses"])
-    q = np.array([0, 0, 1.0, 1, 0, 0, 0, 0.2, 0.1, -0.3, 0.2, 0.4, 0.1])
-    v = np.array([0, 0, 0, 1.0, 0, 0, 3.0, 0, 0, 2.0, 0, -1.0])
-    keys = {"t_span": (0, 0.01), "method": "rk4", "step": 1e-3}
-    both = np.tile(q, (2, 1)), np.tile(v, (2, 1))
-    runs = st.simulate(model, *both, parameters={"link_masses": masses}, **keys)
-    for k, run in enumerate(runs):
-        alone = st.simulate(model.with_parameters(link_masses=masses[k]), q, v, **keys)
-        np.testing.assert_allclose(run.q[-1], alone.q[-1], rtol=0, atol=1e-14)
-    assert np.abs(runs[0].q[-1] - runs[1].q[-1]).max() > 1e-4
-
-
-def test_a_single_link_has_arrays_too():
-    """Its scene is the point; nothing is compiled."""
+    masses = np.outer([1.0, 1.5], model.parameters["link_masses"])  # of runs
+    for own, vector in zip(
+        masses, model.parameters_of_runs({"link_masses": masses}, 2).vectors, strict=True
+    ):
+        alone = model.with_parameters(link_masses=own)
+        np.testing.assert_array_equal(vector, alone.parameter_vector)
+    # a single link has arrays too; its scene is the point, and nothing is compiled
     tables = [{"links": 1, "length": 0.1, "mass": 0.01}]
     scene = parse_scene({"kind": "articulated", "segments": tables, "functions": ["energy"]}, "one")
     model = st.load(folder_of(scene), compiled=False)
     assert model.parameters["link_masses"] == (0.01,)
     assert model.with_parameters(link_masses=[0.02]).parameters["tail_mass"] == 0.02
+
+
+STRANGE = (
+    ({"torso_mass": 105.7}, 'torso_mass: value 105.7 kg: .*"105.7 g"'),
+    ({"torso_mass": 20_000, "torso_inertia": [9e3] * 3}, 'value 20000 kg: .*10 t.*"20000 g"'),
+    ({"torso_mass": 1e-5, "torso_inertia": [1e-9] * 3}, "torso_mass: value 1e-05 kg: .*0.1 g"),
+    ({"tail_mass": 5.0}, r'tail_mass: value 5 kg: 47\.3 times .*0\.10572 kg.*"5 g"'),
+    ({"tail_length": 194.66}, 'tail_length: value 194.66 m: .*100 m.*"194.66 mm"'),
+    ({"tail_length": 1e-4}, "tail_length: value 0.0001 m: .*1 mm"),
+    ({"tail_mount": (0, -405, 0)}, "tail_mount: value 405 m: .*405 mm"),
+    ({"gravity": 9800.0}, r'gravity: value 9800 m/s\^2: .*"9800 mm/s2"'),
+)
+USUAL = (
+    {"torso_mass": "0.15 g", "torso_inertia": [1e-9] * 3, "tail_mass": "10 mg"},  # a gecko
+    {"torso_mass": "6000 kg", "torso_inertia": [5000, 3000, 5000.0]},
+    {"tail_mass": 1.0},  # 9.5 times as heavy as its torso
+    {"link_radius": "0.2 mm", "tail_length": "25 mm"},
+    {"link_radius": 0, "gravity": 0, "tail_mount": [0, 0, 0]},
+    {"torso_mass": 1.0},  # ten times as heavy, with the same inertia: a study of one parameter
+    {"torso_inertia": [1e3, 1e3, 1e3]},  # a torso that cannot turn
+)
+
+
+@pytest.mark.filterwarnings("ignore::serpentail.errors.UnlikeBodies")
+def test_what_no_animal_has_is_told_to_who_gives_it_and_the_rest_is_not():
+    model = zoo.model("bare")
+    for change, words in STRANGE:
+        with row(change):
+            with pytest.warns(st.UnusualSize, match=words) as loading:
+                st.load(model.folder, parameters=change)
+            with pytest.warns(st.UnusualSize, match=words) as changing:
+                model.with_parameters(**change)
+            assert {w.filename for w in (*loading, *changing)} == {__file__}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for change in USUAL:
+            with row(change):
+                model.with_parameters(**change)
+
+
+def test_one_strange_run_of_many_is_told():
+    settings = {"parameters": {"torso_mass": [0.1, 105.7, 0.1]}, "t_span": 1e-3, "step": 1e-3}
+    with pytest.warns(st.UnusualSize, match=r'torso_mass: value 105\.7 kg.* "105\.7 g"') as caught:
+        st.simulate(zoo.model("m1_n1"), np.tile(Q, (3, 1)), np.zeros(8), **settings)
+    assert [w.filename for w in caught] == [__file__]

@@ -1,1 +1,0 @@
-"""Tests of views of runs and plans that are being made."""

@@ -46,37 +46,22 @@ def ends(node):
 
 
 def assert_at(view, q, legs):
-    """The parts are where the model has them in one pose."""
-    close = {"rtol": 0, "atol": 1e-6}  # of float32
-    np.testing.assert_allclose(view.nodes["back"].batched_positions[0], q[:3], **close)
-    np.testing.assert_allclose(view.nodes["back"].batched_wxyzs[0], q[3:7], **close)
-    begins, tips = ends(view.nodes["tail"])
-    points = zoo.model("feet").tail_points(q)
-    np.testing.assert_allclose(begins, points[:-1], **close)
-    np.testing.assert_allclose(tips, points[1:], **close)
-    begins, tips = ends(view.nodes["legs"])
-    joints = zoo.model("feet").leg_points(q, legs)
-    np.testing.assert_allclose(begins.reshape(2, 5, 3), joints[:, :-1], **close)
-    np.testing.assert_allclose(tips.reshape(2, 5, 3), joints[:, 1:], **close)
+    """The parts are where the model has them in one pose, to float32."""
+    back, feet = view.nodes["back"], zoo.model("feet")
+    pose = np.r_[back.batched_positions[0], back.batched_wxyzs[0]]
+    np.testing.assert_allclose(pose, q[:7], rtol=0, atol=1e-6)
+    for part, points in (("tail", feet.tail_points(q)[None]), ("legs", feet.leg_points(q, legs))):
+        expected = points[:, :-1].reshape(-1, 3), points[:, 1:].reshape(-1, 3)
+        np.testing.assert_allclose(ends(view.nodes[part]), expected, rtol=0, atol=1e-6)
 
 
 def test_a_run_is_shown_where_it_has_come_to(view):
     motion = dropped(watch=view)
-    assert {node.name for node in view.nodes.values()} == {
-        "/animal/back",
-        "/animal/belly",
-        "/animal/head",
-        "/animal/tail",
-        "/animal/legs",
-    }
+    names = {f"/animal/{part}" for part in ("back", "belly", "head", "tail", "legs")}
+    assert {node.name for node in view.nodes.values()} == names
     assert_at(view, motion.q[-1], motion.contact.legs[-1])
     assert view.text.content == "t = 0.1000 s"
-
-
-def test_it_moves_and_keeps_its_nodes(view):
-    motion = dropped()
-    view(motion)
-    before = dict(view.nodes)
+    before = dict(view.nodes)  # it moves and keeps them
     part = motion.resample(motion.t[:50])
     view(part)
     assert view.nodes == before
@@ -87,10 +72,9 @@ def test_head_and_belly_tell_the_sides_apart(view):
     q = np.array([0, 0, 1, 0, 1.0, 0, 0, 0, 0])  # upside down: half a turn about x
     still = st.simulate(zoo.model("feet"), q, np.zeros(8), legs=LEGS, t_span=1e-4, method="rk4")
     view(still.resample(still.t[:1]))
-    back, belly, head = (
-        view.nodes[name].batched_positions[0] for name in ("back", "belly", "head")
-    )
-    assert belly[2] > back[2] and head[1] < back[1] - 0.5 * view.nodes["back"].batched_scales[0, 1]
+    nodes = [view.nodes[name] for name in ("back", "belly", "head")]
+    back, belly, head = (node.batched_positions[0] for node in nodes)
+    assert belly[2] > back[2] and head[1] < back[1] - 0.5 * nodes[0].batched_scales[0, 1]
 
 
 def test_a_plan_is_shown_at_nine_moments_without_legs_or_ground(view):
@@ -150,11 +134,12 @@ def test_a_browser_sees_it_and_the_terminal_does_not_tell_of_it(view, capfd):
 
     need(chromium.need_chromium)
     with chromium.chromium() as driver:
+
+        def shown(_):
+            text = driver.execute_script("return document.body.innerText")
+            return "t = 0.1000 s" in text and "feet" in text
+
         driver.get(view.url)
         view(dropped())
-        words = "return document.body.innerText"
-        seen = WebDriverWait(driver, 60).until(
-            lambda browser: "t = 0.1000 s" in browser.execute_script(words)
-        )
-        assert seen and "feet" in driver.execute_script(words)
+        assert WebDriverWait(driver, 60).until(shown)
     assert "Connection" not in "".join(capfd.readouterr())

@@ -10,10 +10,16 @@ TWICE = '#include "scale.h"\ndouble twice(double x) { return SCALE * x; }\n'
 
 
 def call_twice(library):
-    """What the library's function gives for 21."""
     function = ctypes.CDLL(str(library)).twice
     function.restype, function.argtypes = ctypes.c_double, [ctypes.c_double]
     return function(21.0)
+
+
+def program(path, body):
+    """Write a shell script, and return its path as a text."""
+    path.write_text(f"#!/bin/sh\n{body}\n")
+    path.chmod(0o755)
+    return str(path)
 
 
 def libraries(cache):
@@ -57,10 +63,8 @@ def script(tmp_path, monkeypatch):
     log = tmp_path / "calls"
 
     def install(body=""):
-        path = tmp_path / "mycc"
-        path.write_text(f'#!/bin/sh\necho "$@" >> {log}\n{body}\nexec {real} "$@"\n')
-        path.chmod(0o755)
-        monkeypatch.setenv("CC", str(path))
+        text = f'echo "$@" >> {log}\n{body}\nexec {real} "$@"'
+        monkeypatch.setenv("CC", program(tmp_path / "mycc", text))
         return log
 
     return install

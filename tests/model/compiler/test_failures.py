@@ -1,25 +1,32 @@
-"""Whatever goes wrong with a compiler or its sources is named, and leaves no library."""
+"""What goes wrong with a compiler or its sources is named, and leaves no library.
 
+One process builds while others wait; killed and failing ones leave nothing that stays.
+"""
+
+import errno
+import itertools
 import os
 import pickle
+import re
 import shutil
+import signal
+import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
-from serpentail.errors import (
-    CompileFailed,
-    CompilerNotFound,
-    ModelError,
-    SerpentailError,
-    StateError,
-)
-from serpentail.model import compiler, toolchain
+import serpentail as st
+from serpentail.model import compiler, locks, toolchain
 from serpentail.model.cache import cache_folder
+from serpentail.model.manifest import read_folder
+from serpentail.model.snapshot import model_library
+from tests.support import zoo
+from tests.support.file_faults import age, at, before_calls, fault
 
 from ...support.rows import row
-from .conftest import call_twice, forbid_processes, libraries
+from .conftest import call_twice, forbid_processes, libraries, program
 
 # Compilers
 
@@ -27,12 +34,12 @@ from .conftest import call_twice, forbid_processes, libraries
 def test_broken_cc_is_named_and_not_replaced(model, monkeypatch, cache):
     for chosen in ("no-such-cc -O3", "false", 'unbalanced "quote', "env no-such-cc"):
         monkeypatch.setenv("CC", chosen)
-        with row(chosen), pytest.raises(CompilerNotFound) as caught:
+        with row(chosen), pytest.raises(st.CompilerNotFound) as caught:
             compiler.compile_library(*model)
         assert f"CC={chosen!r}" in str(caught.value)
     for chosen in ("echo", "true"):
         monkeypatch.setenv("CC", chosen)
-        with row(chosen), pytest.raises(CompileFailed, match="wrote no library"):
+        with row(chosen), pytest.raises(st.CompileFailed, match="wrote no library"):
             compiler.compile_library(*model)
     assert not libraries(cache)
 
@@ -40,27 +47,25 @@ def test_broken_cc_is_named_and_not_replaced(model, monkeypatch, cache):
 def test_no_compiler_names_what_was_tried(model, monkeypatch, tmp_path):
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setitem(sys.modules, "ziglang", None)
-    with pytest.raises(CompilerNotFound) as caught:
+    with pytest.raises(st.CompilerNotFound) as caught:
         compiler.compile_library(*model)
     for words in ("cc (not on PATH)", "gcc", "clang", "ziglang wheel", "apt install", "xcode"):
         assert words in str(caught.value)
 
 
-def test_broken_compiler_on_path_gives_way_to_the_next(model, monkeypatch, tmp_path):
+def test_broken_compiler_on_path_gives_way_to_the_next_and_ziglang_comes_last(
+    model, monkeypatch, tmp_path
+):
     programs = tmp_path / "bin"
     programs.mkdir()
     real = f'PATH={os.environ["PATH"]} exec {shutil.which("cc")} "$@"'
     for name, body in (("cc", "exit 1"), ("gcc", real)):
-        (programs / name).write_text(f"#!/bin/sh\n{body}\n")
-        (programs / name).chmod(0o755)
+        program(programs / name, body)
     monkeypatch.setenv("PATH", str(programs))
     library = compiler.compile_library(*model)
     assert call_twice(library) == 42.0
     forbid_processes(monkeypatch)
     assert compiler.compile_library(*model) == library
-
-
-def test_ziglang_wheel_comes_last(monkeypatch, tmp_path):
     package = tmp_path / "ziglang"
     package.mkdir()
     (package / "__init__.py").touch()
@@ -69,14 +74,11 @@ def test_ziglang_wheel_comes_last(monkeypatch, tmp_path):
     assert list(toolchain.candidates()) == [(sys.executable, "-m", "ziglang", "cc")]
 
 
-# Sources
-
-
 def test_failing_source_shows_the_compilers_words(model, cache):
     (source,), include = model
     wrong = source.with_name("wrong.c")
     wrong.write_text("double thrice(double x) { return undeclared_name; }\n")
-    with pytest.raises(CompileFailed, match="undeclared_name") as caught:
+    with pytest.raises(st.CompileFailed, match="undeclared_name") as caught:
         compiler.compile_library([source, wrong], include)
     failure = caught.value
     assert "exit code 1" in str(failure) and str(wrong) in str(failure)
@@ -86,56 +88,46 @@ def test_failing_source_shows_the_compilers_words(model, cache):
     assert not libraries(cache) and not list(cache.rglob("*.o"))
 
 
-def test_failing_link_shows_the_compilers_words(model, cache, script):
-    script('case "$*" in *-shared*) echo "tail.c:7: out of patience" >&2; exit 3;; esac')
-    with pytest.raises(CompileFailed, match=r"exit code 3\ntail\.c:7: out of patience\nCommand: "):
-        compiler.compile_library(*model)
-    assert not libraries(cache)
+def test_failing_link_shows_the_compilers_words_and_changed_sources_are_not_kept(
+    model, cache, script
+):
+    (source,), _ = model
+    for act, error, words in (
+        (
+            'echo "tail.c:7: patience" >&2; exit 3',
+            st.CompileFailed,
+            r"code 3\ntail\.c:7: patience\n",
+        ),
+        (f'echo "/* edited */" >> {source}', st.ModelError, "changed while"),
+    ):
+        script(f'case "$*" in *-shared*) {act};; esac')
+        with row(act), pytest.raises(error, match=words):
+            compiler.compile_library(*model)
+        assert not libraries(cache)
 
 
 def test_long_report_loses_its_middle(model):
     (source,), include = model
     source.write_text("".join(f"#error mistake_{n}_ {'x' * 2000}\n" for n in range(10)))
-    with pytest.raises(CompileFailed, match="mistake_0_") as caught:
+    with pytest.raises(st.CompileFailed, match="mistake_0_") as caught:
         compiler.compile_library([source], include)
     assert "mistake_9_" in str(caught.value) and "characters left out" in str(caught.value)
     assert len(str(caught.value)) < 2 * compiler.LONGEST_REPORT < len(caught.value.stderr)
 
 
-def test_sources_that_change_meanwhile_are_not_kept(model, script, cache):
-    (source,), _ = model
-    script(f'case "$*" in *-shared*) echo "/* edited */" >> {source};; esac')
-    with pytest.raises(ModelError, match="changed while"):
-        compiler.compile_library(*model)
-    assert not libraries(cache)
-
-
-def test_missing_files_are_a_model_error(model, tmp_path):
+def test_missing_files_and_unknown_profiles_are_refused(model, tmp_path):
     sources, include = model
     nowhere = tmp_path / "nowhere.c"
     for given in (([nowhere], include), (sources, nowhere), ([], include)):
-        with row(given), pytest.raises(ModelError, match=r"nowhere\.c|no sources"):
+        with row(given), pytest.raises(st.ModelError, match=r"nowhere\.c|no sources"):
             compiler.compile_library(*given)
-
-
-def test_profile_names_are_checked(model):
     for call in (lambda p: compiler.compile_library(*model, profile=p), compiler.describe_compiler):
-        with pytest.raises(SerpentailError, match="profile: value 'quick'"):
+        with pytest.raises(st.SerpentailError, match="profile: value 'quick'"):
             call("quick")
-    assert issubclass(StateError, SerpentailError) and issubclass(StateError, ValueError)
+    assert issubclass(st.StateError, st.SerpentailError) and issubclass(st.StateError, ValueError)
 
 
-# The folder of the cache
-
-
-def test_unwritable_cache_names_the_variable(model, monkeypatch, tmp_path):
-    (tmp_path / "file").touch()
-    monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path / "file" / "cache"))
-    with pytest.raises(SerpentailError, match=rf"{tmp_path}/file.*SERPENTAIL_CACHE"):
-        compiler.compile_library(*model)
-
-
-def test_cache_folder_by_precedence(monkeypatch, tmp_path):
+def test_cache_folder_by_precedence(model, monkeypatch, tmp_path):
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.setenv("XDG_CACHE_HOME", "/xdg")
     assert cache_folder(tmp_path / "argument") == tmp_path / "argument"
@@ -144,3 +136,154 @@ def test_cache_folder_by_precedence(monkeypatch, tmp_path):
     assert cache_folder(None) == Path("/xdg/serpentail")
     monkeypatch.setenv("XDG_CACHE_HOME", "relative")
     assert cache_folder(None) == tmp_path / ".cache" / "serpentail"
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path / "file" / "cache"))
+    assert re.search(rf"{tmp_path}/file.*SERPENTAIL_CACHE", refusal(model))
+
+
+# Whose it is
+
+OTHER = 12345  # user id of somebody else
+
+
+def refusal(model):
+    with pytest.raises(st.SerpentailError) as caught:
+        compiler.compile_library(*model)
+    return str(caught.value)
+
+
+def test_cache_that_others_may_write_is_refused(model, cache):
+    library = compiler.compile_library(*model)
+    for path in (cache, library.parents[1], library.parent, library):
+        for mode in (0o777, 0o775, 0o770, 0o757):
+            with row(path, oct(mode)):
+                path.chmod(mode)
+                message = refusal(model)
+                assert str(path) in message and "is writable by others" in message
+                assert f"`chmod -R go-w {path}`" in message and "SERPENTAIL_CACHE" in message
+                path.chmod(0o700)
+    assert compiler.compile_library(*model) == library
+
+
+def test_cache_in_a_folder_for_all_is_no_folder_for_all(model, cache, monkeypatch):
+    """A cache below /tmp serves; /tmp itself does not, and nobody is told to close it."""
+    cache.mkdir()
+    cache.chmod(0o1777)
+    message = refusal(model)
+    assert "is writable by others" in message and "chmod" not in message
+    monkeypatch.setenv("SERPENTAIL_CACHE", str(cache / "mine"))
+    assert call_twice(compiler.compile_library(*model)) == 42.0
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give files to others")
+def test_what_belongs_to_somebody_else_is_refused(model, cache):
+    library = compiler.compile_library(*model)
+    (note,) = (cache / "compilers").iterdir()
+    for path in (cache, library.parents[1], library.parent, library, note.parent, note):
+        with row(path):
+            os.chown(path, OTHER, OTHER)
+            message = refusal(model)
+            assert f"{path} belongs to user {OTHER}" in message and "SERPENTAIL_CACHE" in message
+            os.chown(path, 0, 0)
+    assert compiler.compile_library(*model) == library
+
+
+# Builders
+
+COMPILE = (
+    "import pathlib, sys; from serpentail.model import compiler; path = pathlib.Path\n"
+    "print(compiler.compile_library([path(sys.argv[1])], path(sys.argv[2])))"
+)
+LOAD = "import sys, serpentail as st; print(st.load(sys.argv[1]).library._name)"
+
+
+def started(text, *arguments, **options):
+    """A process of its own that runs a program."""
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    return subprocess.Popen([sys.executable, "-c", text, *map(str, arguments)], **pipes, **options)
+
+
+def test_processes_with_a_cold_cache_compile_once(cache, script):
+    calls, count = script(), 6
+    crowd = [started(LOAD, zoo.folder("bare")) for _ in range(count)]
+    answers = [process.communicate() for process in crowd]
+    (library,) = libraries(cache)
+    assert answers == [(f"{library}\n", "")] * count
+    lines = calls.read_text().splitlines()
+    compiled = [line for line in lines if " -c " in line]
+    sources = {line.split(" -c ")[1].split()[0] for line in compiled}
+    assert len(compiled) == len(sources) and sum(" -shared " in line for line in lines) == 1
+    assert sum("--version" in line for line in lines) == 1
+
+
+def test_killed_holder_frees_the_lock_and_leaves_no_library(model, cache, script):
+    (source,), include = model
+    made = 'for word; do case $word in *.part) echo half > $word; touch "$0.busy"; sleep 60;; esac;'
+    script(f"{made} done")
+    holder = started(COMPILE, source, include, start_new_session=True)
+    patience = time.monotonic() + 60
+    while not Path(os.environ["CC"] + ".busy").exists() and time.monotonic() < patience:
+        time.sleep(0.01)
+    script()
+    other = started(COMPILE, source, include)
+    time.sleep(0.5)
+    assert other.poll() is None  # it waits
+    assert [path.read_text() for path in libraries(cache)] == ["half\n"]
+    os.killpg(holder.pid, signal.SIGKILL)
+    holder.communicate()
+    out, err = other.communicate(timeout=60)
+    library = compiler.compile_library(*model)
+    assert (out, err) == (f"{library}\n", "") and call_twice(library) == 42.0
+
+
+def test_without_locks_or_patience_it_compiles_anyway(model, cache, monkeypatch):
+    import filelock
+
+    (source,), include = model
+    with monkeypatch.context() as changed:
+        for code in (errno.ENOLCK, errno.ENOTSUP, errno.EIO):
+            changed.setattr(filelock.FileLock, "_acquire", lambda _, code=code: fault(code)())
+            assert call_twice(compiler.compile_library(*model)) == 42.0
+            shutil.rmtree(cache)
+    monkeypatch.setattr(locks, "PATIENCE_S", 0.1)
+    name = compiler.digest([compiler._text_of([source], include), "fast"])
+    with locks.alone(compiler.cache_folder(None), name):
+        assert call_twice(compiler.compile_library(*model)) == 42.0
+    compiler.compile_library(*model)  # a warm cache takes no lock
+    text = f"{COMPILE}; assert 'filelock' not in sys.modules"
+    out, err = started(text, source, include).communicate()
+    assert err == "" and out
+
+
+FAKE = """
+case "$*" in *--version*) echo fake 1;; esac
+while [ $# -gt 0 ]; do [ "$1" = -o ] && echo made > "$2"; shift; done
+"""
+
+
+@pytest.mark.parametrize(
+    ("code", "apart"), [(errno.EIO, 9), pytest.param(errno.ENOSPC, 1, marks=pytest.mark.slow)]
+)
+def test_fault_at_any_call_is_a_refusal_and_leaves_nothing(tmp_path, monkeypatch, code, apart):
+    """With a compiler that takes no time."""
+    monkeypatch.setenv("CC", program(tmp_path / "fake", FAKE))
+    checked, sources, refused = read_folder(zoo.folder("bare")), ["src/bare.c"], 0
+    model_library(checked, sources, "fast")  # imports what it needs
+    for moment in itertools.count(step=apart):
+        cache = tmp_path / f"cache{moment}"
+        monkeypatch.setenv("SERPENTAIL_CACHE", str(cache))
+        came = []
+        with before_calls(at(moment, lambda: came.append(1) or fault(code)())):  # noqa: B023
+            try:
+                model_library(checked, sources, "fast")
+            except st.SerpentailError as error:
+                refused += 1
+                assert "\n" not in str(error) or isinstance(error, st.CompileFailed), moment
+        assert model_library(checked, sources, "fast").read_text() == "made\n", moment
+        age(cache / "parts")
+        model_library(checked, sources, "reproducible")
+        assert not list((cache / "parts").iterdir()), moment
+        shutil.rmtree(cache)
+        if not came:
+            break
+    assert moment > 100 and refused > 50 // apart

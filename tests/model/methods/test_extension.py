@@ -18,14 +18,13 @@ from serpentail.model.toolchain import candidates
 from tests.support import zoo
 
 from ...support.rows import row
-from .calls import ARGUMENTS, CALLS, FORMS, assert_same, call, state, states
+from .conftest import ARGUMENTS, CALLS, FORMS, assert_same, call, state, states
 
 HEADERS = Path(sysconfig.get_path("include"))
 WARNINGS = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
 
 
 def by_ctypes(model):
-    """The model with the extension left out."""
     plain = copy.copy(model)
     for each in plain.kernels.values():
         each.fast = calls.declined
@@ -42,10 +41,8 @@ def answer(model, name, arguments):
 
 
 def test_both_ways_give_the_same_bits_and_words(model):
-    for each, givens in (
-        (model, (state(), states(1), states(3))),
-        (st.load(zoo.folder("single")), (state(), {k: np.float32(a) for k, a in state().items()})),
-    ):
+    single, floats = st.load(zoo.folder("single")), {k: np.float32(a) for k, a in state().items()}
+    for each, givens in ((model, (state(), states(1), states(3))), (single, (state(), floats))):
         plain = by_ctypes(each)
         for name in CALLS:
             for given in givens:
@@ -59,7 +56,8 @@ def test_both_ways_give_the_same_bits_and_words(model):
                             assert answer(each, name, arguments) == answer(plain, name, arguments)
 
 
-def test_neither_results_nor_arguments_are_held(model):
+def test_calls_hold_neither_results_nor_arguments_and_leave_nothing_in_memory(model):
+    """Not those that pass, are declined or fail, nor those of models that come and go."""
     given = state()
     counts = [sys.getrefcount(array) for array in given.values()]
     for name in CALLS:
@@ -67,14 +65,9 @@ def test_neither_results_nor_arguments_are_held(model):
             outputs = call(model, name, given)
         assert all(not np.ndim(o) or o.base is None for o in outputs), name
     assert [sys.getrefcount(array) for array in given.values()] == counts
-
-
-def test_calls_leave_nothing_in_memory(model):
-    """Not those that pass, are declined or fail, nor those of models that come and go."""
     s, other = state(), state()["q"].astype("datetime64[s]")
 
     def work(times):
-        """Do so much, and return the bytes and pages that are in use then."""
         for _ in range(times):
             model.forward_dynamics(s["q"], s["v"], s["tau"])
             model.energy(s["q"], s["v"])
@@ -102,7 +95,6 @@ def test_calls_leave_nothing_in_memory(model):
 
 
 def pages():
-    """How many pages of memory this process has."""
     return int(Path("/proc/self/statm").read_text().split()[1])
 
 

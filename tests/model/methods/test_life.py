@@ -1,21 +1,23 @@
-"""Models of floats and profiles, their names, threads, copies, and what they keep alive."""
+"""Models of floats and profiles, their names, threads, copies, what they keep alive, and x_dot."""
 
 import copy
 import gc
-import math
 import pickle
 import sys
 import threading
 import weakref
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
 
 import serpentail as st
 from tests.support import zoo
 
 from ...support.rows import row
-from .calls import (
+from .conftest import (
     CALLS,
     NV,
     POINTS,
@@ -27,8 +29,6 @@ from .calls import (
     state,
     states,
 )
-
-# Kinds of models
 
 
 def test_float_model(model):
@@ -58,7 +58,16 @@ def test_profiles_agree_to_rounding(users_compiler, name):
         st.load(folder, profile="quick")
 
 
-# Names
+def test_quaternion_may_have_any_norm(model):
+    arguments = state()
+    unit = arguments["q"].copy()
+    unit[3:7] /= np.linalg.norm(unit[3:7])
+    for factor in (-1.0, 2.0**-40, 3.7, 1e-100, 1e100):
+        scaled = np.r_[unit[:3], factor * unit[3:7], unit[7:]]
+        for name in CALLS:
+            with row(name, factor):
+                found, expected = (call(model, name, arguments | {"q": q}) for q in (scaled, unit))
+                assert_close(found, expected, 1e-11, 1e-13)
 
 
 def test_aliases_of_the_field(model):
@@ -94,30 +103,23 @@ def test_external_force_takes_loads_by_name(model):
             model.external_force(**{name: value})
 
 
-# Life of a model
-
-
 def test_eight_threads_on_one_model(model):
-    batch, usual = states(300), sys.getswitchinterval()
+    batch, usual, together = states(300), sys.getswitchinterval(), threading.Barrier(8)
     rows = list(zip(*map(batch.get, ("q", "v", "tau")), strict=True))
     expected = np.array([model.forward_dynamics(*each) for each in rows])
-    found, together = np.zeros((8, *expected.shape)), threading.Barrier(8)
 
     def work(thread):
+        order = np.roll(np.arange(len(rows)), 37 * thread)
         together.wait()
-        for k in np.roll(np.arange(len(rows)), 37 * thread):
-            found[thread, k] = model.forward_dynamics(*rows[k])
+        found = [model.forward_dynamics(*rows[k]) for k in order]
+        return np.array_equal(found, expected[order])
 
-    threads = [threading.Thread(target=work, args=(k,)) for k in range(8)]
     sys.setswitchinterval(1e-6)  # as often as can be
     try:
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
+        with ThreadPoolExecutor(8) as pool:
+            assert all(pool.map(work, range(8)))
     finally:
         sys.setswitchinterval(usual)
-    np.testing.assert_array_equal(found, np.broadcast_to(expected, found.shape))
 
 
 def test_kernel_keeps_what_it_needs():
@@ -135,9 +137,9 @@ def test_kernel_keeps_what_it_needs():
 
 
 def test_copies_are_models(model):
-    originals = [model, model.with_parameters(tail_mass=0.05), zoo.model("baked")]
-    originals += [model.with_parameters(link_inertia=(1, 1, 1))]
-    ways = [copy.copy, copy.deepcopy, lambda m: pickle.loads(pickle.dumps(m))]
+    originals = [model, zoo.model("baked")]
+    originals += [model.with_parameters(tail_mass=0.05, link_inertia=(1, 1, 1))]
+    ways = (copy.copy, copy.deepcopy, lambda m: pickle.loads(pickle.dumps(m)))
     for original in originals:
         given = state(sizes=sizes(original.segments, original.links))
         for k, duplicate in enumerate(ways):
@@ -160,4 +162,72 @@ def test_one_state_costs_few_calls(model):
     entered = [name for event, name in events if event == "call"]
     assert entered == ["forward_dynamics", "kernel", "__call__"]
     assert sum(event == "c_call" for event, _ in events) < 10
-    assert math.isfinite(model.energy(s["q"], s["v"])[0])
+
+
+# x_dot: the equations of motion as one first-order system
+
+
+@pytest.fixture(params=["m1_n3", "arcs2"])
+def moving(request):
+    """A model, its state and its torques."""
+    model, rng = zoo.model(request.param), np.random.default_rng(1)
+    x = rng.normal(size=model.nq + model.nv)
+    x[3:7] /= np.linalg.norm(x[3:7])
+    return model, x, 1e-3 * rng.normal(size=model.layout.nt)
+
+
+def test_the_kinematics_are_those_of_turns(moving):
+    (model, x, u), h = moving, 1e-6
+    nq, omega, x_dot = model.nq, x[model.nq + 3 : model.nq + 6], model.x_dot(x, u)
+    assert np.array_equal(x_dot[:3], x[nq : nq + 3])
+    assert np.array_equal(x_dot[7:nq], x[nq + 6 :])
+    assert np.array_equal(x_dot[nq:], model.forward_dynamics(x[:nq], x[nq:], u))
+    turns = Rotation.from_quat(np.roll(x[3:7], -1)) * Rotation.from_rotvec(np.outer([h, -h], omega))
+    after, before = (np.roll(q, 1) * np.sign(np.roll(q, 1) @ x[3:7]) for q in turns.as_quat())
+    assert np.allclose(x_dot[3:7], (after - before) / (2 * h), rtol=0, atol=1e-9)
+
+
+def test_the_norm_returns_to_one(moving):
+    """The square s of the norm follows s_dot = 2 (1 - s) s / s: s / (1 - s) grows as exp(2 t)."""
+    model, x, u = moving
+    x[3:7] *= 1.1
+    x[model.nq :] *= 0.1
+    settings = {"method": "DOP853", "rtol": 1e-9, "atol": 1e-9}
+    flown = solve_ivp(lambda _, x: model.x_dot(x, 0 * u), (0, 0.1), x, **settings).y[:, -1]
+    after, ratio = flown[3:7], 1.21 / (1 - 1.21) * np.exp(0.2)
+    assert after @ after == pytest.approx(ratio / (1 + ratio), abs=1e-6)
+
+
+def test_values_and_derivatives_are_casadis_interpreted_and_compiled(moving):
+    model, x, u = moving
+    p, f = model.casadi.parameter_vector, model.casadi.x_dot
+    compiled = model.casadi.external("x_dot", derivatives=1)
+    folded = model.casadi.external("x_dot", derivatives=1, folded=True)
+    assert (compiled.name_in(), folded.name_in()) == (["x", "u", "p"], ["x", "u"])
+    jacobian = f.factory("J", ["x", "u", "p"], ["jac:x_dot:x", "jac:x_dot:u"])
+    for norm in (1.0, 0.7):
+        x[3:7] *= norm
+        for found, rtol in ((f(x, u, p), 1e-9), (compiled(x, u, p), 1e-13), (folded(x, u), 1e-13)):
+            assert np.allclose(found.full()[:, 0], model.x_dot(x, u), rtol=rtol, atol=rtol)
+        for own, other in zip(model.x_dot_derivatives(x, u), jacobian(x, u, p), strict=True):
+            assert np.abs(own - other.full()).max() < 1e-12 * np.abs(own).max()
+    by_x = folded.factory("J", ["x", "u"], ["jac:x_dot:x"])(x, u).full()
+    assert np.allclose(by_x, model.x_dot_derivatives(x, u)[0], rtol=1e-11, atol=1e-11)
+
+
+def test_states_in_rows_and_what_is_none(moving):
+    model, x, u = moving
+    assert np.array_equal(model.x_dot(np.stack([x, 2 * x]), u)[0], model.x_dot(x, u))
+    A, B = model.x_dot_derivatives(x, np.stack([u, 3 * u]))
+    assert np.array_equal(A[1], model.x_dot_derivatives(x, 3 * u)[0])
+    assert B.shape == (2, model.nq + model.nv, len(u))
+    size = model.nq + model.nv
+    for wrong, words in (
+        (x[1:], rf"x has shape \({size - 1},\).*{size}.*\({model.nq}\).*\({model.nv}\)"),
+        (np.float64(1), r"x has shape \(\)"),
+        (x * np.nan, r"x\[0\]: value nan"),
+        (0 * x, "quaternion"),
+    ):
+        for method in (model.x_dot, model.x_dot_derivatives):
+            with row(words), pytest.raises(st.StateError, match=words):
+                method(wrong, u)

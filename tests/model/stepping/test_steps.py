@@ -1,5 +1,6 @@
 """Steps of many runs: in lanes as singly, in place as elsewhere, in any number of threads, each run
-under its own torques and parameters, in flight and on the ground, whichever points touch there.
+under its own torques and parameters, in flight and on the ground, whichever points touch there;
+whatever a step cannot take is refused in one line that names it.
 """
 
 import numpy as np
@@ -91,10 +92,7 @@ def test_steps_of_one_call_are_those_of_many(model):
     values = runs_of(model, 780 if not model.contacts else 80)
     one, three = (stepped(model, values, steps=4, threads=n) for n in (1, 3))
     assert np.array_equal(one, three)
-
-
-def test_single_rows_are_repeated(model):
-    values = runs_of(model)
+    values = runs_of(model)  # single rows are repeated
     one = {name: array[2] for name, array in values.items() if name not in ("v", "bristles")}
     tiled = {name: np.tile(array, (RUNS, 1)) for name, array in one.items()}
     assert np.array_equal(stepped(model, values | one), stepped(model, values | tiled))
@@ -103,14 +101,12 @@ def test_single_rows_are_repeated(model):
 def test_runs_have_parameters_of_their_own(model):
     for count in (3, RUNS):
         values = runs_of(model, count)
-        changes = {
-            "tail_mass": np.linspace(0.008, 0.02, count),
-            "gravity": np.linspace(0, 9, count),
-        }
+        mass, gravity = np.linspace(0.008, 0.02, count), np.linspace(0, 9, count)
+        changes = {"tail_mass": mass, "gravity": gravity}
         for each in (changes, model.parameters_of_runs(changes, count)):
             found = stepped(model, values, parameters=each)
             for k in range(count):
-                own = model.with_parameters(**{name: x[k] for name, x in changes.items()})
+                own = model.with_parameters(tail_mass=mass[k], gravity=gravity[k])
                 with row(count, type(each), k):
                     one = {name: array[k] for name, array in values.items()}
                     assert_alike(model, found[k], stepped(own, one))
@@ -143,9 +139,8 @@ def test_floats_and_baked_parameters_serve():
     values = runs_of(zoo.model(AIR))
     found = stepped(zoo.model("single"), {n: a.astype(np.float32) for n, a in values.items()})
     expected = stepped(zoo.model(AIR), values)
-    assert (
-        found.dtype == np.float32 and (np.abs(found - expected) < 2e-4 * (1 + abs(expected))).all()
-    )
+    assert found.dtype == np.float32
+    assert (np.abs(found - expected) < 2e-4 * (1 + np.abs(expected))).all()
     values = runs_of(zoo.model("m1_n3"))
     found, expected = (stepped(zoo.model(name), values) for name in ("baked", "m1_n3"))
     np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
@@ -207,8 +202,8 @@ def test_friction_that_jams_in_some_lanes_is_held_there(in_lanes):
             jams.append(k)
     assert 0 < len(jams) < 18
     together, single = (step(model, values, h=h) for step in (stepped, alone))
-    for k in range(24):
-        assert_alike(model, together[k : k + 1], single[k : k + 1])
+    for one, other in zip(together, single, strict=True):
+        assert_alike(model, one[None], other[None])
 
 
 def test_arcs_bent_out_of_range_fail_where_they_do_alone():
@@ -219,3 +214,84 @@ def test_arcs_bent_out_of_range_fail_where_they_do_alone():
     stepped(model, values, statuses=lanes)
     stepped(model, {name: array[4:5] for name, array in values.items()}, statuses=single)
     assert single[0] != 0 and lanes[4] == single[0] and not np.delete(lanes, 4).any()
+
+
+# What is refused
+
+UPRIGHT = np.eye(11)[3]
+SOUND = {"q": np.tile(UPRIGHT, (9, 1)), "v": np.zeros((9, 10)), "tau": np.zeros((9, 4)), "h": 1e-3}
+ERRORS = dict.fromkeys(("h", "steps", "threads", "method", "stepz"), st.SimulationError)
+ERRORS |= {"parameters": st.ModelError}  # all others: StateError
+REFUSED = [
+    *(("h", value, f"h: value {value}") for value in (0.0, -1e-3, np.nan, np.inf)),
+    ("h", "1 ms", "h: value '1 ms'"),
+    ("h", [1e-3] * 9, "h: value [0.001, "),
+    *(("steps", value, f"steps: value {value}") for value in (0, 2.0, True, 10_001)),
+    ("threads", 0, "threads: value 0"),
+    ("method", "rk5", "method: value 'rk5': did you mean 'rk4'?"),
+    ("stepz", 2, "'stepz': did you mean 'steps'?"),
+    ("q", np.zeros(10), "q has shape (10,), not (11,) or (k, 11)"),
+    ("q", np.zeros((0, 11)), "q has shape (0, 11)"),
+    ("q", np.outer(np.arange(9) < 5, UPRIGHT), "q[3:7] of run 5 is the zero"),
+    ("v", np.zeros((9, 2, 10)), "v has shape (9, 2, 10)"),
+    ("tau", 0.0, "tau has shape ()"),
+    ("tau", ["a"] * 4, "tau: type <U1"),
+    ("v", np.zeros((8, 10)), "numbers of runs differ (q 9, v 8, tau 9)"),
+    ("v", np.where(np.arange(90).reshape(9, 10) == 32, np.nan, 0), "v[3, 2]: value nan"),
+    ("tau", [0, np.inf, 0, 0], "tau[1]: value inf"),
+    ("bristles", np.zeros(4), "bristles: this model has none"),
+    ("legs", np.zeros(8), "legs: this model has none"),
+    ("parameters", {"tail_mass": [1.0]}, "tail_mass: value [1.0]"),
+    ("parameters", {"tail_mas": [1.0]}, "tail_mas: no such parameter"),
+    ("parameters", 3, "parameters: value 3"),
+    ("out", np.zeros((2, 9, 11)), "out: needs 2 arrays, for q, v"),
+    ("out", [np.zeros((9, 11))], "out: needs 2 arrays"),
+    ("statuses", np.zeros(9), "statuses: value"),
+    ("statuses", np.zeros(3, np.intc), "of shape (9,)"),
+]
+UNSOUND = {
+    "of another type": lambda a: a.astype(np.float32),
+    "short": lambda a: a[:4],
+    "Fortran order": lambda a: a.T.copy().T,
+    "no array": lambda a: a.tolist(),
+    "not writeable": lambda a: np.broadcast_to(a[0], a.shape),
+}
+
+
+def test_what_is_wrong_is_named():
+    tail = zoo.model(AIR)
+    for name, value, words in REFUSED:
+        given = SOUND | {name: value}
+        arguments = [given.pop(each) for each in ("q", "v", "tau", "h")]
+        with row(name, value):
+            with pytest.raises(ERRORS.get(name, st.StateError)) as raised:
+                tail.step(*arguments, **given)
+            assert words in str(raised.value) and "\n" not in str(raised.value)
+    for name, spoil in UNSOUND.items():
+        out = [SOUND["q"].copy(), spoil(SOUND["v"])]
+        with row(name), pytest.raises(st.StateError, match=r"step: out: v: value .*writeable C"):
+            tail.step(**SOUND, out=out)
+    made = tail.parameters_of_runs({"tail_mass": np.full(3, 0.01)}, 3)
+    with pytest.raises(st.StateError, match="parameters of 3 runs, not of 9"):
+        tail.step(**SOUND, parameters=made)
+    model = zoo.model("feet_tail")
+    q, v, points = [0, 0, 1, 1, 0, 0, 0, 0, 0], np.zeros(8), 2 * sum(model.contacts.values())
+    with pytest.raises(st.StateError, match=rf"bristles: none: .*\(k, {points}\)"):
+        model.step(q, v, np.zeros(2), 1e-3, legs=np.zeros(8))
+    with pytest.raises(st.StateError, match="legs: none: "):
+        model.step(q, v, np.zeros(2), 1e-3, bristles=np.zeros(points))
+
+
+def test_a_model_without_what_it_needs_says_which():
+    bare = zoo.model("bare")
+    state = [0, 0, 0, 1, 0, 0, 0, 0, 0], np.zeros(8), np.zeros(2), H
+    rows = (
+        (lambda: bare.step(*state), r"without 'rollout'.*`functions`"),
+        (lambda: bare.step(*state, method="implicit_euler"), "without 'rollout', 'implicit'"),
+        (lambda: zoo.model("fixed").step(*np.zeros((3, 4)), 1e-3), "step: fixed has a fixed base"),
+        (lambda: st.load(zoo.folder(AIR), compiled=False).step(**SOUND), "compiled=False"),
+        (lambda: zoo.model(AIR).batch_library.rollouts.function("tail_hops"), "function tail_hops"),
+    )
+    for call, words in rows:
+        with row(words), pytest.raises(st.ModelError, match=words):
+            call()
