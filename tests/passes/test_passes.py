@@ -220,8 +220,9 @@ def random_line(seed, length=120):
     rng, tape = random.Random(seed), Tape()
     nodes = [tape.input(k) for k in range(3)]
     while len(tape.nodes) < length:
-        a, b = rng.choice(nodes[-12:]), rng.choice(nodes)
-        nodes.append(getattr(tape, rng.choice(["add", "sub", "mul", "div"]))(a, b))
+        op = rng.choice(["add", "sub", "mul", "div"])
+        a, b = rng.choice(nodes[-12:]), rng.choice(nodes[:3] if op == "div" else nodes)
+        nodes.append(getattr(tape, op)(a, b))
     return tape.nodes, nodes[-3:]
 
 
