@@ -8,39 +8,24 @@ import pytest
 
 from serpentail_codegen.autodiff.forward import tangent_program
 from serpentail_codegen.autodiff.reverse import adjoint_program
+from serpentail_codegen.ir import dataflow
 from serpentail_codegen.ir.builder import Builder
-from serpentail_codegen.ir.dataflow import (
-    backward_slice,
-    forward_slice,
-    inlined,
-    pruned,
-    reads,
-    writes,
-)
-from serpentail_codegen.ir.interpret import Run
+from serpentail_codegen.ir.dataflow import backward_slice, forward_slice, pruned, reads, writes
 from serpentail_codegen.ir.program import Apply, Guard, Loop, statements
-from tests.support.programs import (
-    EXACT,
-    NEXT,
-    PROGRAMS,
-    RECTANGULAR,
-    SQUARE,
-    TURN,
-    built,
-    numbers,
-    step_of,
-)
+from tests.support import programs
+from tests.support.program_runs import interpreted
+from tests.support.programs import EXACT, NEXT, PROGRAMS, RECTANGULAR, SQUARE, built, numbers
 from tests.support.rows import row
 
-SPLIT = step_of(
+SPLIT = programs.step_of(
     "split", (("x", 1), ("y", 1)), (("s", 1), ("z", 1)), lambda t, x, y: [t.mul(x, x), t.mul(y, y)]
 )
 
 
 def outputs(program, arguments):
     """The outputs of a run by name."""
-    values = Run(program, EXACT, {name: arguments[name] for name in numbers(program)}).values
-    return {a.name: values[a.name] for a in program.of_role("output")}
+    given = {name: arguments[name] for name in numbers(program)}
+    return interpreted(program, given, EXACT)
 
 
 def made():
@@ -131,7 +116,7 @@ def test_outputs_of_a_step_go_one_by_one():
     b.fill(u.part(0, 3), 0)
     b.apply(SPLIT, {"x": x[0], "y": y[0]}, s=w[0], z=dead[0])
     with b.loop("i", 3) as i:
-        b.apply(TURN, {"x": x.part(0, 2), "y": y[i]}, s=b.array("t", 2)[0])
+        b.apply(programs.TURN, {"x": x.part(0, 2), "y": y[i]}, s=b.array("t", 2)[0])
     program = pruned(b.finish())
     (call,) = [s for s in program.body if isinstance(s, Apply)]
     found = (call.step.name, call.reads, call.writes, call.adds)
@@ -185,22 +170,10 @@ def test_called_program_means_the_same():
 def test_called_names_carry_the_programs_name():
     b, a, y, z = outer()
     b.call(PROGRAMS["nested"], x=a, y=y, u=z, w=b.array("w", 1))
-    program = inlined(b.finish())
+    program = dataflow.inlined(b.finish())
     assert " ".join(array.name for array in program.arrays) == "mass a y z w nest_s nest_t"
     for statement, _ in statements(program.body):
         assert all(ref.array in program.arrays for ref in (*reads(statement), *writes(statement)))
-
-
-def test_called_in_a_loop_it_runs_in_every_iteration():
-    b, a, y, z = outer()
-    w, total = b.array("w", 1), b.array("total", 1, role="output")
-    b.fill(total[0], 0)
-    with b.loop("l", 2):
-        b.call(PROGRAMS["accumulators"], x=a, y=y, u=z, w=w)
-        b.copy(total[0], w[0], adds=True)
-    inner = PROGRAMS["accumulators"]
-    expected = outputs(inner, numbers(inner))["w"][0]
-    assert given_to(b.finish(), inner)["total"] == [2 * expected]
 
 
 def test_arguments_that_are_not_bound_are_named():
@@ -213,17 +186,21 @@ def test_arguments_that_are_not_bound_are_named():
 
 
 def test_what_is_called_several_times_has_arrays_of_its_own_each_time():
-    b, a, y, z = outer()
-    w, total = b.array("w", 1), b.array("total", 1, role="output")
-    b.fill(total[0], 0)
-    for _ in range(3):
-        b.call(PROGRAMS["nested"], x=a, y=y, u=z, w=w)
-        b.copy(total[0], w[0], adds=True)
-    names = [array.name for array in inlined(b.finish()).arrays]
-    assert len(set(names)) == len(names)
-    inner = PROGRAMS["nested"]
-    expected = outputs(inner, numbers(inner))["w"][0]
-    assert given_to(b.finish(), inner)["total"] == [3 * expected]
+    """In a loop, and one call after the other: the outputs of all are summed up."""
+    for name in ("accumulators", "nested"):
+        inner, (b, a, y, z) = PROGRAMS[name], outer()
+        w, total = b.array("w", 1), b.array("total", 1, role="output")
+        b.fill(total[0], 0)
+        for times in (2, 1, 1):
+            with b.loop("l", times):
+                b.call(inner, x=a, y=y, u=z, w=w)
+                b.copy(total[0], w[0], adds=True)
+        names = [array.name for array in dataflow.inlined(b.finish()).arrays]
+        with row(name):
+            own = sum(array.role == "local" for array in inner.arrays)
+            assert len(names) == 6 + 3 * own
+            expected = outputs(inner, numbers(inner))["w"][0]
+            assert given_to(b.finish(), inner)["total"] == [4 * expected]
 
 
 def test_parameters_are_shared():
@@ -232,5 +209,4 @@ def test_parameters_are_shared():
     program = b.finish()
     assert [array.name for array in program.of_role("parameters")] == ["mass"]
     given = {"mass": [Fraction(3)], "a": [Fraction(0)] * 3, "y": [Fraction(1)] * 3}
-    run = Run(program, EXACT, given)
-    assert run.values["z"] == [1, 1, 1]
+    assert outputs(program, given)["z"] == [1, 1, 1]

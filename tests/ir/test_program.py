@@ -1,5 +1,5 @@
-"""Programs: what indices, loops, strides and lanes mean, what a builder refuses, and the solvers
-of linear equations.
+"""Programs: what indices, loops, strides and lanes mean, what a builder refuses, the solvers of
+linear equations, and the straight lines of the models.
 """
 
 import math
@@ -9,23 +9,22 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from serpentail_codegen.functions.function import assemble
+from serpentail_codegen.functions.plain import FUNCTIONS
+from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.builder import Builder, narrowed
 from serpentail_codegen.ir.interpret import Run, unroll
 from serpentail_codegen.ir.ldl import ldl_factor, ldl_solve, pair_factor, pair_solve
 from serpentail_codegen.ir.program import Apply, Array, Fill, Index, Loop, as_index, statements
+from serpentail_codegen.ir.tape import live_nodes
 from serpentail_codegen.targets.c.loops import in_loops
-from serpentail_codegen.targets.c.routine import routine_lines
-from tests.support.algebras import FLOATS, RATIONAL
-from tests.support.program_runs import SWAP, outputs
-from tests.support.programs import SUM, step_of
+from tests.references.parameters import TABLE_1, random_states
+from tests.support.program_runs import FLOATS, RATIONAL, interpreted, outputs, unrolled
+from tests.support.programs import SUM, SWAP, step_of
 from tests.support.rows import row
 
-SPLIT = step_of(
-    "split",
-    (("x", 2), ("y", 1)),
-    (("u", 1), ("v", 2)),
-    lambda t, a, b, c: [c, t.add(a, b), t.mul(a, b)],
-)
+PARTS = lambda t, a, b, c: [c, t.add(a, b), t.mul(a, b)]  # noqa: E731
+SPLIT = step_of("split", (("x", 2), ("y", 1)), (("u", 1), ("v", 2)), PARTS)
 
 
 def arrays(b, x, u):
@@ -52,8 +51,7 @@ def test_indices_are_affine():
             assert (3 + a).at(values) == (a + 3).at(values) == a.at(values) + 3
             assert (-2 * a).at(values) == (a * -2).at(values) == -2 * a.at(values)
             assert a + -1 * a == Index()
-    i = Index((("i", 1),))
-    assert i + -1 * i == Index() and as_index(4) == Index((), 4) and as_index(i) is i
+    assert as_index(4) == Index((), 4) and as_index(a) is a
 
 
 def test_arrays_count_vectors():
@@ -93,23 +91,21 @@ def test_empty_loops_are_left_out_and_statements_come_with_those_around_them():
     b.fill(y[0], 0)
     with b.loop("i", 3) as i, b.loop("j", 3) as j:
         b.fill(y[3 * i + j], 1)
-    found = list(statements(b.finish().body))
-    assert [[loop.var for loop in loops] for _, loops in found] == [[], ["i", "j"]]
-    assert all(isinstance(statement, Fill) for statement, _ in found)
-    assert all(isinstance(loop, Loop) for _, loops in found for loop in loops)
+    found = [
+        (type(s), [(type(x), x.var) for x in around]) for s, around in statements(b.finish().body)
+    ]
+    assert found == [(Fill, []), (Fill, [(Loop, "i"), (Loop, "j")])]
 
 
 def test_strided_references_read_and_write_columns():
-    b = Builder("transpose", "A 2 x 3 matrix, transposed.")
-    x, y = arrays(b, 6, 6)
+    """Of a 2 x 3 matrix, and of a 3 x 2 matrix, transposed."""
+    b = Builder("transpose", "Two matrices.")
+    (x, y), z = arrays(b, 6, 6), b.array("z", 6, role="output")
     with b.loop("i", 3) as i:
         b.copy(y.part(2 * i, 2), x.part(i, 2, stride=3))
-    assert outputs(b, x=[1, 2, 3, 4, 5, 6]) == [1, 4, 2, 5, 3, 6]
-    b = Builder("transpose", "A 3 x 2 matrix, transposed.")
-    x, y = arrays(b, 6, 6)
-    with b.loop("i", 3) as i:
-        b.apply(SWAP, {"x": x.part(2 * i, 2)}, x=y.part(i, 2, stride=3))
-    assert outputs(b, x=[1, 2, 3, 4, 5, 6]) == [2, 4, 6, 1, 3, 5]
+        b.apply(SWAP, {"x": x.part(2 * i, 2)}, x=z.part(i, 2, stride=3))
+    found = outputs(b, x=[1, 2, 3, 4, 5, 6])
+    assert found == {"u": [1, 4, 2, 5, 3, 6], "z": [2, 4, 6, 1, 3, 5]}
 
 
 def test_steps_read_everything_before_they_write_and_may_add():
@@ -177,12 +173,9 @@ def test_guards_note_what_must_be_positive_in_order():
         b.guard(x[i], "TOO_SMALL", y[0])
     assert outputs(b, x=[1, -2, 3]) == [0]
     p = b.finish()
-    expected = [("TOO_SMALL", x) for x in (1, -2, 3)]
-    assert Run(p, RATIONAL, {"x": [1, -2, 3]}).guards == expected
+    noted = Run(p, RATIONAL, {"x": [1, -2, 3]}).guards
+    assert noted == [("TOO_SMALL", x) for x in (1, -2, 3)]
     assert unroll(p)[2] == [("TOO_SMALL", node) for node in range(3)]
-
-
-# Lanes and strides, in C too
 
 
 def test_a_lane_of_several_rows_is_read_and_written():
@@ -201,29 +194,10 @@ def test_a_lane_of_several_rows_is_read_and_written():
     assert "apart_8(rows + i + 16, x_new);" in "".join(in_loops(p, "double", "rat").lines)
 
 
-def test_c_reads_and_clears_what_lies_apart():
-    b = Builder("apart", "Scalars.")
-    x, u = arrays(b, 4, 2)
-    b.apply(SWAP, {"x": x.part(0, 2, 2)}, x=u[0])
-    (routine,) = in_loops(b.finish(), "double", "rat").routines
-    lines = routine_lines(routine, "double", "rat")
-    assert lines[-2:] == ["x_out[0] = r0;", "x_out[1] = r1;"] and "const real r0 = x[2];" in lines
-    b = Builder("apart", "Rows.")
-    x, u = b.wide("x", 4, 3), b.wide("u", 2, 3)
-    b.fill(x.part(0, 2, 2), 0)
-    b.apply(SWAP, {"x": x.part(0, 2, 2)}, x=u[0])
-    text = in_loops(b.finish(), "double", "rat")
-    loads = "\n".join(routine_lines(text.routines[0], "double", "rat"))
-    assert "LOAD(&x[0] + c)" in loads and "LOAD(&x[16] + c)" in loads
-    fills = [line for line in text.lines if "fill" in line or "clear" in line]
-    assert fills == [f"rat_fill_rows(8, 0.0, {place});" for place in ("x", "x + 16")]
-
-
 # Linear equations
 
 
 def lower(rows):
-    """The lower triangle of a matrix, in fractions."""
     return [[Fraction(x) for x in values[: k + 1]] for k, values in enumerate(rows)]
 
 
@@ -252,18 +226,6 @@ def test_the_solvers_are_exact_in_rational_arithmetic():
     assert pivots == [3, Fraction(-1, 3)]  # they show what is not positive definite
 
 
-def test_the_solver_agrees_with_numpy():
-    for size in (1, 3, 9, 22):
-        rng = np.random.default_rng(size)
-        half = rng.normal(size=(size, size))
-        A, b = half @ half.T + 0.1 * np.eye(size), rng.normal(size=size)
-        factors, pivots = ldl_factor(FLOATS, [r[: k + 1] for k, r in enumerate(A.tolist())])
-        x = ldl_solve(FLOATS, factors, b.tolist())
-        limit = 1e-14 * np.linalg.cond(A) * np.abs(x).max()
-        np.testing.assert_allclose(x, np.linalg.solve(A, b), rtol=0, atol=limit)
-        assert min(pivots) > 0
-
-
 def test_statements_solve_in_place():
     """[[2, 1], [1, 3]] x = [5, 10], and [[2, 7], [1, 4]] x = [11, 6]: rows 8 apart."""
     rows = {
@@ -282,3 +244,56 @@ def test_statements_solve_in_place():
             assert outputs(b, x=[y for values in matrix for y in [*values, *[0] * 6]]) == solution
             *_, guards = unroll(b.finish())
             assert [status for status, _ in guards] == ["NOT_POSITIVE_DEFINITE"] * 2
+
+
+# Straight lines of the models, parameters baked in or not
+
+TAILS = {"m1_n2": Tail(1, 2), "m2_n3": Tail(2, 3), "arcs2": Tail(2, 3, "continuum")}
+
+
+def arguments_of(program, tail, convert):
+    """Table 1 and a random state for the parameters and inputs of a program."""
+    q, v, v_dot, tau = (rows[0] for rows in random_states(tail.segments, 3, 1, "random"))
+    f_ext = np.random.default_rng(4).uniform(-1, 1, 6 + 3 * (tail.total + 1))
+    known = {"q": q, "v": v, "v_dot": v_dot, "tau": tau, "f_ext": f_ext}
+    known |= {"link_inertia": (4.9e-8, 2e-9, 5e-8)} | TABLE_1
+    arrays = (*program.of_role("parameters"), *program.of_role("input"))
+    return {a.name: [convert(x) for x in np.ravel(known[a.name]).tolist()] for a in arrays}
+
+
+def rounded(x):
+    """A coarse rational: exact arithmetic on it stays small."""
+    coarse = Fraction(round(x * 64), 64)
+    return coarse if abs(x) > 1 / 16 else Fraction(x).limit_denominator(1 << 30)
+
+
+def live_line(program, fixed=None):
+    """Unroll; return the tape and the live nodes, those that must be positive included."""
+    tape, nodes, guards = unroll(program, fixed)
+    wanted = [node for found in nodes.values() for node in found] + [node for _, node in guards]
+    return tape, live_nodes(tape.nodes, wanted)
+
+
+@pytest.mark.parametrize("tail", TAILS)
+def test_unrolling_keeps_every_bit_and_baking_leaves_no_parameter(tail):
+    """Signs of zeros aside: no two constants that round meet in these programs, so folding changes
+    no rounding.
+    """
+    for name, function in FUNCTIONS.items():
+        with row(name):
+            p = assemble(function, TAILS[tail])
+            arguments = arguments_of(p, TAILS[tail], float)
+            expected = interpreted(p, arguments, FLOATS)
+            assert unrolled(p, arguments, FLOATS) == expected
+            assert all(math.isfinite(x) for values in expected.values() for x in values)
+
+            parameters = p.of_role("parameters")
+            tape, live = live_line(p, {a.name: arguments[a.name] for a in parameters})
+            read = {tape.nodes[node][1] for node in live if tape.nodes[node][0] == "input"}
+            assert min(read) >= sum(array.length for array in parameters)
+            assert len(live) <= len(live_line(p)[1])
+            if tail == "m1_n2":  # exactly
+                arguments = arguments_of(p, TAILS[tail], rounded)
+                fixed = [array.name for array in parameters]
+                expected = interpreted(p, arguments)
+                assert unrolled(p, arguments) == unrolled(p, arguments, fixed=fixed) == expected

@@ -12,6 +12,7 @@ from serpentail_codegen.ir.interpret import Numbers
 from serpentail_codegen.ir.step import Step, compacted, specialised
 from serpentail_codegen.ir.tape import (
     BINARY,
+    TERNARY,
     UNARY,
     Tape,
     exact_quotient,
@@ -20,14 +21,39 @@ from serpentail_codegen.ir.tape import (
     operation_count,
     replay,
 )
-from tests.support.algebras import FLOATS, RATIONAL
-from tests.support.random_tapes import INPUTS, SEEDS, grow
+from tests.support.program_runs import FLOATS, RATIONAL
 from tests.support.rows import row
+
+INPUTS = 4
+SEEDS = range(40)
+CONSTANTS = (0, 1, -1, 2, -2, 0.5, -1.0, Fraction(1, 4))  # exact in float64, as are their sums
+
+
+def grow(rng, algebra, tape, leaves, length=80):
+    """Record random operations; return pairs (node, the value computed directly)."""
+    pool = [(tape.input(k), leaf) for k, leaf in enumerate(leaves)]
+    while len(pool) < length:
+        op = rng.choice(BINARY * 2 + UNARY + TERNARY)
+        count = next(k for k, ops in enumerate((UNARY, BINARY, TERNARY), 1) if op in ops)
+        operands = [_operand(rng, algebra, tape, pool) for _ in range(count)]
+        nodes, values = zip(*operands, strict=True)
+        rounds = algebra is FLOATS and None not in map(tape.value, nodes)
+        if (op == "div" and (values[1] == 0 or rounds)) or (op == "sqrt" and values[0] < 0):
+            continue
+        value = getattr(algebra, op)(*values)
+        if abs(value) < 1e60 and (algebra is FLOATS or value.denominator < 10**60):
+            pool.append((getattr(tape, op)(*nodes), value))
+    return pool
+
+
+def _operand(rng, algebra, tape, pool):
+    constant = rng.choice(CONSTANTS)
+    pair = tape.const(constant), algebra.const(constant)
+    return pair if rng.random() < 0.2 else rng.choice(pool)
 
 
 @pytest.fixture
 def tape():
-    """A tape with its inputs recorded."""
     tape = Tape()
     for index in range(INPUTS):
         tape.input(index)

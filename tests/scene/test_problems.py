@@ -1,16 +1,30 @@
-"""Wrong keys of a scene: all are told at once, each with its field, its value and a remedy."""
+"""Wrong keys of a scene: all are told at once, each with its field, its value and a remedy; broken
+files, which both packages refuse in the same words.
+"""
 
+import json
+import os
 import pickle
+import random
+from pathlib import Path
 
 import pytest
 
-from serpentail_codegen.scene.parse import load_scene, scene_for, scene_to_dict
+from serpentail.errors import ModelError
+from serpentail.scenes.file import read_scene
+from serpentail_codegen.scene.parse import load_scene, parse_scene, scene_for, scene_to_dict
 from serpentail_codegen.scene.problems import Problem, SceneError
 from serpentail_codegen.scene.scene import Scene
-from tests.support.hostile import GOOD_NAMES, NAMES
 from tests.support.rows import row
 from tests.support.scenes import VALID
 
+NAMES = (
+    "", " ", ".", "..", "/", "../elsewhere/t", "a/b", "/etc/t", "a\\b", "C:t", "~", "-t",
+    "--output", "_t", "1t", "T", "tA", "t-1", "t.1", "t t", "t\n", "\nt", "t\0", "t;ls", "$(ls)",
+    "t\u0131", "\uff54", "math", "stdio", "float", "a" * 64, "a" * 240, "a" * 100_000,
+    3, 0, True, 1.5, [], ["t"], {}, {"t": 1}, "rät", "features", "Rat",
+)  # fmt: skip
+GOOD_NAMES = ("t", "math_", "float1", "t1", "a_b", "a" * 63, "kangaroo_rat_m1_n3")
 LINKS, STANCE = 'kind = "articulated"\n', VALID + 'contacts = ["torso", "feet"]\n'
 
 
@@ -138,8 +152,7 @@ def test_targets_have_an_order_and_are_all_by_default(read):
 
 def test_names_are_c_identifiers_that_hide_no_header_and_lead_nowhere(refuse_rows, tmp_path):
     one = {"kind": "articulated", "segments": 1, "links": 1}
-    names = (*NAMES, "a-b", "rät", "features", "Rat")
-    refuse_rows((one | {"name": name}, "name", "63") for name in names)
+    refuse_rows((one | {"name": name}, "name", "63") for name in NAMES)
     for name in GOOD_NAMES:
         assert scene_for("articulated", 1, 1, name=name).name == name
     path = tmp_path / "Kangaroo rat.toml"
@@ -159,3 +172,119 @@ def test_each_problem_is_one_short_line_that_crosses_process_borders(refuse):
     with pytest.raises(SceneError) as caught:
         scene_for("articulated", 0, 0)
     assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
+
+
+# Broken files
+
+# fmt: off
+PIECES = [
+    "[[", "]", "=", "#", ".", "\n", "'''", "\\", "\0", "\udcff", "é", "functions", "link_inertia",
+    "name", "[parameters]", "[[parameters]]", "[parameters.x]", '"\\u0000" = 1\n',
+    "true", "false", "nan", "-inf", "0", "-1", "1", "3.5", "1e308", "9" * 400, "0x" + "f" * 4000,
+    "12:30:00", '""', '"3"', '"polar"', '"float"', "[]", "{}", "[1, 1, 1]", "[1, 2, 3.1]",
+    '["energy"]', "[[[]]]", "[{}]",
+]
+# fmt: on
+
+
+def _mutate(text: str, dice: random.Random) -> str:
+    """Replace, insert or swap a few pieces of the text."""
+    for _ in range(dice.randint(1, 2)):
+        start = dice.randrange(len(text) + 1)
+        stop = min(len(text), start + dice.choice([0, 1, 3, 12]))
+        piece = dice.choice([dice.choice(PIECES), text[dice.randrange(len(text) + 1) :][:20]])
+        text = text[:start] + piece + text[stop:]
+    return text
+
+
+def test_damaged_files_never_raise_anything_but_scene_errors(read):
+    dice, survivors, errors = random.Random(2023), [], []
+    parameters = scene_to_dict(scene_for("articulated", 2, 3))["parameters"]
+    lines = [f"{name} = {json.dumps(value)}" for name, value in parameters.items()]
+    text = "\n".join([VALID, 'functions = ["energy"]', "[parameters]", *lines])
+    assert read(text).functions == ("energy",)
+    for _ in range(1200):
+        try:
+            survivors.append(read(_mutate(text, dice).encode(errors="surrogateescape")))
+        except SceneError as error:
+            errors.append(error)
+    assert any(error.problems[0].field != "scene file" for error in errors)
+    assert all(len(str(error).split("\n")) == len(error.problems) > 0 for error in errors)
+    assert all(parse_scene(scene_to_dict(found), "another") == found for found in survivors)
+    assert survivors
+
+
+def test_files_that_are_not_toml_are_refused_with_the_place(read):
+    rows = [
+        ("segments = \n", "line 1, column 12"),
+        ("links = 1\nlinks = 2\n", "line 2"),
+        (b"links = 1\nkind = '\xff'", "byte 18"),
+        ("links = " + "[" * 10_000, "TOML"),
+        ("links = " + "9" * 5_000, "TOML"),
+        ("links = 1\0", "TOML"),
+    ]
+    for text, words in rows:
+        with row(text[:20]), pytest.raises(SceneError, match=words) as caught:
+            read(text)
+        assert "rat.toml" in caught.value.problems[0].value
+    assert read(b"\xef\xbb\xbf" + VALID.replace("\n", "\r\n").encode()) == read(VALID)
+
+
+def unreadable(folder):
+    """Make files from which no scene can be read; their paths by description."""
+    texts = {
+        "empty name": b"kind = ",
+        "latin": b"kind = '\xff'",
+        "large": b"#" * 1_000_001,
+        "deep key": b"a." * 3000 + b"a = 1",
+        "deep number": b"1.1 . " * 3000 + b"1 = 1",
+        "deep header": b"[" + b"a." * 100_000 + b"a]",
+        "deep quoted key": b'"=".' * 10_000 + b"a = 1",
+        "deep array": b"a = " + b"[" * 100_000,
+        "digits": b"a = " + b"9" * 100_000,
+        "nul": b"a = 1\0",
+    }
+    paths = {name: folder / f"{name.replace(' ', '_')}.toml" for name in texts}
+    for name, path in paths.items():
+        path.write_bytes(texts[name])
+    os.mkfifo(folder / "pipe.toml")
+    (folder / "folder.toml").mkdir()
+    (folder / "loop.toml").symlink_to(folder / "loop.toml")
+    more = {name: folder / f"{name}.toml" for name in ("pipe", "folder", "loop", "absent")}
+    more |= {"endless": Path("/dev/zero"), "null": Path("/dev/null")}
+    return paths | more | {"nul in path": folder / "a\0.toml", "long": folder / ("a" * 5000)}
+
+
+def _said(error):
+    """What is wrong and what to do, without the value, which each package shortens in its way."""
+    line = str(error.value)
+    assert "\n" not in line and len(line) < 500
+    field, rest = line.split(": ", 1)
+    return field, rest.rsplit(": ", 1)[1] if "scene file" in field else rest[rest.index("needs") :]
+
+
+def test_both_packages_refuse_what_is_no_scene_file_in_the_same_words(tmp_path):
+    for what, path in unreadable(tmp_path).items():
+        with row(what):
+            with pytest.raises(SceneError) as by_generator:
+                load_scene(path)
+            assert [problem.field for problem in by_generator.value.problems] == ["scene file"]
+            if what == "null":  # a device that ends at once is none either
+                assert "no regular file" in str(by_generator.value)
+            with pytest.raises(ModelError) as by_runtime:
+                read_scene(path, ModelError)
+            assert _said(by_generator) == _said(by_runtime)
+
+
+def test_sizes_of_files_and_depths_of_keys_have_bounds(tmp_path):
+    """A file of 1 MB and 100 dots in a line are taken; dots of numbers are none."""
+    path = tmp_path / "t.toml"
+    numbers = ", ".join(["0.1", "-2.5e-3", "1_0.0", "+3.25E8"] * 5000)
+    text = f"{VALID}[plan]\nx = [{numbers}]\n{'a.' * 100}a = 1\n#"
+    path.write_text(text + "-" * (1_000_000 - len(text)))
+    assert load_scene(path).links == 3
+    assert len(read_scene(path, ModelError)[0]["plan"]["x"]) == 20_000
+    for wrong in (text + "-" * (1_000_001 - len(text)), f"{VALID}[plan]\n{'a.' * 101}a = 1\n"):
+        path.write_text(wrong)
+        with pytest.raises(SceneError, match="scene file"):
+            load_scene(path)

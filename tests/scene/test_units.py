@@ -6,7 +6,6 @@ from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
 
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
 from mpmath import mp, mpf
@@ -14,7 +13,6 @@ from mpmath import mp, mpf
 import serpentail.units
 import serpentail_codegen.scene.units
 from serpentail_codegen.scene.parameters import PARAMETERS
-from serpentail_codegen.scene.parse import scene_for
 from serpentail_codegen.scene.units import MEASURES, dimensions, in_unit, pattern, plain
 from tests.support.rows import row
 from tests.support.scenes import VALID
@@ -130,13 +128,3 @@ def test_the_pattern_of_a_unit_is_what_its_texts_match():
                 assert not re.match(pattern(unit), f"1, 2 {name}")
                 assert not re.match(pattern(unit), "1")
                 in_unit([f"-1.5e-3 {name}", f" .5, 2 {name} "], unit)
-
-
-def test_scenes_of_numbers_with_units_are_the_same_to_the_last_digit():
-    plainly = {"torso_mass": 0.1057, "tail_mount": [0.0, -0.0405, 0.0045]}
-    plainly |= {"torso_inertia": [7e-5] * 3}
-    spoken = {"torso_mass": "105.7 g", "tail_mount": [0, "-40.5 mm", "0.45 cm"]}
-    spoken |= {"torso_inertia": "700, 700, 700 g cm^2"}
-    scenes = [scene_for("articulated", 1, 1, parameters=given) for given in (plainly, spoken)]
-    assert repr(scenes[0]) == repr(scenes[1]) and isinstance(scenes[1].parameters["gravity"], float)
-    assert pytest.approx(0.1057, abs=0) == scenes[1].parameters["torso_mass"]

@@ -1,5 +1,8 @@
-"""What is wrong in a scene file, or in changes of it, is told on one line, and at once."""
+"""What is wrong in a scene file, or in changes of it, is told on one line, and at once; phases:
+one scene and one command for a jump, a flight and a landing.
+"""
 
+import json
 import re
 from pathlib import Path
 
@@ -7,16 +10,19 @@ import numpy as np
 import pytest
 
 import serpentail as st
+from serpentail import cli
 from serpentail.scenes.overrides import changed, parsed
 from serpentail.scenes.plan import plan_arguments
 from serpentail.simulation import limits
 from tests.support import zoo
 from tests.support.rows import row
+from tests.support.scenes import SCENES
 
 START = {"q": [0, 0, 0.3, 1, 0, 0, 0, 0, 0], "v": [0] * 8}
 TASK = {"start": START, "duration": 0.3}
 LONG = "1" + "0" * 400
 HEX = f"0x{'f' * 5000}"
+OVERLAP = "[{at = 0.1, delta = 1.0, duration = 0.2}, {at = 0.2, delta = 0.0, rate = 9}]"
 
 
 def told(error, work, *arguments, **keys):
@@ -28,74 +34,59 @@ def told(error, work, *arguments, **keys):
     return text
 
 
-def moves(text, delta=-0.26):
-    """Legs with moves."""
-    return f"delta = {delta}\nmoves = {text}"
+def moves(text):
+    return f"delta = -0.26\nmoves = {text}"
 
 
-# what replaces a line of the simple scene, what is added to it, and what is told
-WRONG = [
-    ("duration", "duration = -1.0", "", r"simulate.duration: value -1.0"),
-    ("duration", "", "", "simulate.duration: no value"),
-    ("duration", "duration = nan", "", "simulate.duration: value nan"),
-    ("duration", f"duration = {LONG}", "", "simulate.duration: value 1000"),
-    ("duration", f"duration = {HEX}", "", "simulate.duration: value of type int"),
-    ("duration", "duratoin = 1.0", "", "simulate: key: value 'duratoin': .*'duration'"),
-    ("duration", "duration = 1.0\nstep = 1e-12", "", r"step 1e-12: needs 1e\+12"),
-    ("duration", "duration = 1.0\nmost_step = 1e-9", "", r"1e\+09 steps"),
-    ("duration", "duration = 1.0\noutput_step = 1e-9", "", "10000000 samples"),
-    ("height", "height = -0.05", "", r"q0: point \d+ \((tail|feet)\) .* mm deep"),
-    ("height", "height = nan", "", "simulate.start.height: value nan"),
-    ("height", "heigth = 0.1", "", "simulate.start: key: value 'heigth': .*'height'"),
-    ("height", "velocity = [1, 2]", "", r"simulate.start.velocity: value \[1, 2\]: .*three"),
-    ("height", "velocity = [0, 0, 1]\nsettle = {}", "", "simulate.start.settle: .*velocity"),
-    ("height", "rate = [0, 0, 1]\nsettle = {}", "", "simulate.start.settle: .*rate"),
-    ("height", "height = 0.1\nsettle = { rounds = 0 }", "", "rounds: value 0"),
-    ("height", "height = 0.1\nbends = [0.1, 0.2]", "", r"bends has shape \(1, 2\)"),
-    ("gamma", "", "", "simulate.legs: value .*gamma, delta"),
-    ("delta", moves("1"), "", "legs.moves: value 1: .*tables"),
-    ("delta", moves('"at"'), "", "legs.moves: value 'at': .*tables"),
-    ("delta", moves("[]") + "\ntimes = [0.0, 1.0]", "", "simulate.legs: .*not both"),
-    ("delta", moves("[{ at = 0.1, delta = -1.0 }]"), "", "one of rate"),
-    ("delta", moves("[{ at = 0.1, delta = -1.0, rate = -1 }]"), "", r"moves\[0\].rate: value -1"),
-    ("delta", moves("[{ at = 0.1, delta = -0.26, rate = 1 }]"), "", "another angle"),
-    ("delta", moves("[{ at = 0.1, dleta = 1, rate = 1 }]"), "", "'delta'"),
-    (
-        "delta",
-        moves("[{at=0.1, delta=1.0, duration=0.2}, {at=0.2, delta=0.0, rate=9}]", 0.0),
-        "",
-        r"legs.moves\[1\].at: value 0.2: .* 0.3 s",
-    ),
-    ("delta", "delta = [0.0, 1.0]\ntimes = [1.0, 0.0]", "", "Legs: times: value"),
-    ("", "", '[simulate.controller]\nkind = "pfl"\n', "simulate.controller: .*reference"),
-    ("", "", '[simulate.controller]\nkind = "pdf"\n', "'pfl'"),
-    ("", "", '[simulate.controller]\nkind = "damping"\ndamping = -1.0\n', "damping: value -1.0"),
-    ("", "", '[simulate.controller]\nkind = "damping"\nkp = 1.0\n', "'kp': .*'damping'"),
-    ("", "", '[[simulate.controller]]\nkind = "none"\n', r"simulate.controller\[0\]: .*begin"),
-    (
-        "",
-        "",
-        '[[simulate.controller]]\nbegin = 0\nkind = "pdf"\n',
-        r"simulate.controller\[0\].kind: value 'pdf'",
-    ),
-    ("duration", "duration = 1\ncontroller = []", "", r"simulate.controller: value \[\]: .*begin"),
-    ("duration", "duration = 1\ncontroller = 3", "", r"simulate.controller: value 3"),
-    ("", "", "[simulate.reference]\ntimes = [0.0]\n", "simulate.reference: .*times and bends"),
-    ("", "", '[simulate.reference]\nfile = "none.npz"\n', "simulate.reference.file: value"),
-    (
-        "",
-        "",
-        "[simulate.reference]\ntimes = [0.0, 0.0]\nbends = [[0.1], [0.2]]\n",
-        "Reference: times: value",
-    ),
+# what replaces a line of the simple scene, and what is told
+LINES = [
+    ("duration", "duration = -1.0", r"simulate.duration: value -1.0"),
+    ("duration", "", "simulate.duration: no value"),
+    ("duration", "duration = nan", "simulate.duration: value nan"),
+    ("duration", f"duration = {LONG}", "simulate.duration: value 1000"),
+    ("duration", f"duration = {HEX}", "simulate.duration: value of type int"),
+    ("duration", "duration = 1.0\nstep = 1e-12", r"step 1e-12: needs 1e\+12"),
+    ("duration", "duration = 1.0\nmost_step = 1e-9", r"1e\+09 steps"),
+    ("duration", "duration = 1.0\noutput_step = 1e-9", "10000000 samples"),
+    ("height", "height = -0.05", r"q0: point \d+ \((tail|feet)\) .* mm deep"),
+    ("height", "height = nan", "simulate.start.height: value nan"),
+    ("height", "velocity = [0, 0, 1]\nsettle = {}", "simulate.start.settle: .*velocity"),
+    ("height", "rate = [0, 0, 1]\nsettle = {}", "simulate.start.settle: .*rate"),
+    ("height", "height = 0.1\nsettle = { rounds = 0 }", "rounds: value 0"),
+    ("height", "height = 0.1\nbends = [0.1, 0.2]", r"bends has shape \(1, 2\)"),
+    ("gamma", "", "simulate.legs: value .*gamma, delta"),
+    ("delta", moves("1"), "legs.moves: value 1: .*tables"),
+    ("delta", moves('"at"'), "legs.moves: value 'at': .*tables"),
+    ("delta", moves("[]") + "\ntimes = [0.0, 1.0]", "simulate.legs: .*not both"),
+    ("delta", moves("[{ at = 0.1, delta = -1.0 }]"), "one of rate"),
+    ("delta", moves("[{ at = 0.1, delta = -1.0, rate = -1 }]"), r"moves\[0\].rate: value -1"),
+    ("delta", moves("[{ at = 0.1, delta = -0.26, rate = 1 }]"), "another angle"),
+    ("delta", moves("[{ at = 0.1, dleta = 1, rate = 1 }]"), "'delta'"),
+    ("delta", moves(OVERLAP), r"legs.moves\[1\].at: value 0.2: .* 0.3 s"),
+    ("delta", "delta = [0.0, 1.0]\ntimes = [1.0, 0.0]", "Legs: times: value"),
+    ("duration", "duration = 1\ncontroller = []", r"simulate.controller: value \[\]: .*begin"),
+    ("duration", "duration = 1\ncontroller = 3", r"simulate.controller: value 3"),
 ]
+# what is added to it
+ADDED = {
+    '[simulate.controller]\nkind = "pfl"\n': "simulate.controller: .*reference",
+    '[simulate.controller]\nkind = "pdf"\n': "'pfl'",
+    '[simulate.controller]\nkind = "damping"\ndamping = -1.0\n': "damping: value -1.0",
+    '[simulate.controller]\nkind = "damping"\nkp = 1.0\n': "'kp': .*'damping'",
+    '[[simulate.controller]]\nkind = "none"\n': r"simulate.controller\[0\]: .*begin",
+    '[[simulate.controller]]\nbegin = 0\nkind = "pdf"\n': r"controller\[0\].kind: value 'pdf'",
+    "[simulate.reference]\ntimes = [0.0]\n": "simulate.reference: .*times and bends",
+    '[simulate.reference]\nfile = "none.npz"\n': "simulate.reference.file: value",
+}
 
 
 def test_what_is_wrong_with_a_motion_is_named(scenario):
-    for old, new, added, words in WRONG:
-        with row(new, added), pytest.raises(st.SimulationError, match=words) as caught:
-            scenario(added, **({old: new} if old else {})).simulate()
-        assert max(map(len, str(caught.value).splitlines())) < 700
+    rows = [({old: new}, "", words) for old, new, words in LINES]
+    for changed_lines, added, words in [*rows, *(({}, *each) for each in ADDED.items())]:
+        with row(*changed_lines.values(), added):
+            with pytest.raises(st.SimulationError, match=words) as caught:
+                scenario(added, **changed_lines).simulate()
+            assert max(map(len, str(caught.value).splitlines())) < 700
 
 
 def test_what_no_model_can_be_is_one_line(scene, tmp_path):
@@ -148,7 +139,7 @@ def test_changes_that_name_nothing_are_one_line():
     table = {"legs": {"moves": [1]}}
     for text, words in rows.items():
         with row(text):
-            assert words in told(st.SimulationError, lambda t=text: changed(table, parsed([t])))
+            assert words in told(st.SimulationError, lambda t: changed(table, parsed([t])), text)
     found = changed(table, {"legs.moves.0": 5, "a.b": 1})
     assert found == {"legs": {"moves": [5]}, "a": {"b": 1}}
     for value in ("9" * 5000, "[" * 5000, "{" + "a." * 3000 + "a=1}", "kick"):  # words: no TOML
@@ -159,7 +150,6 @@ def test_what_no_plan_can_be_is_one_line():
     rows = [
         ({"start": START | {"q": [0, [1, 2], 3]}}, r"start\[0\]: value \[0, \[1, 2\], 3\]: .*9"),
         ({"start": START | {"v": "free"}}, r"start\[1\]: value 'free': .*8"),
-        ({"damping": 10**300}, "damping: value 1000"),
         ({"damping": 10**400}, "damping: value 1000"),
         ({"smoothing": 1e300}, r"smoothing: value 1e\+300: .* 1e\+100"),
         ({"bounds": {"torque": 1e308}}, r"bounds.torque: value 1e\+308"),
@@ -167,16 +157,15 @@ def test_what_no_plan_can_be_is_one_line():
         ({"rule": ["radau"]}, r"rule: value \['radau'\]: .*'trapezoidal'"),
         ({"solver": ["ipopt"]}, r"solver: value \['ipopt'\]"),
         ({"intervals": 10**9}, "intervals: value 1000000000: .*10000"),
-        ({"seed": -1}, "seed: value -1"),
         ({"track": "yes"}, "track: value 'yes': .*True"),
     ]
+
+    def planned(change):
+        st.plan(zoo.model("m1_n3"), **plan_arguments(TASK | change))
+
     for change, words in rows:
         with row(change):
-            text = told(
-                st.PlanningError,
-                lambda c=change: st.plan(zoo.model("m1_n3"), **plan_arguments(TASK | c)),
-            )
-            assert re.search(words, text)
+            assert re.search(words, told(st.PlanningError, planned, change))
 
 
 def test_a_scene_can_set_numbers_of_a_solver_but_not_make_it_write_files_or_run_code():
@@ -232,3 +221,65 @@ def test_a_scene_without_a_motion(scene):
             st.scenario(name)
     with pytest.raises(st.SimulationError, match="cannot be read"):
         st.scenario("nowhere.toml")
+
+
+# Phases
+
+KICK = SCENES / "kick_and_land.toml"
+
+
+@pytest.fixture
+def refused(tmp_path, capsys):
+    """Return a function from changes of the scene's text to what the command says against it."""
+
+    def told(change):
+        text = KICK.read_text()
+        for old, new in change.items():
+            assert old in text
+            text = text.replace(old, new)
+        path = tmp_path / "scene.toml"
+        path.write_text(text)
+        assert cli.main(["simulate", str(path), "--folder", str(zoo.folder("ground"))]) == 2
+        return capsys.readouterr().err
+
+    return told
+
+
+def test_one_command_makes_the_landing(capsys):
+    folder = str(zoo.folder("ground"))
+    assert cli.main(["simulate", str(KICK), "--folder", folder, "--json", "-"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["landed"] and told["landing_group"] == "feet"
+    assert list(told["phases"]) == ["kick", "right", "land"]
+    assert told["phases"]["right"]["plan_is_true"]
+    assert told["phases"]["land"]["ended_by"] == "duration"
+
+
+def test_phases_can_be_changed():
+    changes = {"phase.0.duration": "0.1 s", "phase.0.moves": []}
+    scene = st.scenario(KICK, zoo.folder("ground"), changes)
+    run = scene.sequence()
+    assert not run.complete and run.trajectory.t[-1] == pytest.approx(0.1)
+    with pytest.raises(st.SimulationError, match="t_span"):
+        scene.simulate(t_span=0.1)
+
+
+def test_what_a_phase_cannot_be_is_named(refused):
+    rows = {
+        'name = "kick"': ('nam = "kick"', r"phase\[0\]: key: value 'nam': .*'name'"),
+        'name = "right"': ("", r"phase\[1\].name: no value"),
+        "duration = 1.5": ("", r"phase\[1\].duration: no value"),
+        'until = "airborne"': ('until = "up"', "until: value 'up': .*'airborne'"),
+        'clearance = "10 mm"': ('clearance = "10 s"', r"phase\[0\].clearance: value '10 s'"),
+        'torso_rate = "free"': ('torso_rat = 1', r"phase\[1\].plan.goal: key: value 'torso_rat'"),
+        "[phase.plan]": ("[phase.plan]\nstart = {}", "'right': plan.start: value {}"),
+        'name = "land"': ('name = "kick"', "'kick'"),
+        "rtol = 1e-5": ("duration = 2.0", r"simulate.duration: .*\[\[phase\]\]"),
+        'delta = "-15 deg"': ('delta = "-15 deg"\nmoves = []', r"simulate.legs.moves: .*phase"),
+        "damping = 5e-3": ("damping = -5e-3", "'land': damping: value -0.005"),
+    }  # fmt: skip
+    for old, (new, words) in rows.items():
+        with row(old):
+            assert re.search(words, refused({old: new}))
+    told = refused({'until = "airborne"': "until = 3", 'name = "land"': "name = 3"})
+    assert "until" in told and "name: value 3" in told  # all at once

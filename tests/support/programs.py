@@ -60,9 +60,8 @@ class Narrow(Run):
         for ref, rows in zip(wide, before, strict=True):
             own = np.arange(ref.lanes) < call.columns.at(at)
             pairs = zip(self.read(ref, at), rows, strict=True)
-            self.write(
-                ref, at, [np.where(own, new, np.nan if old is None else old) for new, old in pairs]
-            )
+            kept = [np.where(own, new, np.nan if old is None else old) for new, old in pairs]
+            self.write(ref, at, kept)
 
 
 def jacobian(program, arguments, active):
@@ -109,12 +108,9 @@ TURN = step_of(
     (("s", 2),),
     lambda t, a, b, y: [t.sub(t.mul(a, y), b), t.add(a, t.mul(b, t.mul(y, y)))],
 )
-RATIO = step_of(
-    "ratio",
-    (("x", 1), ("y", 1)),
-    (("s", 1),),
-    lambda t, x, y: [t.div(x, t.add(t.mul(y, y), t.const(1)))],
-)
+BELOW = lambda t, x, y: [t.div(x, t.add(t.mul(y, y), t.const(1)))]  # noqa: E731
+RATIO = step_of("ratio", (("x", 1), ("y", 1)), (("s", 1),), BELOW)
+SWAP = step_of("swap", (("x", 2),), (("x", 2),), lambda t, a, b: [b, a])
 
 
 def built(count=3):
@@ -175,12 +171,8 @@ def temporaries():
 def columns():
     """A 2 x 3 matrix column by column, written, added to and read with strides."""
     b = Builder("nest", "Strides.")
-    m, y, u = (
-        b.array("m", 6, role="input"),
-        b.array("y", 1, 3, "input"),
-        b.array("u", 6, role="output"),
-    )
-    t = b.array("t", 6)
+    m, u = b.array("m", 6, role="input"), b.array("u", 6, role="output")
+    y, t = b.array("y", 1, 3, "input"), b.array("t", 6)
     b.fill(t[0], *range(6))
     with b.loop("i", 3) as i:
         b.apply(TURN, {"x": m.part(i, 2, 3), "y": y[i]}, s_=t.part(i, 2, 3))
@@ -275,16 +267,7 @@ def triangle():
     return b.finish()
 
 
-RECTANGULAR = {
-    "carry_up": carry(),
-    "carry_down": carry(downward=True),
-    "accumulators": accumulators(),
-    "temporaries": temporaries(),
-    "columns": columns(),
-    "nested": nested(),
-    "chain": chain(),
-    "outputs_read": outputs_read(),
-    "guarded": guarded(),
-    "scratch": scratch(),
-}
+FUNCTIONS = (accumulators, temporaries, columns, nested, chain, outputs_read, guarded, scratch)
+RECTANGULAR = {"carry_up": carry(), "carry_down": carry(downward=True)}
+RECTANGULAR |= {function.__name__: function() for function in FUNCTIONS}
 PROGRAMS = RECTANGULAR | {"triangle": triangle()}

@@ -4,31 +4,11 @@ import re
 from functools import singledispatchmethod
 
 from serpentail_codegen.functions.function import assemble
+from serpentail_codegen.ir import program as ir
 from serpentail_codegen.ir.dataflow import inlined
-from serpentail_codegen.ir.program import (
-    Apply,
-    Call,
-    Copy,
-    Factor,
-    FactorPair,
-    Fill,
-    Guard,
-    Loop,
-    Solve,
-    SolvePair,
-    Unit,
-    When,
-    padded,
-)
+from serpentail_codegen.targets import target
 from serpentail_codegen.targets.expressions import Dialect, Scalars, index_text
-from serpentail_codegen.targets.target import (
-    SEAL,
-    Emission,
-    Target,
-    body_lines,
-    refused,
-    unknown_statement,
-)
+from serpentail_codegen.targets.target import SEAL, body_lines, refused, unknown_statement
 
 NUMPY = Dialect(
     "{name} = {text}",
@@ -122,31 +102,31 @@ class NumpyPrinter:
     statement = singledispatchmethod(unknown_statement)
 
     @statement.register
-    def _loop(self, loop: Loop):
+    def _loop(self, loop: ir.Loop):
         span = f"range({index_text(loop.start)}, {index_text(loop.stop)})"
         head = f"for {loop.var} in {f'reversed({span})' if loop.downward else span}:"
         return [head, *(f"    {line}" for line in body_lines(self, loop.body))]
 
     @statement.register
-    def _when(self, when: When):
+    def _when(self, when: ir.When):
         body = body_lines(self, when.body)
         return [f"if {view(when.scalar)}[0] > 0:", *(f"    {line}" for line in body)]
 
     @statement.register
-    def _fill(self, fill: Fill):
+    def _fill(self, fill: ir.Fill):
         return [f"store({view(fill.target)}, {numbers(fill.values)}, False)"]
 
     @statement.register
-    def _unit(self, unit: Unit):
+    def _unit(self, unit: ir.Unit):
         first, count, lanes = index_text(unit.first), unit.target.size, unit.target.lanes
         return [f"{view(unit.target)} = np.eye({lanes})[{first} : {first} + {count}]"]
 
     @statement.register
-    def _copy(self, copy: Copy):
+    def _copy(self, copy: ir.Copy):
         return [f"store({view(copy.target)}, {view(copy.source)}.copy(), {copy.adds})"]
 
     @statement.register
-    def _apply(self, apply: Apply):
+    def _apply(self, apply: ir.Apply):
         self.steps[apply.step.name] = apply.step
         call = f"{apply.step.name}({', '.join(f'{view(ref)}.copy()' for ref in apply.reads)})"
         outputs = zip(apply.writes, apply.adds, strict=True)
@@ -154,32 +134,32 @@ class NumpyPrinter:
         return [f"new = {call}", *stores]
 
     @statement.register
-    def _guard(self, guard: Guard):
+    def _guard(self, guard: ir.Guard):
         head = f"if not np.all({view(guard.scalar)} > 0):"
         return [head, f'    raise ArithmeticError("{guard.status}")']
 
     @statement.register
-    def _factor(self, factor: Factor):
+    def _factor(self, factor: ir.Factor):
         name = factor.matrix.name
-        return [f"factor({name}, {name}, {factor.size}, {padded(factor.size)})"]
+        return [f"factor({name}, {name}, {factor.size}, {ir.padded(factor.size)})"]
 
     @statement.register
-    def _solve(self, solve: Solve):
+    def _solve(self, solve: ir.Solve):
         name = solve.matrix.name
-        return [f"solve({name}, {name}, {view(solve.x)}, {padded(solve.x.size)})"]
+        return [f"solve({name}, {name}, {view(solve.x)}, {ir.padded(solve.x.size)})"]
 
     @statement.register
-    def _factor_pair(self, factor: FactorPair):
-        name, row = factor.matrix.name, padded(factor.size)
+    def _factor_pair(self, factor: ir.FactorPair):
+        name, row = factor.matrix.name, ir.padded(factor.size)
         return [f"factor({name}[{factor.size * row} :], {name}, {factor.size}, {row})"]
 
     @statement.register
-    def _solve_pair(self, solve: SolvePair):
-        name, row = solve.matrix.name, padded(solve.x.size)
+    def _solve_pair(self, solve: ir.SolvePair):
+        name, row = solve.matrix.name, ir.padded(solve.x.size)
         return [f"solve({name}[{solve.x.size * row} :], {name}, {view(solve.x)}, {row})"]
 
     @statement.register
-    def _call(self, call: Call):
+    def _call(self, call: ir.Call):
         raise refused(self, call, "programs are inlined before they are printed")
 
 
@@ -192,7 +172,7 @@ def emit(scene, tail, functions, version):
     parts = [head, "import numpy as np", HELPERS.strip()]
     parts += ["\n".join(step_lines(step)) for step in steps.values()]
     path = f"{scene.name}_numpy.py"
-    return Emission({path: "\n\n\n".join([*parts, *texts]) + "\n"}, (path,), {}, {})
+    return target.Emission({path: "\n\n\n".join([*parts, *texts]) + "\n"}, (path,), {}, {})
 
 
-TARGET = Target("numpy", NumpyPrinter, emit)
+TARGET = target.Target("numpy", NumpyPrinter, emit)

@@ -1,31 +1,39 @@
-"""Targets: each prints every statement of a program or refuses it in words, and drops none."""
+"""Targets: each prints every statement of a program or refuses it in words, and drops none; the
+NumPy target that follows the recipe means what the programs mean.
+"""
 
 import inspect
+import json
+from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+from serpentail_codegen import pipeline
+from serpentail_codegen.functions.catalogue import CATALOGUE
+from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.ir import program as ir
 from serpentail_codegen.ir.builder import Builder
 from serpentail_codegen.ir.interpret import Numbers, Run
-from serpentail_codegen.pipeline import TARGETS
+from serpentail_codegen.scene.parse import scene_for
 from serpentail_codegen.scene.scene import TARGETS as NAMES
 from serpentail_codegen.targets.c.loops import LoopPrinter, in_loops
+from serpentail_codegen.targets.c.routine import routine_lines
 from serpentail_codegen.targets.casadi.printer import PythonPrinter, step_view
 from serpentail_codegen.targets.target import UnprintableStatement
 from serpentail_codegen.targets.templating import render
+from tests.references.parameters import random_states
+from tests.support.programs import SWAP
 from tests.support.rows import row
-
-
-def printed_kinds(printer):
-    """The kinds of statement that a printer has a method for."""
-    return set(inspect.getattr_static(printer, "statement").dispatcher.registry) - {object}
+from tests.targets.numpy_target import TARGET
 
 
 def test_every_printer_has_a_method_for_each_statement_and_for_nothing_else():
-    assert tuple(TARGETS) == NAMES  # a scene can ask for each
-    for name, target in TARGETS.items():
-        assert printed_kinds(target.printer) == set(ir.STATEMENTS), name
+    assert tuple(pipeline.TARGETS) == NAMES  # a scene can ask for each
+    for target in (*pipeline.TARGETS.values(), TARGET):
+        kinds = inspect.getattr_static(target.printer, "statement").dispatcher.registry
+        assert set(kinds) - {object} == set(ir.STATEMENTS), target.name
 
 
 class Rotate:
@@ -72,15 +80,9 @@ def casadi_values(program, **arguments):
     printer = PythonPrinter(program)
     inputs = [array.name for array in program.of_role("input")]
     view = {"name": program.name, "doc": program.doc, "inputs": inputs, "outputs": [], "shapes": {}}
-    data = {
-        "scene": SimpleNamespace(name="model"),
-        "version": "",
-        "content_hash": "",
-        "sizes": {},
-        "functions": [view | {"lines": printer.lines()}],
-        "steps": [step_view(step) for step in printer.steps.values()],
-        "selects": False,
-    }
+    data = {"scene": SimpleNamespace(name="model"), "version": "", "content_hash": "", "sizes": {}}
+    data |= {"functions": [view | {"lines": printer.lines()}], "selects": False}
+    data["steps"] = [step_view(step) for step in printer.steps.values()]
     names: dict = {}
     exec(render("casadi", "module.py.jinja", data), names)
     return names[program.name]({}, **arguments)
@@ -101,20 +103,32 @@ def test_casadi_adds_what_a_copy_adds():
 # What C's helpers take only side by side.
 
 
-def test_c_fills_scalars_that_lie_apart_one_by_one():
+def test_c_writes_scalars_that_lie_apart_one_by_one():
     b = Builder("apart", "Apart.")
-    y = b.array("y", 12, role="output")
+    p, y = b.array("p", 8, role="parameters"), b.array("y", 12, role="output")
     b.fill(y.part(0, 4, 3), 7, 7, 7, 7)
-    lines = in_loops(b.finish(), "double", "x").lines
-    assert list(lines) == [f"y[{k}] = 7.0;" for k in (0, 3, 6, 9)]
+    b.copy(y.part(1, 4), p.part(1, 4, 2))  # folded in
+    lines = in_loops(b.finish(), "double", "x", {"p": range(8)}).lines
+    copies = [f"y[{k + 1}] = p[{2 * k + 1}];" for k in range(4)]
+    assert list(lines[1:]) == [*(f"y[{k}] = 7.0;" for k in (0, 3, 6, 9)), *copies]
 
 
-def test_c_keeps_the_stride_of_what_is_folded_in():
-    b = Builder("apart", "Apart.")
-    p, y = b.array("p", 4, role="parameters"), b.array("y", 2, role="output")
-    b.copy(y[0], p.part(1, 2, 2))
-    lines = in_loops(b.finish(), "double", "x", {"p": [1, 2, 3, 4]}).lines
-    assert {"y[0] = p[1];", "y[1] = p[3];"} <= set(lines)
+def test_c_reads_and_clears_what_lies_apart():
+    b = Builder("apart", "Scalars.")
+    x, u = arrays(b, 4, 2)
+    b.apply(SWAP, {"x": x.part(0, 2, 2)}, x=u[0])
+    (routine,) = in_loops(b.finish(), "double", "rat").routines
+    lines = routine_lines(routine, "double", "rat")
+    assert lines[-2:] == ["x_out[0] = r0;", "x_out[1] = r1;"] and "const real r0 = x[2];" in lines
+    b = Builder("apart", "Rows.")
+    x, u = b.wide("x", 4, 3), b.wide("u", 2, 3)
+    b.fill(x.part(0, 2, 2), 0)
+    b.apply(SWAP, {"x": x.part(0, 2, 2)}, x=u[0])
+    text = in_loops(b.finish(), "double", "rat")
+    loads = "\n".join(routine_lines(text.routines[0], "double", "rat"))
+    assert "LOAD(&x[0] + c)" in loads and "LOAD(&x[16] + c)" in loads
+    fills = [line for line in text.lines if "fill" in line or "clear" in line]
+    assert fills == [f"rat_fill_rows(8, 0.0, {place});" for place in ("x", "x + 16")]
 
 
 def test_c_refuses_to_add_numbers_to_lanes():
@@ -123,3 +137,59 @@ def test_c_refuses_to_add_numbers_to_lanes():
     b.copy(wide[0], x[0], adds=True)
     with pytest.raises(UnprintableStatement, match="cannot be added to the lanes of wide"):
         in_loops(b.finish(), "double", "x")
+
+
+# The recipe for a target
+
+VALUES = ["mass_matrix", "forward_dynamics", "energy", "tail_points"]
+DERIVATIVES = ["forward_dynamics_derivatives", "inverse_dynamics_hessian", "inverse_dynamics_vjp"]
+SCENES = {
+    "one_link": scene_for("articulated", 1, 1, functions=[*VALUES, *DERIVATIVES]),
+    "links": scene_for("articulated", 2, 3, functions=[*VALUES, *DERIVATIVES, "implicit"]),
+    "arcs": scene_for("continuum", 2, functions=[*VALUES, "inverse_dynamics_derivatives", "pfl"]),
+    "feet": scene_for(
+        "articulated", 1, 2, contacts=["feet", "tail"], functions=["contact_dynamics", "implicit"]
+    ),
+}
+
+
+def emitted(scene, root):
+    """The manifest of a scene's model in NumPy alone, and the names that its module defines."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(pipeline.TARGETS, "numpy", TARGET)
+        pipeline.generate(replace(scene, targets=("numpy",)), root)
+    folder, names = root / scene.name, {}
+    exec((folder / f"{scene.name}_numpy.py").read_text(), names)
+    return json.loads((folder / "manifest.json").read_text()), names
+
+
+def arguments_of(scene, function, tail):
+    """A random state; positive numbers for all other arguments."""
+    q, v, v_dot, tau = (rows[0] for rows in random_states(scene.segments, 5, 1, "random"))
+    known, rng = {"q": q, "v": v, "v_dot": v_dot, "tau": tau}, np.random.default_rng(7)
+    return {
+        a.name: known[a.name] if a.name in known else rng.uniform(0.1, 0.3, a.length(tail))
+        for a in function.inputs
+    }
+
+
+@pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
+def test_emitted_module_computes_what_the_programs_mean(scene, tmp_path):
+    manifest, names = emitted(scene, tmp_path)
+    assert names["__doc__"].endswith(f"derivation {manifest['content_hash']}.")
+    assert manifest["scene"]["targets"] == ["numpy"] and "work" not in manifest
+    tail = pipeline.tail_of(scene)
+    parameters = {key: np.ravel(value).tolist() for key, value in scene.parameters.items()}
+    for name in manifest["functions"]:
+        function = CATALOGUE[name].of(tail)
+        program, arguments = assemble(function, tail), arguments_of(scene, function, tail)
+        arrays = (*program.of_role("parameters"), *program.of_role("input"))
+        given = {a.name: (parameters | arguments)[a.name] for a in arrays}
+        expected = Run(program, Numbers(), given).values
+        found = names[name](parameters, **arguments)
+        with row(name):
+            assert list(found) == [a.name for a in function.outputs]
+            for key, values in found.items():
+                wanted = np.array(expected[key], float)
+                limit = 1e-10 * np.max(np.abs(wanted))
+                np.testing.assert_allclose(values, wanted, rtol=0, atol=limit, err_msg=key)

@@ -12,11 +12,12 @@ from pathlib import Path
 
 import pytest
 
+from serpentail.model.manifest import read_folder
 from serpentail_codegen.__main__ import main
 from serpentail_codegen.scene.problems import SceneError
 from serpentail_codegen.targets import exchange
 from serpentail_codegen.targets.write import write_folder
-from tests.support.file_faults import age, at, before_calls, fault
+from tests.support.file_faults import age, at, before_calls, fault, killed_at
 from tests.support.models import model_folder
 from tests.support.rows import row
 
@@ -109,17 +110,51 @@ def test_file_systems_that_know_less(tmp_path, monkeypatch):
 # Kills
 
 
+def killed_generations(folder, old, new):
+    """Kill a generation of the new model over the old one, at each call of the file system; return
+    how many calls there are, and how often which model was left.
+
+    After each kill the runtime reads one of both, its user's files are there, and the next
+    generation leaves nothing else.
+    """
+    os.fsync = lambda _: None  # a kill loses nothing that was written
+    checked, mine = [read_folder(source) for source in (old, new)], folder / "build" / "mine.o"
+    before, after = (
+        ({name: text.decode() for name, text in found.files.items()}, found.manifest)
+        for found in checked
+    )
+    hashes, left = [found.manifest_hash for found in checked], [0, 0]
+    for moment in itertools.count():
+        write_folder(folder, *before)
+        mine.parent.mkdir(exist_ok=True)
+        mine.write_text("mine")
+        killed = killed_at(moment, lambda: write_folder(folder, *after), (exchange, "_exchanged"))
+        left[hashes.index(read_folder(folder).manifest_hash)] += 1
+        assert mine.read_text() == "mine", moment
+
+        age(folder.parent)
+        write_folder(folder, *after)
+        assert os.listdir(folder.parent) == [folder.name], moment
+        assert read_folder(folder).manifest_hash == hashes[1], moment
+        assert {*os.listdir(folder)} == {*os.listdir(new), "build"}, moment
+        if not killed:
+            return [moment, *left]
+
+
 def test_a_generation_killed_at_any_call_leaves_a_model(tmp_path):
-    """Models of the fewest files, as each call that writes them is a kill."""
+    """Models of the fewest files, as each call that writes them is a kill; in a process without
+    threads, as it forks.
+    """
     options = {"name": "tail", "targets": ["casadi"]}
     sizes = [(1, ["mass_matrix"]), (2, ["mass_matrix", "energy"])]
-    models = [str(model_folder(1, n, functions=names, **options)) for n, names in sizes]
-    program = [sys.executable, "-m", "tests.targets.killed_generations"]
-    command = [*program, str(tmp_path / "root" / "tail"), *models]
+    models = [model_folder(1, n, functions=names, **options) for n, names in sizes]
+    code = "import sys, pathlib, tests.targets.test_write as test\n"
+    code += "print(test.killed_generations(*map(pathlib.Path, sys.argv[1:])))"
+    command = [sys.executable, "-c", code, tmp_path / "root" / "tail", *models]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
-    found = json.loads(done.stdout)
-    assert found["moments"] > 50 and found["old"] > found["new"] > 5
+    moments, old, new = json.loads(done.stdout)
+    assert moments > 50 and old > new > 5
 
 
 def test_parts_of_the_living_stay(folder):

@@ -1,7 +1,9 @@
-"""Passes over programs: directions in turn, tangents at rest left out, steps fused."""
+"""Passes: directions in turn, tangents at rest left out, steps fused, straight lines scheduled."""
 
+import random
 from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -9,41 +11,29 @@ import pytest
 from serpentail_codegen.functions.catalogue import CATALOGUE
 from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.tail import Tail
+from serpentail_codegen.ir import program as ir
 from serpentail_codegen.ir.cost import executed
 from serpentail_codegen.ir.dataflow import inlined
 from serpentail_codegen.ir.interpret import Numbers, Run, unroll
-from serpentail_codegen.ir.program import (
-    Apply,
-    Array,
-    Fill,
-    Index,
-    Loop,
-    Program,
-    Unit,
-    as_index,
-    statements,
-)
+from serpentail_codegen.ir.program import Apply, Array, Fill, Index, Loop, Program
 from serpentail_codegen.ir.step import Step
-from serpentail_codegen.ir.tape import operation_count
+from serpentail_codegen.ir.tape import Tape, live_nodes, operation_count
+from serpentail_codegen.passes import schedule
 from serpentail_codegen.passes.directions import directions_in_turn
 from serpentail_codegen.passes.fused import fit, fused, joined
 from serpentail_codegen.passes.still import without_still
 from serpentail_codegen.passes.unread import without_unread_fills
 from tests.support.rows import row
 
+ZERO, ONE, TWO = map(ir.as_index, range(3))
 NODES = (("input", 0), ("input", 1), ("add", 0, 1))
 ADD = Step("sum", "a + b.", (("a", 1), ("b", 1)), (("c", 1),), NODES, (2,))
-TAILS = {
-    "m1_n3": Tail(1, 3),
-    "m3_n4": Tail(3, 4),
-    "m6_n6": Tail(6, 6),
-    "arcs3": Tail(3, 4, "continuum"),
-}
+TAILS = {"m1_n3": Tail(1, 3), "m3_n4": Tail(3, 4), "m6_n6": Tail(6, 6)}
+TAILS |= {"arcs3": Tail(3, 4, "continuum")}
 
 
 @cache
 def program_of(name, tail):
-    """The program of a function for one of the tails."""
     return assemble(CATALOGUE[name].of(TAILS[tail]), TAILS[tail])
 
 
@@ -103,8 +93,8 @@ def test_a_step_that_lost_its_tangents_has_no_columns_left():
     step = Step("twice", "2 x", (("x", 1),), (("y", 1),), (("input", 0), ("add", 0, 0)), (1,))
     x, y = Array("x", "input", 1), Array("y", "output", 1)
     seed = Array("seed", "local", 1, lanes=3)
-    call = Apply(step, (x[0],), (y[0],), (False,), as_index(2))
-    program = Program("f", "", (x, y, seed), (Unit(seed[0], as_index(0)), call))
+    call = Apply(step, (x[0],), (y[0],), (False,), TWO)
+    program = Program("f", "", (x, y, seed), (ir.Unit(seed[0], ZERO), call))
     assert directions_in_turn(program).body[-1] == Apply(step, (x[0],), (y[0],), (False,))
 
 
@@ -114,10 +104,10 @@ def test_fills_that_are_overwritten_go_and_others_stay():
     k = Index((("k", 1),))
     kept = Fill(y.whole(), (0,) * 3)
     body = (Apply(step, (x[0],), (y.part(k, 1),), (0,)),)
-    loop = Loop("k", as_index(0), as_index(2), False, body)
+    loop = Loop("k", ZERO, TWO, False, body)
     program = Program("f", "", (x, y, z), (Fill(z[0], (0,)), kept, loop))
     assert without_unread_fills(program).body == (kept, loop)
-    everywhere = Loop("k", as_index(0), as_index(3), False, body)
+    everywhere = Loop("k", ZERO, ir.as_index(3), False, body)
     program = Program("f", "", (x, y, z), (kept, everywhere))
     assert without_unread_fills(program).body == (everywhere,)
 
@@ -140,7 +130,7 @@ def test_zeros_are_stored_where_a_step_gave_nothing_else():
     d_x, d_z = (Array(name, "local", 1, lanes=3) for name in ("d_x", "d_z"))
     out = [Array(name, "output", 1, lanes=3) for name in ("a", "b")]
     call = Apply(step, (x[0], d_x[0], d_z[0]), (out[0][0], out[1][0]), (False, False))
-    start = Unit(d_x[0], as_index(0)), Fill(d_z[0], (0,))
+    start = ir.Unit(d_x[0], ZERO), Fill(d_z[0], (0,))
     program = Program("f", "", (x, d_x, d_z, *out), (*start, call))
     _, found, zeros = without_still(program).body
     assert found.reads == (d_x[0],) and found.writes == (out[1][0],)
@@ -152,7 +142,7 @@ def test_zeros_are_stored_where_a_step_gave_nothing_else():
 
 def steps(program):
     """How many steps a program applies."""
-    return sum(isinstance(s, Apply) for s, _ in statements(program.body))
+    return sum(isinstance(s, Apply) for s, _ in ir.statements(program.body))
 
 
 def test_fewer_steps_give_the_same_numbers():
@@ -175,19 +165,17 @@ def test_steps_are_joined_only_where_the_second_reads_what_the_first_stored():
     assert fit(call(0, 1, 2), call(3, 4, 0))  # overwrites what was read
     assert not fit(call(0, 1, 2, adds=True), call(2, 0, 3))
     assert not fit(call(0, 1, 2), call(3, 4, 2))
-    assert not fit(call(0, 1, 2), replace(call(2, 0, 3), columns=as_index(1)))
+    assert not fit(call(0, 1, 2), replace(call(2, 0, 3), columns=ONE))
     pair = Apply(ADD, (x.part(2, 1, 2), x.part(0, 1)), (x.part(3, 1),), (False,))
     wide = replace(pair, reads=(replace(pair.reads[0], size=2), pair.reads[1]))
     assert not fit(call(0, 1, 2), wide)
 
-
-def test_steps_of_other_directions_stay_apart():
     def twice(lanes):
         x, y = (Array(f"{name}{lanes}", "local", 1, lanes=lanes) for name in "xy")
         return Apply(ADD, (x[0], x[0]), (y[0],), (False,))
 
     assert fit(twice(0), twice(2)) and fit(twice(2), twice(0))
-    assert not fit(twice(2), twice(5))
+    assert not fit(twice(2), twice(5))  # other directions
 
 
 def test_ways_to_join_two_steps_have_names_of_their_own():
@@ -203,9 +191,9 @@ def test_short_loops_are_written_out_with_the_lanes_that_each_iteration_needs():
     x, y = Array("x", "input", 2, lanes=4), Array("y", "output", 2, lanes=4)
     k = Index((("k", 1),))
     call = Apply(ADD, (x.part(k, 1), x.part(0, 1)), (y.part(k, 1),), (False,), 2 * k + 2)
-    loop = Loop("k", as_index(0), as_index(2), False, (call,))
+    loop = Loop("k", ZERO, TWO, False, (call,))
     first, second = fused(Program("f", "", (x, y), (loop,))).body
-    assert (first.columns, second.columns) == (as_index(2), as_index(4))
+    assert (first.columns, second.columns) == (TWO, ir.as_index(4))
     assert (first.writes, second.writes) == ((y.part(0, 1),), (y.part(1, 1),))
 
 
@@ -216,3 +204,96 @@ def test_what_is_added_to_a_fill_is_stored():
     assert step.adds == (False,)
     numbers = {"x": [2.0, 3.0]}
     assert Run(Program("f", "", (x, y), (step,)), Numbers(), numbers).values["y"] == [10.0]
+
+
+# The schedule of straight lines: every value once, after what it needs
+
+
+def straight(tail):
+    """Nodes and results of forward dynamics."""
+    tape, outputs, guards = unroll(assemble(CATALOGUE["forward_dynamics"].of(tail), tail))
+    return tape.nodes, [*outputs["v_dot"], *(node for _, node in guards)]
+
+
+def random_line(seed, length=120):
+    """Nodes of a random straight line over three inputs, and its last values."""
+    rng, tape = random.Random(seed), Tape()
+    nodes = [tape.input(k) for k in range(3)]
+    while len(tape.nodes) < length:
+        op = rng.choice(["add", "sub", "mul", "div"])
+        a, b = rng.choice(nodes[-12:]), rng.choice(nodes[:3] if op == "div" else nodes)
+        nodes.append(getattr(tape, op)(a, b))
+    return tape.nodes, nodes[-3:]
+
+
+def assert_valid(nodes, live, order):
+    """The order has every live node once, operands before their use."""
+    assert sorted(order) == sorted(live)
+    place = {n: k for k, n in enumerate(order)}
+    for n in order:
+        if nodes[n][0] not in schedule.LEAVES:
+            assert all(place[a] < place[n] for a in nodes[n][1:])
+
+
+def scheduled_by_the_rule(nodes, live, results):
+    """The rule as it is stated: at every step, look at all that is ready."""
+    operations = [n for n in live if nodes[n][0] not in schedule.LEAVES]
+    needs = {n: {a for a in nodes[n][1:] if a in operations} for n in operations}
+    users = {n: {u for u in operations if n in needs[u]} for n in operations}
+    height = {}
+    for n in reversed(operations):
+        beyond = max((height[u] for u in users[n]), default=0)
+        height[n] = beyond + schedule.LATENCY.get(nodes[n][0], 4)
+
+    order, alive = [], 0
+    while len(order) < len(operations):
+        ready = [n for n in operations if n not in order and needs[n] <= set(order)]
+        frees = {
+            n: sum(a not in results and users[a] - set(order) == {n} for a in needs[n])
+            for n in ready
+        }
+        if alive >= schedule.REGISTERS:
+            best = max(ready, key=lambda n: (frees[n], height[n], -n))
+        else:
+            best = max(ready, key=lambda n: (height[n], frees[n], -n))
+        order.append(best)
+        alive += 1 - frees[best]
+    return [n for n in live if nodes[n][0] in schedule.LEAVES] + order
+
+
+def test_the_order_is_that_of_the_rule(monkeypatch):
+    for seed in range(10):
+        nodes, results = random_line(seed)
+        more = [*results, *random.Random(seed).sample(range(3, len(nodes)), 20)]
+        for registers in (3, 8, 24):
+            monkeypatch.setattr(schedule, "REGISTERS", registers)
+            for wanted in (results, more):
+                live = live_nodes(nodes, wanted)
+                order = schedule.scheduled(nodes, live, wanted)
+                with row(seed, registers):
+                    assert_valid(nodes, live, order)
+                    assert order == scheduled_by_the_rule(nodes, live, wanted)
+
+
+def test_functions_keep_their_dependencies_and_change_their_order():
+    for size in ((1, 1), (1, 3), (3, 2)):
+        nodes, results = straight(Tail(*size))
+        live = live_nodes(nodes, results)
+        order = schedule.scheduled(nodes, live, results)
+        with row(size):
+            assert_valid(nodes, live, order)
+            assert order != live
+            assert order == schedule.scheduled(nodes, live, results)
+    nodes, results = straight(Tail(3, 4))  # long lines are left alone
+    live = live_nodes(nodes, results)
+    assert schedule.scheduled(nodes, live, results) == live
+
+
+def test_lines_of_much_independent_work_are_left_alone():
+    """Pairs of a sum and its product, 8 cycles: enough to be busy in any order, or one less."""
+    for more, alone in ((0, False), (1, True)):
+        tape, pairs = Tape(), 4 * schedule.MOST_ABREAST + more
+        x = [tape.input(k) for k in range(pairs + 1)]
+        results = [tape.mul(tape.add(a, b), a) for a, b in pairwise(x)]
+        live = live_nodes(tape.nodes, results)
+        assert (schedule.scheduled(tape.nodes, live, results) == live) == alone
