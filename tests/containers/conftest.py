@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from tests.motion.analytic import motion
+from tests.motion.conftest import motion
 from tests.support import zoo
 
 SETTINGS = {"legs": st.Legs.fixed(3.6, -0.3), "output_step": 0.002, "rtol": 1e-6}

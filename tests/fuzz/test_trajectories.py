@@ -6,7 +6,7 @@ import xarray
 from hypothesis import strategies as some
 
 import serpentail as st
-from tests.motion.analytic import fields, motion
+from tests.motion.conftest import fields, motion
 from tests.support.rows import row
 
 from .searching import answer

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from serpentail.attitude import pitch_roll_yaw, product, quaternion_rate, rotation_matrix
 from tests.support.rows import row
 
-from .analytic import top
+from .conftest import top
 
 RNG = np.random.default_rng(5)
 A, B = RNG.normal(size=(2, 7, 4))
