@@ -1,18 +1,22 @@
 """Every function of a model answers with finite numbers or refuses, whatever it is given; the same
-numbers give the same bits in whatever form they come; a batch is its single calls.
+numbers give the same bits in whatever form they come; a batch is its single calls. Trajectories are
+made, sampled anew, kept and read, or refused by a ValueError.
 """
 
 import inspect
 
 import numpy as np
 import pytest
+import xarray
 from hypothesis import assume
 from hypothesis import strategies as some
 
 import serpentail as st
+from tests.motion.conftest import fields, motion
 from tests.support import zoo
+from tests.support.rows import row
 
-from .searching import answer, outputs
+from .conftest import answer
 from .strange import FORMS, plain, strange
 
 MODELS = some.sampled_from(["ground_m1_n1", "arcs1", "single"])
@@ -36,6 +40,10 @@ def calls(draw):
     model = zoo.model(draw(MODELS))
     name, shapes = draw(some.sampled_from(sorted(functions(model).items())))
     return getattr(model, name), {word: draw(plain(shape)) for word, shape in shapes.items()}
+
+
+def outputs(result) -> tuple:
+    return result if isinstance(result, tuple) else (result,)
 
 
 def upright(arguments):
@@ -111,15 +119,9 @@ def test_a_step_is_made_or_refused(search):
             given["h"] = data.draw(strange())
         answer(model.step, **given)
 
-    search(
-        law,
-        name=some.sampled_from(["ground_m1_n1", "m1_n1"]),
-        many=some.booleans(),
-        wrong=some.integers(0, 5),
-        every=some.booleans(),
-        steps=some.sampled_from([1, 3]),
-        data=some.data(),
-    )
+    names, steps = some.sampled_from(["ground_m1_n1", "m1_n1"]), some.sampled_from([1, 3])
+    how = {"wrong": some.integers(0, 5), "every": some.booleans(), "data": some.data()}
+    search(law, name=names, many=some.booleans(), steps=steps, **how)
 
 
 def test_parameters_are_taken_or_refused(search):
@@ -162,3 +164,79 @@ def test_unknown_words_and_too_many_are_type_errors():
             getattr(model, name)(*[np.zeros(3)] * (len(shapes) + 3))
         with pytest.raises(TypeError):
             getattr(model, name)(nothing=1)
+
+
+# Trajectories.
+
+REFUSED = (ValueError, st.SerpentailError)
+SOME_TIMES = some.lists(some.floats(-9, 9), min_size=1, max_size=9, unique=True).map(sorted)
+INSIDE = some.lists(some.floats(0, 0.4), min_size=1, max_size=5, unique=True).map(sorted)
+
+
+@pytest.fixture(scope="module")
+def flight():
+    return motion(np.linspace(0, 0.4, 21), segments=1)
+
+
+def test_fields_are_taken_or_refused(flight, taken_or_refused):
+    own, value = fields(flight), strange((21,)) | strange((21, 9))
+    taken_or_refused(st.Trajectory, [*own, "contact"], value, own, REFUSED)
+
+
+def test_the_same_numbers_make_the_same_motion(flight):
+    for form, formed in FORMS.items():
+        given = {name: x for name, x in fields(flight).items() if name != "info"}
+        if form == "float32":
+            given = {name: x.astype(np.float32).astype(float) for name, x in given.items()}
+        expected = st.Trajectory(**given)
+        found = st.Trajectory(**{name: formed(x) for name, x in given.items()})
+        for name in given:
+            with row(form, name):
+                np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
+                assert type(getattr(found, name)) is np.ndarray
+                assert getattr(found, name).flags.c_contiguous
+
+
+def test_new_samples_are_one_by_one_what_they_are_together(flight, search):
+    def law(times, odd):
+        answer(flight.resample, odd, refusals=REFUSED)
+        together = answer(flight.resample, times)
+        for k, t in enumerate(times):
+            alone = answer(flight.resample, [t])
+            for name in ("q", "v", "tau", "kinetic"):
+                one, same = getattr(alone, name)[0], getattr(together, name)[k]
+                np.testing.assert_allclose(one, same, rtol=0, atol=1e-13)
+
+    search(law, times=INSIDE, odd=strange((3,)) | some.lists(some.floats(-0.1, 0.5), max_size=5))
+
+
+def test_what_is_kept_is_read_again(search, tmp_path):
+    def law(times, segments):
+        flight = motion(np.array(times), segments)
+        again = st.Trajectory.load(flight.save(tmp_path / "run"))
+        for name, value in fields(flight).items():
+            np.testing.assert_array_equal(getattr(again, name), value)
+        path = flight.to_csv(tmp_path / "run.csv")
+        table = np.atleast_1d(np.genfromtxt(path, delimiter=",", names=True))
+        np.testing.assert_array_equal(table["time_s"], flight.t)
+        np.testing.assert_array_equal(table["qw_1"], flight.q[:, 3])
+        np.testing.assert_array_equal(flight.to_xarray().q, flight.q)
+        with xarray.open_dataset(flight.to_netcdf(tmp_path / "run.nc")) as data:
+            np.testing.assert_array_equal(data.v, flight.v)
+
+    search(law, times=SOME_TIMES, segments=some.integers(0, 3))
+
+
+def test_names_of_files_are_taken_or_refused(flight, search, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = some.text(some.characters(codec="utf-8", exclude_characters="/"), max_size=300)
+
+    def law(method, name):
+        found = answer(getattr(flight, method), name, refusals=(*REFUSED, TypeError))
+        assert found is None or found.stat().st_size > 100
+        if found is not None and method == "save":
+            np.testing.assert_array_equal(st.Trajectory.load(found).q, flight.q)
+        assert {p.resolve().parent for p in tmp_path.iterdir()} <= {tmp_path.resolve()}
+
+    methods = some.sampled_from(["save", "to_csv", "to_netcdf"])
+    search(law, method=methods, name=names | some.none() | some.integers())
