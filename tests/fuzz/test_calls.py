@@ -1,13 +1,12 @@
 """Every function of a model answers with finite numbers or refuses, whatever it is given; the same
-numbers give the same bits in whatever form they come; a batch is its single calls. Trajectories are
-made, sampled anew, kept and read, or refused by a ValueError.
+numbers give the same bits in whatever form they come. Trajectories are made, sampled anew and kept,
+or refused by a ValueError.
 """
 
 import inspect
 
 import numpy as np
 import pytest
-import xarray
 from hypothesis import assume
 from hypothesis import strategies as some
 
@@ -20,7 +19,6 @@ from .conftest import answer
 from .strange import FORMS, plain, strange
 
 MODELS = some.sampled_from(["ground_m1_n1", "arcs1", "single"])
-CLOSE = {np.float64: 1e-9, np.float32: 2e-3}  # of a batch to its states, of the largest number
 
 
 def functions(model):
@@ -79,28 +77,6 @@ def test_the_same_numbers_give_the_same_bits(search):
             assert type(one) is type(other) and one.dtype == other.dtype
 
     search(law, call=calls(), batch=some.booleans(), form=some.sampled_from(sorted(FORMS)))
-
-
-def test_a_batch_is_its_single_calls(search):
-    """Arguments of one state are repeated over the batch."""
-
-    def law(call, several, count):
-        method, arguments = call
-        upright(arguments)
-        rows = {}
-        for k, (word, x) in enumerate(arguments.items()):
-            rows[word] = x if k and several[k] else np.linspace(0.5, 1.5, count)[:, None] * x
-        found = answer(method, **rows)
-        assume(found is not None)
-        for k in range(count):
-            of_k = {word: x if x.ndim == 1 else x[k] for word, x in rows.items()}
-            for one, many in zip(outputs(answer(method, **of_k)), outputs(found), strict=True):
-                size = max(np.abs(one).max(), 1e-12)
-                near = CLOSE[many.dtype.type]
-                np.testing.assert_allclose(many[k], one, rtol=near, atol=near * size)
-
-    several = some.lists(some.booleans(), min_size=8, max_size=8)
-    search(law, call=calls(), several=several, count=some.sampled_from([1, 2, 3, 9]))
 
 
 def test_a_step_is_made_or_refused(search):
@@ -169,7 +145,6 @@ def test_unknown_words_and_too_many_are_type_errors():
 # Trajectories.
 
 REFUSED = (ValueError, st.SerpentailError)
-SOME_TIMES = some.lists(some.floats(-9, 9), min_size=1, max_size=9, unique=True).map(sorted)
 INSIDE = some.lists(some.floats(0, 0.4), min_size=1, max_size=5, unique=True).map(sorted)
 
 
@@ -208,23 +183,6 @@ def test_new_samples_are_one_by_one_what_they_are_together(flight, search):
                 np.testing.assert_allclose(one, same, rtol=0, atol=1e-13)
 
     search(law, times=INSIDE, odd=strange((3,)) | some.lists(some.floats(-0.1, 0.5), max_size=5))
-
-
-def test_what_is_kept_is_read_again(search, tmp_path):
-    def law(times, segments):
-        flight = motion(np.array(times), segments)
-        again = st.Trajectory.load(flight.save(tmp_path / "run"))
-        for name, value in fields(flight).items():
-            np.testing.assert_array_equal(getattr(again, name), value)
-        path = flight.to_csv(tmp_path / "run.csv")
-        table = np.atleast_1d(np.genfromtxt(path, delimiter=",", names=True))
-        np.testing.assert_array_equal(table["time_s"], flight.t)
-        np.testing.assert_array_equal(table["qw_1"], flight.q[:, 3])
-        np.testing.assert_array_equal(flight.to_xarray().q, flight.q)
-        with xarray.open_dataset(flight.to_netcdf(tmp_path / "run.nc")) as data:
-            np.testing.assert_array_equal(data.v, flight.v)
-
-    search(law, times=SOME_TIMES, segments=some.integers(0, 3))
 
 
 def test_names_of_files_are_taken_or_refused(flight, search, tmp_path, monkeypatch):
