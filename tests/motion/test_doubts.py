@@ -129,9 +129,7 @@ def test_how_deep_a_tail_goes_by_points_close_together():
         found = sunk(tails)
         np.testing.assert_allclose(found, [through(tail) for tail in tails], atol=1e-6)
         assert found.any()
-
-
-def test_tails_that_leave_the_torso_are_not_in_it():
+    # those that leave the torso are not in it
     mounts = 0.84 * sphere(50)
     ways = np.linspace(0, 3, 7)[:, None] * np.ones((50, 1, 3))
     assert sunk(mounts[:, None] * (1 + ways)).max() == 0  # straight away
@@ -168,7 +166,7 @@ def test_blows_from_20_body_weights_on(rat):
         assert all("t = 2 s" in each and "20.1" in each for each in told)
 
 
-def test_bends_beyond_half_a_turn():
+def test_bends_beyond_half_a_turn(rat):
     """Of joints what all links turn together; of arcs the length of (a, b), or theta."""
     along = np.array([np.cos(2.0), np.sin(2.0)])
     for name, segment, bent in (
@@ -188,9 +186,7 @@ def test_bends_beyond_half_a_turn():
                 assert len(told) == count
                 assert all(f"segment {segment} " in each for each in told)
                 assert all("3.21 rad at t = 2 s" in each for each in told)
-
-
-def test_bends_of_more_than_two_turns_are_taken_for_degrees(rat):
+    # of more than two turns they are taken for degrees
     for bend, degrees in ((12.5, False), (12.6, True)):
         q = at_height(rat, 1.0)
         q[:, 7] = bend / 3
@@ -200,15 +196,13 @@ def test_bends_of_more_than_two_turns_are_taken_for_degrees(rat):
 # Where the model is, and where it is not.
 
 
-def test_files_and_pickles_keep_what_was_found(kick, tmp_path):
+def test_files_and_pickles_keep_what_was_found(kick, rat, tmp_path):
     loaded = st.Trajectory.load(kick.save(tmp_path / "kick.npz"))
     for copy in (loaded, pickle.loads(pickle.dumps(kick))):
         assert copy.model is None and copy.warnings == kick.warnings
     again = st.Trajectory.load(loaded.save(tmp_path / "again.npz"))
     assert again.warnings == kick.warnings and "doubts" not in kick.info
-
-
-def test_books_that_do_not_balance_come_first(rat):
+    # of books that do not balance first
     motion = made(rat, 0.0)
     motion.info["warnings"] = ["the books"]
     assert motion.warnings[0] == "the books" and len(motion.warnings) > 1

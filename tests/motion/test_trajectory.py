@@ -177,25 +177,21 @@ def test_resample_converges_to_the_free_top_and_the_sines():
     assert np.log2(coarse / half)[2] > 3.5 and coarse[2] < 1e-3
 
 
-def test_resample_is_exact_for_a_parabolic_flight_and_keeps_unit_quaternions(flight):
+def test_resample_is_exact_for_a_parabola_of_linear_torque_and_does_not_overshoot(flight):
     t = np.linspace(0, 0.4, 997)
     dense = flight.resample(t)
     np.testing.assert_allclose(dense.q[:, :3], motion(t).q[:, :3], rtol=0, atol=1e-15)
     np.testing.assert_allclose(dense.v[:, :3], motion(t).v[:, :3], rtol=0, atol=1e-14)
     np.testing.assert_allclose(np.linalg.norm(dense.attitude, axis=1), 1, rtol=0, atol=4e-16)
+    expected = np.stack([np.interp(t, flight.t, column) for column in flight.tau.T], axis=1)
+    np.testing.assert_allclose(dense.tau, expected, rtol=0, atol=1e-14)
+    step = np.where(flight.t < 0.2, 0.0, 1.0)
+    energy = dataclasses.replace(flight, kinetic=step).resample(t).kinetic
+    assert energy.min() == 0 and energy.max() == 1
     # whatever the signs of the quaternions
     q = flight.q.copy()
     q[1:, 3:7] *= np.random.default_rng(2).choice([-1.0, 1.0], len(q) - 1)[:, None]
     np.testing.assert_array_equal(dataclasses.replace(flight, q=q).resample(t).q, dense.q)
-
-
-def test_torque_is_linear_and_energies_do_not_overshoot(flight):
-    t = np.linspace(0, 0.4, 777)
-    step = np.where(flight.t < 0.2, 0.0, 1.0)
-    dense = dataclasses.replace(flight, kinetic=step).resample(t)
-    assert dense.kinetic.min() == 0 and dense.kinetic.max() == 1
-    expected = np.stack([np.interp(t, flight.t, column) for column in flight.tau.T], axis=1)
-    np.testing.assert_allclose(dense.tau, expected, rtol=0, atol=1e-14)
 
 
 def test_no_motion_goes_on_beyond_its_samples(flight):
@@ -213,9 +209,7 @@ def test_no_motion_goes_on_beyond_its_samples(flight):
                 with row(samples, t), pytest.raises(ValueError, match="outside"):
                     short.resample(t)
     assert flight.resample([0.0, np.nextafter(0.4, 1)]).t[-1] == 0.4
-
-
-def test_one_sample_and_no_tail_resample_too():
+    # one sample and no tail will do
     alone = motion(np.array([0.1]), segments=0)
     again = alone.resample([0.1])
     np.testing.assert_allclose(again.q, alone.q, rtol=0, atol=4e-16)

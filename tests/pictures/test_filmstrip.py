@@ -114,6 +114,11 @@ def test_motions_are_rows_at_the_same_times():
     films = strip_of([one, other], 5, [SIDE], ["a", "b"], None).films
     for first, second in zip(*films, strict=True):
         assert abs(first.time - second.time) < np.diff(one.t).max() / 2
+    # those nearest to wanted times
+    (film,) = strip_of([one], [0.31, 0.0, 0.1], [SIDE], None, None).films
+    nearest = [one.t[np.abs(one.t - t).argmin()] for t in (0.0, 0.1, 0.31)]
+    assert [frame.time for frame in film] == nearest
+    assert len(strip_of([flight(samples=3)], 8, [SIDE], None, None).films[0]) == 3
 
 
 def test_moments_do_not_repeat_what_rests():
@@ -126,24 +131,13 @@ def test_moments_do_not_repeat_what_rests():
         assert ((times > 0) & (times < 0.4)).sum() <= count // 8
         even = np.linspace(0, 1.2, count)
         np.testing.assert_allclose(moments([(t, 0 * t)], count), even, atol=1e-3)
-
-
-def test_the_way_is_that_of_the_drawn_points():
-    """A torso that slides 1 m and back has gone 2 m."""
+    # the way is that of the drawn points: a torso that slides 1 m and back has gone 2 m
     motion = flight(SPEEDS["still"], segments=0, samples=101)
     q = motion.q.copy()
     q[:, 3:7] = 1, 0, 0, 0
     q[:, 1] = 0.5 - np.abs(np.linspace(-1, 1, 101)) / 2
     gone = way(motion.model, dataclasses.replace(motion, q=2 * q - q * (np.arange(7) > 2)))
     assert gone[0] == 0 and gone[-1] == pytest.approx(2) and (np.diff(gone) > 0).all()
-
-
-def test_frames_are_the_samples_nearest_to_wanted_times():
-    motion = flight()
-    (film,) = strip_of([motion], [0.31, 0.0, 0.1], [SIDE], None, None).films
-    nearest = [motion.t[np.abs(motion.t - t).argmin()] for t in (0.0, 0.1, 0.31)]
-    assert [frame.time for frame in film] == nearest
-    assert len(strip_of([flight(samples=3)], 8, [SIDE], None, None).films[0]) == 3
 
 
 def test_ground_is_drawn_below_what_stays_above_it():
@@ -217,9 +211,11 @@ def faces(axes, colour):
     return [(each.get_facecolor()[3], each.get_xy()) for each in patches]
 
 
-def test_what_is_below_the_ground_is_pale():
+def test_what_is_below_the_ground_is_pale_and_shadows_lie_where_one_looks_down():
     """The torso half in the ground: all of it pale, and its upper part over that."""
-    for view in ("side", "oblique", "top"):
+    for view, lies in (("side", False), ("oblique", True), ("top", True)):
+        _, axes = standing(height=0.3).filmstrip(frames=[0.0], views=(view,))
+        assert bool(faces(axes[0, 0], SHADOW)) == lies, view
         _, axes = standing(height=-0.06).filmstrip(frames=[0.0], views=(view,))
         (whole, outline), (part, above) = faces(axes[0, 0], TORSO)
         assert whole == PALE and part == 1
@@ -228,12 +224,6 @@ def test_what_is_below_the_ground_is_pale():
             if line.get_alpha() is None and view == "side" and line.get_linewidth() == 1.4:
                 assert np.nanmin(line.get_ydata(), initial=0) >= 0
         assert any(line.get_alpha() == PALE for line in axes[0, 0].lines)
-
-
-def test_shadows_lie_where_one_looks_down():
-    for view, lies in (("side", False), ("oblique", True), ("top", True)):
-        _, axes = standing(height=0.3).filmstrip(frames=[0.0], views=(view,))
-        assert bool(faces(axes[0, 0], SHADOW)) == lies, view
 
 
 def test_arrows_are_the_forces():
@@ -245,19 +235,13 @@ def test_arrows_are_the_forces():
         assert len(arrows.U) == sum(GROUPS.values())
 
 
-# Plots.
-
-
-def test_forces_are_drawn_on_a_linear_axis():
+def test_plots_have_forces_on_a_linear_axis_and_events_on_every_panel():
     figure, every = standing().plot()
     (axes,) = [axes for axes in figure.axes if axes.get_ylabel().startswith("normal force")]
     for line, count in zip(axes.lines, GROUPS.values(), strict=True):
         drawn = line.get_ydata().min(), line.get_ydata().max()
         assert drawn == pytest.approx((count * WEIGHT, count * BLOW))
     assert {each.get_yscale() for each in every} == {"linear"}
-
-
-def test_events_are_lines_on_every_panel_and_told_above_the_first():
     _, every = standing().plot("height", "force", "tail")
     for axes in every:
         lines = {each.get_label(): each for each in axes.collections}

@@ -67,21 +67,21 @@ def test_what_cannot_be_plotted_is_refused(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_panels_that_stay_zero_are_left_out_unless_they_are_named():
+def test_panels_and_curves_that_stay_zero_are_left_out_unless_they_are_named():
     motion = dataclasses.replace(flight(), tau=np.zeros((59, 4)))
     assert not any("torque" in label for label in labels(motion.plot()[1]))
     assert any("torque" in label for label in labels(flight().plot()[1]))
     assert labels(motion.plot("torque")[1]) == ["tail torque [mN m]"]
     assert not any("force" in label for label in labels(flight().plot()[1]))
     assert len(flight(segments=0).plot()[1]) == len(PANELS) - 3  # no tail, no torque, no force
-
-
-def test_curves_that_stay_zero_are_told_instead_of_drawn():
-    """The flight is in the plane x = 0."""
+    # the flight is in the plane x = 0
     _, (axes,) = flight().plot("momentum")
     assert set(curves(axes)) == {"forward $y$", "up $z$"}
-    told = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert told[-1] == "right $x$: 0"
+    assert axes.get_legend().get_texts()[-1].get_text() == "right $x$: 0"
+    # what is conserved is drawn flat
+    constant = np.full((59, 3), 1e-3) * (1 + 1e-13 * np.eye(59, 3))
+    _, (axes,) = dataclasses.replace(flight(), angular_momentum=constant).plot("angular_momentum")
+    assert np.ptp(axes.get_ylim()) >= 0.01
 
 
 def test_tails_are_shown_by_the_bends_of_their_segments_or_without_a_model_by_their_coordinates():
@@ -135,8 +135,7 @@ def test_everything_is_labelled_and_legends_cover_nothing():
     for axes in every:
         assert axes.get_ylabel().endswith("]")
         low, high = axes.get_ylim()
-        lines = curves(axes).values()
-        legend = axes.get_legend()
+        lines, legend = curves(axes).values(), axes.get_legend()
         if legend is None:
             assert len(lines) == 1
             continue
@@ -146,12 +145,6 @@ def test_everything_is_labelled_and_legends_cover_nothing():
         for line in lines:
             data = line.get_ydata()
             assert np.nanmin(data) >= low and np.nanmax(data) <= min(high, bottom)
-
-
-def test_a_conserved_momentum_is_drawn_flat():
-    constant = np.full((59, 3), 1e-3) * (1 + 1e-13 * np.eye(59, 3))
-    _, (axes,) = dataclasses.replace(flight(), angular_momentum=constant).plot("angular_momentum")
-    assert np.ptp(axes.get_ylim()) >= 0.01
 
 
 # All figures.

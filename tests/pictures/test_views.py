@@ -75,11 +75,6 @@ def film_frame(seed, height=0.06):
     return frames(trajectory.model, dataclasses.replace(trajectory, q=q), [0], 0.0)[0]
 
 
-def seen(seeds):
-    """Yield numbers of attitudes with every view."""
-    return product(range(seeds), NAMED.values())
-
-
 def widths(points):
     """How far points (P, 2) reach in 90 directions."""
     angle = np.linspace(0, 2 * np.pi, 90)
@@ -87,7 +82,7 @@ def widths(points):
 
 
 def test_silhouette_is_the_outline_of_the_projected_surface():
-    for seed, view in seen(5):
+    for seed, view in product(range(5), NAMED.values()):
         rotation = Rotation.random(rng=seed).as_matrix()
         shadow = view.of(surface() @ rotation.T)[:, :2]
         outline = silhouette(rotation, SEMI_AXES, view, count=721)
@@ -114,13 +109,13 @@ def check_hidden(seed, view):
 
 
 def test_the_torso_hides_exactly_what_a_ray_to_the_viewer_hits():
-    for seed, view in seen(3):
+    for seed, view in product(range(3), NAMED.values()):
         with row(seed, view.name):
             check_hidden(seed, view)
 
 
 def test_what_is_above_the_ground_is_outlined():
-    for (seed, view), height in product(seen(2), (-0.02, 0.005)):
+    for seed, view, height in product(range(2), NAMED.values(), (-0.02, 0.005)):
         frame = film_frame(seed, height)
         world = frame.torso + surface(300) @ frame.rotation.T
         shadow = view.of(world[world[:, 2] >= 0])[:, :2]

@@ -25,7 +25,6 @@ from tests.support.chromium import opened, requests
 pytestmark = pytest.mark.slow  # Chromium is no part of a newcomer's installation
 PHONE = (375, 740)
 SETTLED = 0.1  # s, for what is drawn when a frame comes
-DONE = "return window.serpentail && (serpentail.ready || serpentail.error)"
 
 
 @pytest.fixture(scope="module")
@@ -239,10 +238,11 @@ def test_an_output_of_a_notebook_runs_and_fetches_nothing(browser, kick, tmp_pat
     whole = f'<!doctype html><meta charset="utf-8"><body><p>A motion</p>{output}{output}</body>'
     notebook.write_text(whole, encoding="utf-8")
     browser.get_log("performance")
+    done = "return window.serpentail && (serpentail.ready || serpentail.error)"
     browser.get(notebook.as_uri())
     for frame in browser.find_elements("css selector", "iframe"):
         browser.switch_to.frame(frame)
-        WebDriverWait(browser, 60).until(lambda driver: driver.execute_script(DONE))
+        WebDriverWait(browser, 60).until(lambda driver: driver.execute_script(done))
         assert browser.execute_script("return serpentail.error") is None
         seek(browser, 0.6)
         assert value(browser) == pytest.approx(0.6, abs=0.003)

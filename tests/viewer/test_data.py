@@ -45,7 +45,11 @@ def test_samples_are_packed_bit_by_bit():
 
 def test_the_kick_is_whole_and_below_1_mb(tmp_path, kick):
     path = kick.view(tmp_path / "run.html")
-    _, run = single_run(path)
+    data, run = single_run(path)
+    check_words(data, run, kick)
+    loaded = st.Trajectory.load(kick.save(tmp_path / "kick.npz"))
+    again = loaded.view(tmp_path / "loaded.html", model=kick.model)
+    assert loaded.model is None and again.read_bytes() == path.read_bytes()
     assert path == tmp_path / "run.html" and path.stat().st_size <= 1e6
     assert run["rows"] == len(kick.t) == 1201
 
@@ -76,8 +80,7 @@ def test_the_kick_is_whole_and_below_1_mb(tmp_path, kick):
     np.testing.assert_allclose(feet, kick.contact.points, atol=1e-7)
 
 
-def test_the_kick_s_numbers_and_events(tmp_path, kick):
-    data, run = single_run(kick.view(tmp_path / "run.html"))
+def check_words(data, run, kick):
     numbers, summary = dict(run["numbers"]), told(kick)
     assert float(numbers["take-off (s)"]) == pytest.approx(summary["take_off_s"], rel=1e-3)
     assert float(numbers["highest torso (m)"]) == pytest.approx(summary["apex_m"], rel=1e-3)
@@ -138,13 +141,6 @@ def test_a_run_that_failed_is_shown_up_to_there(tmp_path, kick):
         assert len(data["notes"]) == 1 and data["notes"][0].endswith(str(caught.value))
         assert data["warnings"] == cut.warnings != []
         assert run["rows"] == len(cut.t) and 1 < len(cut.t) < 1201
-
-
-def test_a_saved_motion_has_the_same_page(tmp_path, kick):
-    own = kick.view(tmp_path / "own.html")
-    loaded = st.Trajectory.load(kick.save(tmp_path / "kick.npz"))
-    again = loaded.view(tmp_path / "loaded.html", model=kick.model)
-    assert loaded.model is None and own.read_bytes() == again.read_bytes()
 
 
 def test_several_motions_have_names_that_stay_data(tmp_path, kick, flight):
