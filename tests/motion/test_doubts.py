@@ -89,16 +89,13 @@ def test_the_depths_of_tail_and_legs_by_hand_and_the_reference(rat):
     assert not any("legs" in each for each in made(rat, q, legs=angles[None]).warnings)
 
 
-def test_a_tenth_of_the_torso_s_length_is_allowed(rat):
+def test_a_tenth_of_the_torso_s_length_is_allowed_and_more_where_it_has_contact_or_no_ground(rat):
     """9.9 mm; the straight tail is out of the ground. All samples count, also beyond thousands."""
     for depth, count in ((9.8e-3, 0), (10e-3, 1)):
         assert len(made(rat, SEMI_AXES[2] - depth).warnings) == count
     q = at_height(rat, 1.0, 10_000)
     q[9000, 2] = 0.0
     assert "t = 9000 s" in the(made(rat, q).warnings, "torso: ")
-
-
-def test_what_has_contact_may_be_deep_and_where_is_no_ground_all_may(rat):
     for model, words in (
         (scene_of("self_recovery").model, []),
         (zoo.model("feet_tail"), ["torso"]),

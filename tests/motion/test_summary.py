@@ -123,7 +123,7 @@ def test_a_single_sample_and_a_motion_that_nobody_simulated(kick):
     assert all(of[name] is None for name in unknown) and strict(of) == of
 
 
-def test_a_run_that_failed_has_numbers_and_warnings_up_to_there():
+def test_a_run_that_failed_and_methods_that_look_for_no_events():
     scene = scene_of("kick")
     with pytest.raises(st.SimulationError) as caught:
         scene.simulate(most_steps=400)
@@ -131,9 +131,6 @@ def test_a_run_that_failed_has_numbers_and_warnings_up_to_there():
     assert of["work_J"] is of["ground_impulse_N_s"] is None
     assert of["peak_ground_force_N"] > 700 and strict(of) == of
     assert {"torso", "ground"} <= {each.split(":")[0] for each in of["warnings"]}
-
-
-def test_methods_that_look_for_no_events():
     scene = scene_of("kick", duration=0.01)
     for method in ("dop853", "lsoda"):
         of = scene.summary(scene.simulate(method=method, rtol=1e-6, atol=1e-6))
@@ -233,9 +230,7 @@ def test_a_rolling_torso_does_not_slip_and_a_spinning_one_does(rat):
         motion = dataclasses.replace(made(rat, q, t=t), v=v, contact=contact)
         wanted = 0.0 if rolls else radius * turn
         assert told(motion)["slip_m"]["torso"] == pytest.approx(wanted, abs=1e-6)
-
-
-def test_a_point_in_the_air_does_not_slip(rat):
+    # a point in the air does not slip
     points, forces = np.zeros((2, 3, 6, 3))
     points[:, 0, 0] = [0, 1, 3]
     for force, slip in ((0, 0.0), (1, 2.0)):

@@ -237,7 +237,7 @@ def test_links_and_arcs_are_drawn_as_thick_as_they_are():
             np.testing.assert_allclose(scales[len(radii) :, 1], radii)
 
 
-def test_equal_links_have_one_thickness_and_thin_torsos_are_seen():
+def test_equal_links_have_one_thickness_and_thin_torsos_and_fixed_bases_are_seen():
     model = zoo.model("m2_n2")
     assert body_of(model).thickness == ()
     found = shape(model)
@@ -246,9 +246,7 @@ def test_equal_links_have_one_thickness_and_thin_torsos_are_seen():
     flat = model.with_parameters(torso_inertia=(8e-5, 8e-5, 1.6e-4))  # a disc
     least, most, _ = np.sort(shape(flat)["semi_axes"])
     assert least == 0.15 * most
-
-
-def test_a_fixed_base_is_a_ball_at_the_mount():
+    # a fixed base is a ball at the mount
     model = zoo.model("fixed")
     reach = np.linalg.norm(model.parameters["tail_mount"])
     assert shape(model)["semi_axes"] == [max(reach, 2 * RADIUS)] * 3
