@@ -43,9 +43,8 @@ class Growing:
 
 def plain(shape) -> some.SearchStrategy:
     """Return arrays of doubles of moderate size, as a model takes them."""
-    return arrays.arrays(
-        np.float64, shape, elements=some.floats(-2, 2, width=32), fill=some.nothing()
-    )
+    moderate = some.floats(-2, 2, width=32)
+    return arrays.arrays(np.float64, shape, elements=moderate, fill=some.nothing())
 
 
 def holed(shape) -> some.SearchStrategy:
@@ -55,20 +54,10 @@ def holed(shape) -> some.SearchStrategy:
 
 def spread(array: np.ndarray) -> np.ndarray:
     """Return the same numbers, every third of a longer row."""
-    wide = np.full((*array.shape[:-1], 3 * array.shape[-1]), np.nan) if array.ndim else array
-    if array.ndim:
-        wide[..., 1::3] = array
-        return wide[..., 1::3]
-    return wide
-
-
-def backward(array: np.ndarray) -> np.ndarray:
-    """Return the same numbers, stored from the last to the first."""
-    return np.flip(np.flip(array).copy())
+    return np.repeat(array, 3, axis=-1)[..., 1::3] if array.ndim else array
 
 
 def locked(array: np.ndarray) -> np.ndarray:
-    """Return the same numbers, read-only."""
     array = array.copy()
     array.setflags(write=False)
     return array
@@ -91,7 +80,7 @@ FORMS = {
     "other bytes": lambda a: a.astype(">f8"),
     "Fortran": np.asfortranarray,
     "spread": spread,
-    "backward": backward,
+    "backward": lambda a: np.flip(np.flip(a).copy()),
     "read-only": locked,
     "unaligned": unaligned,
     "subclass": lambda a: a.copy().view(Labelled),
@@ -109,26 +98,21 @@ JUNK = some.one_of(
     NUMBERS,
     some.lists(some.one_of(some.none(), NUMBERS, some.lists(NUMBERS, max_size=3)), max_size=13),
     some.dictionaries(some.text(max_size=2), NUMBERS, max_size=2),
-    some.builds(set),
-    some.builds(object),
-    some.builds(Foreign),
-    some.builds(Growing),
+    some.one_of(*map(some.builds, (set, object, Foreign, Growing))),
     some.sampled_from(
-        [Ellipsis, slice(None), range(9), Path("x"), 10**400, NotImplemented, int, len]
-    ),
-    some.sampled_from(
-        [decimal.Decimal("0.5"), fractions.Fraction(1, 3), datetime.date(2000, 1, 1)]
+        [
+            *(Ellipsis, slice(None), range(9), Path("x"), 10**400, NotImplemented, int, len),
+            *(decimal.Decimal("0.5"), fractions.Fraction(1, 3), datetime.date(2000, 1, 1)),
+        ]
     ),
     some.builds(lambda n: memoryview(bytes(8 * n)), some.integers(0, 13)),
     some.builds(lambda n: (x for x in range(n)), some.integers(0, 13)),
 )
 DTYPES = some.one_of(
-    arrays.boolean_dtypes(),
+    *(arrays.boolean_dtypes(), arrays.complex_number_dtypes(), arrays.datetime64_dtypes()),
     arrays.integer_dtypes(endianness="?"),
     arrays.unsigned_integer_dtypes(endianness="?"),
     arrays.floating_dtypes(endianness="?"),
-    arrays.complex_number_dtypes(),
-    arrays.datetime64_dtypes(),
     arrays.byte_string_dtypes(max_len=4),
     arrays.unicode_string_dtypes(max_len=4),
 )

@@ -1,16 +1,64 @@
-"""Motions of the repository's scenes, and motions made by hand of their models."""
+"""Motions: of functions of time, of the repository's scenes, and made by hand of their models."""
 
+import dataclasses
 from functools import cache
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import serpentail as st
+from serpentail.motion.summary import summary
 from serpentail_codegen.scene.parse import load_scene
 from tests.support.models import folder_of
 from tests.support.scenes import SCENES
 
-from .analytic import motion
+PRECESSION, TILT, SPIN = 7.0, 0.6, 11.0  # rad/s, rad, rad/s of a torque-free symmetric top
+
+
+def top(t):
+    """Attitude (w, x, y, z) and body rate of a torque-free top: R = Rz(a t) Rx(tilt) Rz(b t)."""
+    turns = np.stack([PRECESSION * t, TILT + 0 * t, SPIN * t], axis=1)
+    rotation = Rotation.from_euler("ZXZ", turns)
+    omega = PRECESSION * rotation.as_matrix()[:, 2, :] + [0, 0, SPIN]  # a R^T z + b z
+    return rotation.as_quat(canonical=False)[:, [3, 0, 1, 2]], omega
+
+
+def motion(t, segments=2):
+    """The top in parabolic flight, its tail swinging in sines: all known functions of time."""
+    attitude, omega = top(t)
+    phase = 12 * t[:, None] + np.arange(2 * segments)
+    position = np.stack([0 * t, 0.6 * t, 2.8 * t - 4.9 * t**2], axis=1)
+    rate = np.stack([0 * t, 0.6 + 0 * t, 2.8 - 9.8 * t], axis=1)
+    parameters = {"gravity": 9.8, "torso_inertia": (1, 2, 3)}
+    return st.Trajectory(
+        t=t,
+        q=np.hstack([position, attitude, 0.5 * np.sin(phase)]),
+        v=np.hstack([rate, omega, 6 * np.cos(phase)]),
+        tau=np.sign(np.sin(phase)),
+        kinetic=1 + rate[:, 2] ** 2 / 2,
+        potential=9.8 * position[:, 2],
+        linear_momentum=rate,
+        angular_momentum=np.tile([1e-3, 2e-3, 3e-3], (len(t), 1)),
+        info={"method": "analytic", "steps": len(t), "parameters": parameters},
+    )
+
+
+def fields(trajectory):
+    """The arrays and the info of a flight by name."""
+    found = {each.name: getattr(trajectory, each.name) for each in dataclasses.fields(trajectory)}
+    return {name: value for name, value in found.items() if value is not None}
+
+
+def assert_same(first, second):
+    """Every array bit-equal, every info equal."""
+    for name, value in fields(first).items():
+        other = getattr(second, name)
+        if name == "info":
+            assert value == other
+        else:
+            assert value.dtype == other.dtype == np.float64
+            assert value.tobytes() == other.tobytes() and value.shape == other.shape
 
 
 @cache
@@ -48,8 +96,13 @@ def leap():
     return simulated("tail_support_jump")
 
 
-def made(model, q, *, t=None, forces=None, points=None, events=(), legs=None):
-    """A motion of configurations q (K, nq), at rest, with forces (K, points, 3) of the ground."""
+def made(model, q=0.1, *, t=None, forces=None, points=None, events=(), legs=None):
+    """A motion at rest of configurations (K, nq), or of a level torso at a height; forces (K,
+    points, 3) are the ground's.
+    """
+    if not isinstance(q, np.ndarray):
+        like = next((each for each in (t, forces, points) if each is not None), range(3))
+        q = at_height(model, q, len(like))
     rows = len(q)
     zeros = np.zeros((rows, 3))
     contact = None
@@ -58,18 +111,19 @@ def made(model, q, *, t=None, forces=None, points=None, events=(), legs=None):
         forces = np.zeros((rows, count, 3)) if forces is None else forces
         points = np.zeros_like(forces) if points is None else points
         contact = st.Contact(points, forces, np.zeros((rows, count, 2)), model.contacts, legs)
-    arrays = {
-        "t": np.arange(float(rows)) if t is None else t,
-        "q": q,
-        "v": np.zeros((rows, model.nv)),
-        "tau": np.zeros((rows, model.nv - 6)),
-        "kinetic": np.zeros(rows),
-        "potential": np.zeros(rows),
-        "linear_momentum": zeros,
-        "angular_momentum": zeros,
-    }
-    info = {"events": list(events)}
-    return st.Trajectory(**arrays, info=info, contact=contact, model=model)
+    return st.Trajectory(
+        t=np.arange(float(rows)) if t is None else t,
+        q=q,
+        v=np.zeros((rows, model.nv)),
+        tau=np.zeros((rows, model.nv - 6)),
+        kinetic=np.zeros(rows),
+        potential=np.zeros(rows),
+        linear_momentum=zeros,
+        angular_momentum=zeros,
+        info={"events": list(events)},
+        contact=contact,
+        model=model,
+    )
 
 
 def at_height(model, height, rows=3):
@@ -79,9 +133,9 @@ def at_height(model, height, rows=3):
     return q
 
 
-def down(group, time):
-    return {"time": time, "group": group, "kind": "touch_down"}
+def told(motion):
+    return summary(motion.model, motion)
 
 
-def off(group, time):
-    return {"time": time, "group": group, "kind": "take_off"}
+def event(kind, group, time):
+    return {"time": time, "group": group, "kind": kind}

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from serpentail.attitude import pitch_roll_yaw, product, quaternion_rate, rotation_matrix
 from tests.support.rows import row
 
-from .analytic import top
+from .conftest import top
 
 RNG = np.random.default_rng(5)
 A, B = RNG.normal(size=(2, 7, 4))
@@ -26,11 +26,6 @@ def euler(angles):
 def configurations(quaternion):
     """Configurations (..., 7) with these attitudes."""
     return np.concatenate([np.zeros((*quaternion.shape[:-1], 3)), quaternion], axis=-1)
-
-
-def somersault(angle):
-    """Attitudes (K, 4) that pitch by these angles (K,)."""
-    return np.stack([np.cos(angle / 2), np.sin(angle / 2), 0 * angle, 0 * angle], axis=1)
 
 
 def near(found, expected, most):
@@ -78,22 +73,22 @@ def test_angles_invert_the_product_of_rotations():
 
 def test_unwrapped_pitch_counts_the_turns_of_a_somersault():
     """Also over so many samples that they must be unwrapped at once, without loss of digits."""
-    for angle, most in (
-        (np.linspace(0, 5 * np.pi, 300), 1e-12),
-        (np.linspace(0, 3e4, 3 * 10**5), 1e-9),
-    ):
-        found = pitch_roll_yaw(configurations(somersault(angle)), unwrap=True)
-        near(found, np.stack([angle, 0 * angle, 0 * angle], axis=1), most)
+    for end, count, most in ((5 * np.pi, 300, 1e-12), (3e4, 3 * 10**5, 1e-9)):
+        turn = np.linspace(0, end, count)
+        quaternion = np.stack([np.cos(turn / 2), np.sin(turn / 2), 0 * turn, 0 * turn], axis=1)
+        found = pitch_roll_yaw(configurations(quaternion), unwrap=True)
+        near(found, np.stack([turn, 0 * turn, 0 * turn], axis=1), most)
+    # a time axis is needed, but may have no sample
+    assert pitch_roll_yaw(np.zeros((0, 9)), unwrap=True).shape == (0, 3)
+    with pytest.raises(ValueError, match="1 dimensions"):
+        pitch_roll_yaw(np.array([0, 0, 0, 1.0, 0, 0, 0]), unwrap=True)
 
 
-def test_unwrapped_angles_are_continuous_and_still_the_attitude():
+def test_unwrapped_angles_are_continuous_the_attitude_and_nearest_to_those_before():
     attitude, _ = top(np.linspace(0, 2, 4001))
     unwrapped = pitch_roll_yaw(configurations(attitude), unwrap=True)
     assert np.abs(np.diff(unwrapped, axis=0)).max() < 0.1
     near(euler(unwrapped), rotation_matrix(attitude), 2e-14)
-
-
-def test_unwrapped_angles_are_the_nearest_to_those_before():
     turns = 2 * np.pi * np.arange(-9, 10)
     for step in (0.05, 0.4, 4.0):
         walk = np.cumsum(step * np.random.default_rng(7).normal(size=(200, 4)), axis=0)
@@ -105,9 +100,3 @@ def test_unwrapped_angles_are_the_nearest_to_those_before():
             nearest = min(np.abs(way).min(axis=1).sum() for way in ways)
             assert np.abs(found - before).sum() == pytest.approx(nearest, abs=1e-9), step
         near(euler(unwrapped), rotation_matrix(walk), 1e-13)
-
-
-def test_unwrapping_needs_a_time_axis_and_may_have_no_sample():
-    assert pitch_roll_yaw(np.zeros((0, 9)), unwrap=True).shape == (0, 3)
-    with pytest.raises(ValueError, match="1 dimensions"):
-        pitch_roll_yaw(np.array([0, 0, 0, 1.0, 0, 0, 0]), unwrap=True)

@@ -70,17 +70,15 @@ def test_the_torso_s_depth_by_points_of_its_surface(rat):
         assert "t = 1 s" in found and '"torso" to `contacts`' in found
 
 
-def test_the_tail_s_depth_by_hand(rat):
-    """Straight, hanging from a torso pitched by 60 degrees about its mount."""
+def test_the_depths_of_tail_and_legs_by_hand_and_the_reference(rat):
+    """A straight tail that hangs from a torso pitched by 60 degrees; then hip, D and knee, whereas
+    ankle and foot are contacts, and may be in the ground.
+    """
     q = at_height(rat, 0.15, 1)
     q[0, 3:5] = np.cos(np.pi / 6), np.sin(np.pi / 6)
     tip = reference.attitude(q[0, 3:7]) @ (MOUNT - [0, LENGTH, 0])
     found = the(made(rat, q).warnings, "tail: ")
     assert millimetres(found) == pytest.approx(-1e3 * (0.15 + tip[2]), rel=0.01)
-
-
-def test_the_legs_depth_by_the_reference(rat):
-    """Hip, D and knee; ankle and foot are contacts, and may be in the ground."""
     angles = np.radians([210, -40, 210, -75])
     q = at_height(rat, 0.002, 1)
     every = np.array(reference.joints(rat.parameters, angles))
@@ -91,24 +89,20 @@ def test_the_legs_depth_by_the_reference(rat):
     assert not any("legs" in each for each in made(rat, q, legs=angles[None]).warnings)
 
 
-def test_a_tenth_of_the_torso_s_length_is_allowed(rat):
+def test_a_tenth_of_the_torso_s_length_is_allowed_and_more_where_it_has_contact_or_no_ground(rat):
     """9.9 mm; the straight tail is out of the ground. All samples count, also beyond thousands."""
     for depth, count in ((9.8e-3, 0), (10e-3, 1)):
-        q = at_height(rat, SEMI_AXES[2] - depth)
-        assert len(made(rat, q).warnings) == count
+        assert len(made(rat, SEMI_AXES[2] - depth).warnings) == count
     q = at_height(rat, 1.0, 10_000)
     q[9000, 2] = 0.0
     assert "t = 9000 s" in the(made(rat, q).warnings, "torso: ")
-
-
-def test_what_has_contact_may_be_deep_and_where_is_no_ground_all_may(rat):
     for model, words in (
         (scene_of("self_recovery").model, []),
         (zoo.model("feet_tail"), ["torso"]),
         (zoo.model("feet"), ["torso", "tail"]),
         (zoo.model("m1_n3"), []),
     ):
-        told = made(model, at_height(model, -0.1)).warnings
+        told = made(model, -0.1).warnings
         assert [each.split(":")[0] for each in told] == words
 
 
@@ -132,9 +126,7 @@ def test_how_deep_a_tail_goes_by_points_close_together():
         found = sunk(tails)
         np.testing.assert_allclose(found, [through(tail) for tail in tails], atol=1e-6)
         assert found.any()
-
-
-def test_tails_that_leave_the_torso_are_not_in_it():
+    # those that leave the torso are not in it
     mounts = 0.84 * sphere(50)
     ways = np.linspace(0, 3, 7)[:, None] * np.ones((50, 1, 3))
     assert sunk(mounts[:, None] * (1 + ways)).max() == 0  # straight away
@@ -166,12 +158,12 @@ def test_blows_from_20_body_weights_on(rat):
     for weights, count in ((19.9, 0), (20.1, 1)):
         forces = np.zeros((3, 6, 3))
         forces[2, :, 2] = weights * WEIGHT / 6
-        told = made(rat, at_height(rat, 1.0), forces=forces).warnings
+        told = made(rat, 1.0, forces=forces).warnings
         assert len(told) == count
         assert all("t = 2 s" in each and "20.1" in each for each in told)
 
 
-def test_bends_beyond_half_a_turn():
+def test_bends_beyond_half_a_turn(rat):
     """Of joints what all links turn together; of arcs the length of (a, b), or theta."""
     along = np.array([np.cos(2.0), np.sin(2.0)])
     for name, segment, bent in (
@@ -191,9 +183,7 @@ def test_bends_beyond_half_a_turn():
                 assert len(told) == count
                 assert all(f"segment {segment} " in each for each in told)
                 assert all("3.21 rad at t = 2 s" in each for each in told)
-
-
-def test_bends_of_more_than_two_turns_are_taken_for_degrees(rat):
+    # of more than two turns they are taken for degrees
     for bend, degrees in ((12.5, False), (12.6, True)):
         q = at_height(rat, 1.0)
         q[:, 7] = bend / 3
@@ -203,15 +193,13 @@ def test_bends_of_more_than_two_turns_are_taken_for_degrees(rat):
 # Where the model is, and where it is not.
 
 
-def test_files_and_pickles_keep_what_was_found(kick, tmp_path):
+def test_files_and_pickles_keep_what_was_found(kick, rat, tmp_path):
     loaded = st.Trajectory.load(kick.save(tmp_path / "kick.npz"))
     for copy in (loaded, pickle.loads(pickle.dumps(kick))):
         assert copy.model is None and copy.warnings == kick.warnings
     again = st.Trajectory.load(loaded.save(tmp_path / "again.npz"))
     assert again.warnings == kick.warnings and "doubts" not in kick.info
-
-
-def test_books_that_do_not_balance_come_first(rat):
-    motion = made(rat, at_height(rat, 0.0))
+    # of books that do not balance first
+    motion = made(rat, 0.0)
     motion.info["warnings"] = ["the books"]
     assert motion.warnings[0] == "the books" and len(motion.warnings) > 1

@@ -1,4 +1,6 @@
-"""Numbers of runs of every kind: as JSON, as aligned text, as tables; none where there is none."""
+"""Numbers of runs of every kind, none where there is none: as JSON, text and tables; the ground's
+forces, impulses and slips, against sums by hand and v^2 / (2 mu g).
+"""
 
 import dataclasses
 import json
@@ -13,9 +15,12 @@ from serpentail.motion.summary import summary
 from serpentail.motion.table import as_text, as_word
 from tests.support import zoo
 
-from .conftest import at_height, down, made, scene_of
+from .conftest import at_height, event, made, scene_of, told
 
 ROOT = Path(__file__).parents[2]
+MASS, GRAVITY = 0.10572 + 0.00351, 9.8  # kg of torso and tail, m/s^2: the rat's
+MU, SPEED = 0.05, 0.3
+LEGS = st.Legs.fixed(np.radians(210), np.radians(-15))
 OF_EVENTS = {
     *("take_off_s", "recontact_s", "landing_group", "least_upright_landing", "landed"),
     *("turned_landing_rad", "touching_s", "first_touch_down_s", "last_take_off_s"),
@@ -27,8 +32,8 @@ OF_THE_GROUND = OF_EVENTS | {
 }
 
 
-def strict(told):
-    return json.loads(json.dumps(told, allow_nan=False))
+def strict(numbers):
+    return json.loads(json.dumps(numbers, allow_nan=False))
 
 
 def test_the_document_s_table_is_that_of_the_numbers():
@@ -39,19 +44,27 @@ def test_the_document_s_table_is_that_of_the_numbers():
     assert len(set(names)) == len(names) and all(each.meaning for each in numbers.NUMBERS)
 
 
-def test_text_has_aligned_names_values_and_units(kick):
-    told = summary(kick.model, kick)
-    lines = str(told).splitlines()
+def test_text_markdown_and_json_have_values_units_and_meanings(kick):
+    of = told(kick)
+    lines = str(of).splitlines()
     width = len("peak_group_force_weights, right_foot")
     assert all(line[width : width + 2] == "  " and line[width + 2] != " " for line in lines)
     rows = {line[:width].rstrip(): line[width:] for line in lines}
-    assert rows["apex_m"].split() == [f"{told['apex_m']:.5f}", "m"]
+    assert rows["apex_m"].split() == [f"{of['apex_m']:.5f}", "m"]
     assert rows["peak_ground_force_weights"].endswith("  body weights")
     assert rows["apex_m"].rindex(" m") == rows["duration_s"].rindex(" s")
     assert rows["landed"].strip() == "no" and rows["steps"].strip().isdigit()
     assert rows["peak_tail_force_N"].strip() == "-"
     said = [line.removeprefix("warnings").strip() for line in lines if line.startswith("warn")]
     assert said == kick.warnings
+    lines = of.markdown().splitlines()
+    assert len(lines) == len(of) + 2 and len({line.count("|") for line in lines}) == 1
+    assert lines[0].split() == ["|", "number", "|", "value", "|", "unit", "|", "meaning", "|"]
+    (apex,) = (line.split(" | ") for line in lines if "| apex_m |" in line)
+    described = strict(of.described())
+    assert {name: each["value"] for name, each in described.items()} == strict(of)
+    assert apex[1:] == [as_word(of["apex_m"]), "m", described["apex_m"]["meaning"] + " |"]
+    assert described["apex_m"]["unit"] == "m" and described["body_weight_N"]["unit"] == "N"
 
 
 def test_words_and_reports_without_units():
@@ -73,73 +86,153 @@ def test_words_and_reports_without_units():
     assert as_text({}) == ""
 
 
-def test_markdown_and_json_have_units_and_meanings(kick):
-    told = summary(kick.model, kick)
-    lines = told.markdown().splitlines()
-    assert len(lines) == len(told) + 2 and len({line.count("|") for line in lines}) == 1
-    assert lines[0].split() == ["|", "number", "|", "value", "|", "unit", "|", "meaning", "|"]
-    (apex,) = (line.split(" | ") for line in lines if "| apex_m |" in line)
-    described = strict(told.described())
-    assert {name: each["value"] for name, each in described.items()} == strict(told)
-    assert apex[1:] == [as_word(told["apex_m"]), "m", described["apex_m"]["meaning"] + " |"]
-    assert described["apex_m"]["unit"] == "m" and described["body_weight_N"]["unit"] == "N"
-
-
 # Runs of other kinds.
 
 
 def test_a_flight_without_contacts():
     for name in ("m1_n3", "arcs2"):
         model = zoo.model(name)
-        motion = st.simulate(model, at_height(model, 0)[0], np.zeros(model.nv), t_span=0.1)
-        told = summary(model, motion)
-        assert all(told[name] is None for name in OF_THE_GROUND)
-        assert told["body_weight_N"] > 1 and told["warnings"] == [] and told["tilt_max_deg"] == 0
-        assert strict(told) == told and "peak_ground_force_N" in str(told)
+        of = told(st.simulate(model, at_height(model, 0)[0], np.zeros(model.nv), t_span=0.1))
+        assert all(of[name] is None for name in OF_THE_GROUND)
+        assert of["body_weight_N"] > 1 and of["warnings"] == [] and of["tilt_max_deg"] == 0
+        assert strict(of) == of and "peak_ground_force_N" in str(of)
 
 
 def test_a_body_without_feet(rat):
-    motion = made(rat, at_height(rat, 0.1), events=[down("tail", 1.5)])
+    motion = made(rat, events=[event("touch_down", "tail", 1.5)])
     rests, forces = np.zeros((2, 3, 3, 3))
     forces[-1, :, 2] = 1.0
     contact = st.Contact(rests, forces, rests[..., :2], {"tail": 2, "torso": 1})
-    told = summary(rat, dataclasses.replace(motion, contact=contact))
-    assert told["standing_end"] is told["landed"] is told["peak_foot_force_N"] is None
-    assert told["least_upright_landing"] == 1 and told["landing_group"] == "tail"
-    assert told["peak_group_force_N"] == {"tail": 2.0, "torso": 1.0} and strict(told) == told
+    of = told(dataclasses.replace(motion, contact=contact))
+    assert of["standing_end"] is of["landed"] is of["peak_foot_force_N"] is None
+    assert of["least_upright_landing"] == 1 and of["landing_group"] == "tail"
+    assert of["peak_group_force_N"] == {"tail": 2.0, "torso": 1.0} and strict(of) == of
 
 
-def test_a_single_sample(kick):
+def test_a_single_sample_and_a_motion_that_nobody_simulated(kick):
     arrays = ("t", "q", "v", "tau", "kinetic", "potential", "linear_momentum", "angular_momentum")
     first = {name: getattr(kick, name)[:1] for name in arrays}
     contact = kick.contact.mapped(lambda samples: samples[:1])
-    told = summary(kick.model, dataclasses.replace(kick, contact=contact, **first))
-    assert told["duration_s"] == told["energy_change_J"] == 0
-    assert told["tilt_max_deg"] == told["tilt_end_deg"]
-    assert told["landed"] is None and told["peak_ground_force_N"] == pytest.approx(1.07, abs=0.01)
-    assert strict(told) == told
-
-
-def test_a_motion_that_nobody_simulated(rat):
-    told = summary(rat, dataclasses.replace(made(rat, at_height(rat, 1.0)), info={}))
+    of = told(dataclasses.replace(kick, contact=contact, **first))
+    assert of["duration_s"] == of["energy_change_J"] == 0
+    assert of["tilt_max_deg"] == of["tilt_end_deg"]
+    assert of["landed"] is None and of["peak_ground_force_N"] == pytest.approx(1.07, abs=0.01)
+    assert strict(of) == of
+    of = told(dataclasses.replace(made(kick.model, 1.0), info={}))  # that nobody simulated
     unknown = ("work_J", "imbalance", "impulse_N_s", "cpu_s", "real_time_factor", "touching_s")
-    assert all(told[name] is None for name in unknown) and strict(told) == told
+    assert all(of[name] is None for name in unknown) and strict(of) == of
 
 
-def test_a_run_that_failed_has_numbers_and_warnings_up_to_there():
+def test_a_run_that_failed_and_methods_that_look_for_no_events():
     scene = scene_of("kick")
     with pytest.raises(st.SimulationError) as caught:
         scene.simulate(most_steps=400)
-    told = scene.summary(caught.value.trajectory)
-    assert told["work_J"] is told["ground_impulse_N_s"] is None
-    assert told["peak_ground_force_N"] > 700 and strict(told) == told
-    assert {"torso", "ground"} <= {each.split(":")[0] for each in told["warnings"]}
-
-
-def test_methods_that_look_for_no_events():
+    of = scene.summary(caught.value.trajectory)
+    assert of["work_J"] is of["ground_impulse_N_s"] is None
+    assert of["peak_ground_force_N"] > 700 and strict(of) == of
+    assert {"torso", "ground"} <= {each.split(":")[0] for each in of["warnings"]}
     scene = scene_of("kick", duration=0.01)
     for method in ("dop853", "lsoda"):
-        told = scene.summary(scene.simulate(method=method, rtol=1e-6, atol=1e-6))
-        assert all(told[name] is None for name in OF_EVENTS)
-        assert told["ground_impulse_N_s"][2] == pytest.approx(1.0705 * 0.01, rel=1e-2)
-        assert told["standing_end"] is True and strict(told) == told
+        of = scene.summary(scene.simulate(method=method, rtol=1e-6, atol=1e-6))
+        assert all(of[name] is None for name in OF_EVENTS)
+        assert of["ground_impulse_N_s"][2] == pytest.approx(1.0705 * 0.01, rel=1e-2)
+        assert of["standing_end"] is True and strict(of) == of
+
+
+# Forces and impulses.
+
+
+def test_the_ground_s_impulse_is_what_momentum_and_weight_leave(kick, leap):
+    for motion in (kick, leap):
+        span = motion.t[-1] - motion.t[0]
+        expected = motion.linear_momentum[-1] - motion.linear_momentum[0]
+        expected[2] += MASS * GRAVITY * span
+        found = told(motion)["ground_impulse_N_s"]
+        np.testing.assert_allclose(found, expected, rtol=0, atol=5e-5)
+        assert expected[2] > 1
+        # whereas samples of the force 1 ms apart miss what a blow gives
+        sampled = np.trapezoid(motion.contact.forces.sum(axis=1)[:, 2], motion.t)
+        assert abs(sampled - expected[2]) > 0.1
+
+
+def test_peaks_by_hand(leap):
+    """Forces of feet (right 0 to 2, left 3 to 5) and tail at three samples."""
+    forces = np.zeros((3, 18, 3))
+    forces[0, 0], forces[0, 3] = (3, 0, 4), (0, 0, 5)  # a pair: (3, 0, 9)
+    forces[1, 1], forces[1, 5] = (0, 0, 8), (0, 6, 0)  # right 8, left 6, both 10
+    forces[2, 2], forces[2, 7], forces[2, 17] = (0, 0, 1), (0, 0, 2), (2, 0, 0)
+    of, weight = told(made(leap.model, forces=forces)), MASS * GRAVITY
+    group = {"feet": 10, "tail": np.sqrt(8), "right_foot": 8, "left_foot": 6}
+    assert of["peak_ground_force_N"] == 10
+    assert of["peak_ground_force_weights"] == pytest.approx(10 / weight)
+    assert of["body_weight_N"] == pytest.approx(weight)
+    assert of["peak_group_force_N"] == pytest.approx(group)
+    weights = {name: force / weight for name, force in group.items()}
+    assert of["peak_group_force_weights"] == pytest.approx(weights)
+    assert of["peak_foot_force_N"] == pytest.approx(np.sqrt(90))
+    assert of["peak_tail_force_N"] == 2
+    forces[1] = 1e308  # what overflows is no number
+    of = told(made(leap.model, forces=forces))
+    assert of["peak_ground_force_N"] is of["peak_group_force_N"]["feet"] is None
+
+
+def test_the_kick_s_peak_is_of_both_feet_together_and_without_gravity_of_no_weight(kick):
+    of = told(kick)
+    every = np.linalg.norm(kick.contact.forces.sum(axis=1), axis=1).max()
+    assert of["peak_ground_force_N"] == pytest.approx(every) == pytest.approx(764, abs=20)
+    assert of["peak_ground_force_weights"] == pytest.approx(every / MASS / GRAVITY)
+    assert of["peak_ground_force_N"] > 1.7 * of["peak_foot_force_N"]
+    of = summary(kick.model.with_parameters(gravity=0.0), kick)
+    assert of["peak_ground_force_N"] > 700 and of["com_rise_m"] is None
+    assert of["body_weight_N"] is of["peak_ground_force_weights"] is None
+    assert set(of["peak_group_force_weights"].values()) == {None}
+    assert not any("body weights" in each for each in of["warnings"])
+
+
+# Slips.
+
+
+def slid(name, speed, mu):
+    """Paths of a rat that comes to rest on the ground, and is then pushed along x."""
+    model = zoo.model(name).with_parameters(mu=mu)
+    settings = {"legs": LEGS, "controller": st.Damping(1e-3)}
+    start = at_height(model, 0.06, 1)[0]
+    q, v, bristles = st.settle(model, start, rounds=3, duration=0.4, **settings)
+    v[0] = speed
+    settings |= {"bristles0": bristles, "t_span": 0.8, "output_step": 2e-3}
+    return told(st.simulate(model, q, v, **settings))["slip_m"]
+
+
+def test_the_path_of_sliding_feet_tail_and_torso():
+    """Who sticks does not slip, although its springs stretch. With the paper's friction it is the
+    path of the point: its springs pull it back, so that it is longer than a sliding block's way.
+    """
+    wanted = SPEED**2 / (2 * MU * GRAVITY)
+    found = slid("ground", SPEED, MU)
+    assert found == pytest.approx(dict.fromkeys(["feet", "tail", "torso"], wanted), rel=0.01)
+    assert max(slid("ground", 0.01, mu=1.0).values()) < 1e-4
+    assert slid("paper", SPEED, MU)["feet"] > wanted
+
+
+def test_a_rolling_torso_does_not_slip_and_a_spinning_one_does(rat):
+    """A sphere of radius 2 cm that rolls along x by 3 rad in 1 s; then the same without rolling."""
+    t, radius, turn = np.linspace(0, 1, 501), 0.02, 3.0
+    for rolls in (True, False):
+        q = at_height(rat, radius, len(t))
+        q[:, 0] = radius * turn * t * rolls
+        half = turn * t / 2
+        q[:, 3:7] = np.stack([np.cos(half), 0 * t, np.sin(half), 0 * t], axis=1)
+        points = q[:, None, :3] * [1, 1, 0]
+        v = np.zeros((len(t), rat.nv))
+        v[:, 0], v[:, 4] = radius * turn * rolls, turn
+        forces = np.tile([0, 0, 1.0], (len(t), 1, 1))
+        contact = st.Contact(points, forces, np.zeros((len(t), 1, 2)), {"torso": 1})
+        motion = dataclasses.replace(made(rat, q, t=t), v=v, contact=contact)
+        wanted = 0.0 if rolls else radius * turn
+        assert told(motion)["slip_m"]["torso"] == pytest.approx(wanted, abs=1e-6)
+    # a point in the air does not slip
+    points, forces = np.zeros((2, 3, 6, 3))
+    points[:, 0, 0] = [0, 1, 3]
+    for force, slip in ((0, 0.0), (1, 2.0)):
+        forces[1:, 0, 2] = force
+        assert told(made(rat, points=points, forces=forces))["slip_m"] == {"feet": slip}

@@ -1,6 +1,4 @@
-"""Moving films: as many frames as their speed asks for, all of them different, whole or not at
-all.
-"""
+"""Moving films: as many frames as their speed asks for, all different, whole or not at all."""
 
 import dataclasses
 import re
@@ -12,7 +10,7 @@ import matplotlib
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from PIL import Image
+from PIL import Image, ImageSequence
 
 import serpentail as st
 from serpentail.pictures import encode
@@ -30,11 +28,7 @@ FEW = {"speed": 3.0, "views": ("side",)}  # five frames
 def gif_frames(path):
     with Image.open(path) as film:
         assert film.info["loop"] == 0 and film.info["duration"] == 40  # for ever, 25 a second
-        frames = []
-        for k in range(film.n_frames):
-            film.seek(k)
-            frames.append(np.asarray(film.convert("RGB")))
-    return frames
+        return [np.asarray(frame.convert("RGB")) for frame in ImageSequence.Iterator(film)]
 
 
 def mp4_frames(path):
@@ -51,7 +45,6 @@ def ffmpeg():
 
 
 def check_frames(path, read, speed):
-    """A film has the frames of its speed, all of them different, and is the same twice."""
     settings = {"speed": speed, "views": ("side", "oblique")}
     assert flight().film(str(path), **settings) == path
     frames = read(path)
@@ -64,11 +57,16 @@ def check_frames(path, read, speed):
     assert flight().film(path, **settings).read_bytes() == first
 
 
-def test_a_gif_has_the_frames_of_its_speed(tmp_path):
+def test_a_gif_has_the_frames_of_its_speed_all_different_and_the_same_twice(tmp_path):
     check_frames(tmp_path / "new" / "a.gif", gif_frames, 0.8)
+    # several motions move beside each other
+    alone = flight().film(tmp_path / "a.gif", **FEW)
+    both = st.film([flight(), flight((2.6, 2.8))], tmp_path / "b.gif", **FEW)
+    one, two = (gif_frames(path) for path in (alone, both))
+    assert len(one) == len(two) and two[0].shape[1] > one[0].shape[1]
 
 
-def test_an_mp4_has_the_frames_of_its_speed_and_a_gif_its_colours(tmp_path):
+def test_an_mp4_has_them_too_and_a_gif_its_colours(tmp_path):
     """A gif's palette is made beforehand: no drawn colour may be far from it."""
     ffmpeg()
     check_frames(tmp_path / "new" / "a.mp4", mp4_frames, 2.0)
@@ -78,7 +76,9 @@ def test_an_mp4_has_the_frames_of_its_speed_and_a_gif_its_colours(tmp_path):
         assert np.abs(one.astype(int) - other).mean() < 2
 
 
-def test_a_film_is_slow_motion_of_four_seconds_and_tells_its_speed(tmp_path, monkeypatch):
+def test_a_film_is_slow_motion_of_four_seconds_tells_its_speed_and_ends_in_time(
+    tmp_path, monkeypatch
+):
     told = []
     monkeypatch.setitem(MODULE.MOVING, ".gif", lambda _, frames: told.append(frames))
     monkeypatch.setattr("serpentail.pictures.film.pictures", lambda strip, slow: (strip, slow))
@@ -90,6 +90,13 @@ def test_a_film_is_slow_motion_of_four_seconds_and_tells_its_speed(tmp_path, mon
     assert times[0] == 0 and LASTS - times[-1] < 1 / (25 * 7)
     for slow, words in ((7, "1/7 of real"), (1, "real"), (0.5, "2 times real"), (2.5, "1/2.5 of")):
         assert speed_words(slow).startswith(words)
+    # the last frame is inside, whatever the rounding, if the motion lasts a whole number of frames
+    asked, same = [], lambda self, t: asked.append(t) or dataclasses.replace(self)
+    monkeypatch.setattr(st.Trajectory, "resample", same)
+    for end in np.random.default_rng(2).uniform(0.1, 9, 50):
+        motion = dataclasses.replace(flight(), t=np.linspace(0.3, 0.3 + end, 59))
+        motion.film(tmp_path / "a.gif", speed=25 * end / 50)
+        assert len(asked[-1]) == 51 and asked[-1][-1] <= motion.t[-1]
 
 
 def test_pictures_have_even_sizes_and_leave_the_look_of_others():
@@ -100,13 +107,6 @@ def test_pictures_have_even_sizes_and_leave_the_look_of_others():
     before = dict(matplotlib.rcParams)
     for _ in pictures(strip, 1.0):
         assert dict(matplotlib.rcParams) == before
-
-
-def test_several_motions_move_beside_each_other(tmp_path):
-    alone = flight().film(tmp_path / "a.gif", **FEW)
-    both = st.film([flight(), flight((2.6, 2.8))], tmp_path / "b.gif", **FEW)
-    one, two = (gif_frames(path) for path in (alone, both))
-    assert len(one) == len(two) and two[0].shape[1] > one[0].shape[1]
 
 
 def test_a_film_on_paper_is_the_filmstrip_and_in_html_the_page(tmp_path, monkeypatch):
@@ -140,20 +140,6 @@ def test_what_no_film_can_be_is_refused(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_the_last_frame_lies_in_the_motion(tmp_path, monkeypatch):
-    """Whatever the rounding, where the motion lasts a whole number of frames."""
-    seen = []
-    monkeypatch.setattr(
-        st.Trajectory, "resample", lambda self, t: (seen.append(t), dataclasses.replace(self))[1]
-    )
-    monkeypatch.setattr("serpentail.pictures.film.pictures", lambda *_: iter(()))
-    monkeypatch.setitem(MODULE.MOVING, ".gif", lambda *_: None)
-    for end in np.random.default_rng(2).uniform(0.1, 9, 50):
-        motion = dataclasses.replace(flight(), t=np.linspace(0.3, 0.3 + end, 59))
-        motion.film(tmp_path / "a.gif", speed=25 * end / 50)
-        assert len(seen[-1]) == 51 and seen[-1][-1] <= motion.t[-1]
-
-
 # Encoders.
 
 
@@ -167,11 +153,18 @@ def test_without_an_encoder_the_remedy_is_told_first_and_one_on_path_serves(tmp_
     assert encode.encoder() == "found"
 
 
-def test_an_encoder_that_fails_leaves_the_old_file(tmp_path, monkeypatch):
-    script, path = tmp_path / "ffmpeg", tmp_path / "a.mp4"
-    script.touch(0o700)
+@pytest.fixture
+def script(tmp_path, monkeypatch):
+    """What is run as the encoder."""
+    found = tmp_path / "ffmpeg"
+    found.touch(0o700)
+    monkeypatch.setattr(encode, "encoder", lambda: str(found))
+    return found
+
+
+def test_an_encoder_that_fails_leaves_the_old_file(tmp_path, script):
+    path = tmp_path / "a.mp4"
     path.write_bytes(b"before")
-    monkeypatch.setattr(encode, "encoder", lambda: str(script))
     for code, words in (("exit 3", "3"), ("echo the disk is on fire >&2; exit 1", "the disk")):
         script.write_text(f"#!/bin/sh\n{code}\n")
         with row(code), pytest.raises(st.NotWritten, match=rf"a\.mp4.*ffmpeg: {words}"):
@@ -179,22 +172,16 @@ def test_an_encoder_that_fails_leaves_the_old_file(tmp_path, monkeypatch):
         assert path.read_bytes() == b"before" and set(tmp_path.iterdir()) == {path, script}
 
 
-def test_a_stop_by_the_user_ends_the_encoder(tmp_path, monkeypatch):
-    begun, real = [], subprocess.Popen
-
-    def kept(*arguments, **options):
-        begun.append(real(*arguments, **options))
-        return begun[-1]
-
+def test_a_stop_by_the_user_ends_the_encoder(tmp_path, script, monkeypatch):
     def stopped():
         yield np.zeros((64, 64, 3), np.uint8)
         raise KeyboardInterrupt
 
-    script, path = tmp_path / "ffmpeg", tmp_path / "a.mp4"
-    script.touch(0o700)
     script.write_text("#!/bin/sh\nexec cat > /dev/null\n")  # until it is ended
-    monkeypatch.setattr(encode, "encoder", lambda: str(script))
-    monkeypatch.setattr(subprocess, "Popen", kept)
+    begun, real = [], subprocess.Popen
+    monkeypatch.setattr(
+        subprocess, "Popen", lambda *a, **o: begun.append(real(*a, **o)) or begun[0]
+    )
     with pytest.raises(KeyboardInterrupt):
-        encode.write_mp4(path, stopped())
-    assert begun[0].returncode is not None and not path.exists()
+        encode.write_mp4(tmp_path / "a.mp4", stopped())
+    assert begun[0].returncode is not None and list(tmp_path.iterdir()) == [script]

@@ -1,5 +1,5 @@
-"""Laws of filmstrips: equal scales, nothing hidden, moments that differ, ground where there is
-some.
+"""Filmstrips: equal scales, nothing hidden, moments that differ, ground where there is some; what
+stands on it, and what is below it.
 """
 
 import dataclasses
@@ -11,15 +11,23 @@ import pytest
 from PIL import Image
 
 import serpentail as st
+from serpentail.pictures.animal import PALE, SHADOW
 from serpentail.pictures.filmstrip import strip_of
 from serpentail.pictures.frames import moments, way
 from serpentail.pictures.page import drawn_points
-from serpentail.pictures.style import STYLE
+from serpentail.pictures.style import STYLE, TORSO
 from serpentail.pictures.views import NAMED, SIDE, views_of
 from tests.support.drawn_flight import SPEEDS, flight
 from tests.support.rows import row
 
 VIEWS = ("side", "top", "oblique")
+GROUPS = {"feet": 6, "tail": 3, "torso": 1}
+WEIGHT, BLOW = 0.2, 20.0  # N, of a point
+EVENTS = [
+    {"time": 0.1, "group": "feet", "kind": "take_off"},
+    {"time": 0.11, "group": "tail", "kind": "take_off"},
+    {"time": 0.5, "group": "feet", "kind": "touch_down"},
+]
 
 
 def lifted(motion, height):
@@ -54,14 +62,18 @@ def check_scales(figure, axes, motion, frames):
             assert (shown > low).all() and (shown < high).all()
 
 
+def inside(box, page):
+    assert page.x0 <= box.x0 < box.x1 <= page.x1
+    assert page.y0 <= box.y0 < box.y1 <= page.y1
+
+
 def check_overlaps(figure, axes):
     """Panels, key and labels do not overlap, and lie on the page."""
     figure.draw_without_rendering()
     boxes = [each.get_tightbbox() for each in panels_of(figure, axes)]
     boxes.append(figure.legends[0].get_window_extent())
     for k, box in enumerate(boxes):
-        assert figure.bbox.x0 <= box.x0 < box.x1 <= figure.bbox.x1
-        assert figure.bbox.y0 <= box.y0 < box.y1 <= figure.bbox.y1
+        inside(box, figure.bbox)
         for other in boxes[:k]:
             shared = matplotlib.transforms.Bbox.intersection(box, other)
             assert shared is None or min(shared.width, shared.height) < 2
@@ -102,6 +114,11 @@ def test_motions_are_rows_at_the_same_times():
     films = strip_of([one, other], 5, [SIDE], ["a", "b"], None).films
     for first, second in zip(*films, strict=True):
         assert abs(first.time - second.time) < np.diff(one.t).max() / 2
+    # those nearest to wanted times
+    (film,) = strip_of([one], [0.31, 0.0, 0.1], [SIDE], None, None).films
+    nearest = [one.t[np.abs(one.t - t).argmin()] for t in (0.0, 0.1, 0.31)]
+    assert [frame.time for frame in film] == nearest
+    assert len(strip_of([flight(samples=3)], 8, [SIDE], None, None).films[0]) == 3
 
 
 def test_moments_do_not_repeat_what_rests():
@@ -114,26 +131,13 @@ def test_moments_do_not_repeat_what_rests():
         assert ((times > 0) & (times < 0.4)).sum() <= count // 8
         even = np.linspace(0, 1.2, count)
         np.testing.assert_allclose(moments([(t, 0 * t)], count), even, atol=1e-3)
-
-
-def test_the_way_is_that_of_the_drawn_points():
-    """A torso that slides 1 m and back has gone 2 m."""
+    # the way is that of the drawn points: a torso that slides 1 m and back has gone 2 m
     motion = flight(SPEEDS["still"], segments=0, samples=101)
     q = motion.q.copy()
     q[:, 3:7] = 1, 0, 0, 0
     q[:, 1] = 0.5 - np.abs(np.linspace(-1, 1, 101)) / 2
     gone = way(motion.model, dataclasses.replace(motion, q=2 * q - q * (np.arange(7) > 2)))
     assert gone[0] == 0 and gone[-1] == pytest.approx(2) and (np.diff(gone) > 0).all()
-
-
-def test_frames_are_the_samples_nearest_to_wanted_times():
-    motion = flight()
-    (film,) = strip_of([motion], [0.31, 0.0, 0.1], [SIDE], None, None).films
-    assert [frame.time for frame in film] == [
-        motion.t[np.abs(motion.t - t).argmin()] for t in (0.0, 0.1, 0.31)
-    ]
-    few = dataclasses.replace(flight(samples=3))
-    assert len(strip_of([few], 8, [SIDE], None, None).films[0]) == 3
 
 
 def test_ground_is_drawn_below_what_stays_above_it():
@@ -162,3 +166,89 @@ def test_wrong_arguments_are_named(tmp_path):
         with pytest.raises(st.ViewError, match="model=st"):
             draw()
     assert [path.name for path in tmp_path.iterdir()] == ["a.npz"]
+
+
+# On the ground.
+
+
+def standing(height=0.0, legs=False):
+    """The flight as if it had stood, with one blow."""
+    motion, count = flight(), sum(GROUPS.values())
+    shape = (len(motion.t), count, 3)
+    points = np.random.default_rng(3).uniform(-0.1, 0.1, shape)
+    forces = np.broadcast_to([0, 0, WEIGHT], shape).copy()
+    forces[len(motion.t) // 2, :, 2] = BLOW
+    angles = np.zeros((len(motion.t), 4)) if legs else None
+    contact = st.Contact(points, forces, np.zeros((*shape[:2], 2)), GROUPS, angles)
+    if legs:
+        motion.model.kernels["leg_points"] = None
+        motion.model.leg_points = lambda q, _: q[:, None, None, :3] + np.zeros((1, 2, 6, 1))
+    q = motion.q + height * (np.arange(motion.q.shape[1]) == 2)
+    info = {"events": EVENTS}
+    return dataclasses.replace(motion, q=q, contact=contact, info=info, model=motion.model)
+
+
+def marks(figure):
+    return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def test_the_key_has_every_mark_and_lies_on_the_page():
+    for frames, legs in ((1, True), (4, False), (8, True)):
+        with matplotlib.rc_context(STYLE):
+            found, _ = standing(legs=legs).filmstrip(frames=frames)
+            found.draw_without_rendering()
+        inside(found.legends[0].get_window_extent(), found.bbox)
+        told = marks(found)
+        assert len(told) == 7 + legs and ("leg" in told) == legs
+        assert told[-1] == "below the ground" and told[-2].startswith("force, 60 mm: ")
+    assert "below the ground" not in marks(standing(height=1.0).filmstrip(frames=1)[0])
+
+
+def faces(axes, colour):
+    """Filled outlines of a colour: how opaque each is, and its corners."""
+    wanted = matplotlib.colors.to_rgb(colour)
+    patches = [each for each in axes.patches if each.get_facecolor()[:3] == wanted]
+    return [(each.get_facecolor()[3], each.get_xy()) for each in patches]
+
+
+def test_what_is_below_the_ground_is_pale_and_shadows_lie_where_one_looks_down():
+    """The torso half in the ground: all of it pale, and its upper part over that."""
+    for view, lies in (("side", False), ("oblique", True), ("top", True)):
+        _, axes = standing(height=0.3).filmstrip(frames=[0.0], views=(view,))
+        assert bool(faces(axes[0, 0], SHADOW)) == lies, view
+        _, axes = standing(height=-0.06).filmstrip(frames=[0.0], views=(view,))
+        (whole, outline), (part, above) = faces(axes[0, 0], TORSO)
+        assert whole == PALE and part == 1
+        assert (np.ptp(above, axis=0) <= np.ptp(outline, axis=0) + 1e-9).all()
+        for line in axes[0, 0].lines:
+            if line.get_alpha() is None and view == "side" and line.get_linewidth() == 1.4:
+                assert np.nanmin(line.get_ydata(), initial=0) >= 0
+        assert any(line.get_alpha() == PALE for line in axes[0, 0].lines)
+
+
+def test_arrows_are_the_forces():
+    motion = standing()
+    _, axes = motion.filmstrip(frames=[0.0, float(motion.t[29])], views=("side",))
+    for panel, size in zip(axes[0], (np.sqrt(WEIGHT / BLOW), 1), strict=True):
+        (arrows,) = [each for each in panel.collections if hasattr(each, "U")]
+        np.testing.assert_allclose(np.hypot(arrows.U, arrows.V), 0.06 * size)
+        assert len(arrows.U) == sum(GROUPS.values())
+
+
+def test_plots_have_forces_on_a_linear_axis_and_events_on_every_panel():
+    figure, every = standing().plot()
+    (axes,) = [axes for axes in figure.axes if axes.get_ylabel().startswith("normal force")]
+    for line, count in zip(axes.lines, GROUPS.values(), strict=True):
+        drawn = line.get_ydata().min(), line.get_ydata().max()
+        assert drawn == pytest.approx((count * WEIGHT, count * BLOW))
+    assert {each.get_yscale() for each in every} == {"linear"}
+    _, every = standing().plot("height", "force", "tail")
+    for axes in every:
+        lines = {each.get_label(): each for each in axes.collections}
+        for kind in ("take_off", "touch_down"):
+            drawn = [segment[0, 0] for segment in lines[f"_{kind}"].get_segments()]
+            assert drawn == [event["time"] for event in EVENTS if event["kind"] == kind]
+    assert [text.get_text() for text in every[0].texts] == ["feet off", "feet on"]
+    # where events are unknown there are none
+    _, axes = dataclasses.replace(standing(), info={"method": "dop853"}).plot("height")
+    assert not axes[0].collections and not axes[0].texts

@@ -1,6 +1,12 @@
-"""Laws of plots over time: the panels asked for, on the axes given, without what stays zero."""
+"""Plots over time: the panels asked for, on the axes given, without what stays zero; all figures
+are written whole or not at all, with equal bytes twice, and without global state.
+"""
 
 import dataclasses
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 import matplotlib
 import numpy as np
@@ -15,6 +21,13 @@ from serpentail.pictures.style import STYLE
 from tests.support.drawn_flight import flight
 from tests.support.rows import row
 
+STARTS = {".pdf": b"%PDF-", ".png": b"\x89PNG", ".svg": b"<?xml"}
+DRAWN = {
+    "film": lambda motion, path: motion.filmstrip(path, frames=1, views=("side",)),
+    "times": lambda motion, path: motion.plot("height", path=path),
+}
+OTHERS = {"font.size": 20, "axes.facecolor": "red", "svg.fonttype": "none", "xtick.color": "red"}
+
 
 def labels(axes):
     return [each.get_ylabel().replace("\n", " ") for each in np.atleast_1d(axes)]
@@ -25,15 +38,12 @@ def curves(axes):
     return {line.get_label(): line for line in axes.lines if len(line.get_xdata())}
 
 
-def test_the_panels_that_are_named_in_their_order():
+def test_the_panels_that_are_named_in_their_order_on_axes_that_are_given():
     figure, axes = flight().plot("tilt", "height", "tail")
     assert isinstance(figure, Figure) and list(figure.axes) == list(axes)
     told = ["tilt of the back [deg]", "height of torso [mm]", "bend of segment [deg]"]
     assert labels(axes) == told
     assert axes[-1].get_xlabel() == "time [s]"
-
-
-def test_axes_that_are_given_are_drawn_on():
     figure = Figure()
     left, right = figure.subplots(1, 2)
     assert flight().plot("height", ax=left) == (figure, left)
@@ -57,58 +67,50 @@ def test_what_cannot_be_plotted_is_refused(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_panels_that_stay_zero_are_left_out_unless_they_are_named():
+def test_panels_and_curves_that_stay_zero_are_left_out_unless_they_are_named():
     motion = dataclasses.replace(flight(), tau=np.zeros((59, 4)))
     assert not any("torque" in label for label in labels(motion.plot()[1]))
     assert any("torque" in label for label in labels(flight().plot()[1]))
     assert labels(motion.plot("torque")[1]) == ["tail torque [mN m]"]
     assert not any("force" in label for label in labels(flight().plot()[1]))
     assert len(flight(segments=0).plot()[1]) == len(PANELS) - 3  # no tail, no torque, no force
-
-
-def test_curves_that_stay_zero_are_told_instead_of_drawn():
-    """The flight is in the plane x = 0."""
+    # the flight is in the plane x = 0
     _, (axes,) = flight().plot("momentum")
     assert set(curves(axes)) == {"forward $y$", "up $z$"}
-    told = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert told[-1] == "right $x$: 0"
+    assert axes.get_legend().get_texts()[-1].get_text() == "right $x$: 0"
+    # what is conserved is drawn flat
+    constant = np.full((59, 3), 1e-3) * (1 + 1e-13 * np.eye(59, 3))
+    _, (axes,) = dataclasses.replace(flight(), angular_momentum=constant).plot("angular_momentum")
+    assert np.ptp(axes.get_ylim()) >= 0.01
 
 
-@pytest.mark.parametrize("links", [1, 4])
-def test_tails_are_shown_by_the_bends_of_their_segments(links):
+def test_tails_are_shown_by_the_bends_of_their_segments_or_without_a_model_by_their_coordinates():
     motion = flight()
-    motion.model.links = links
-    _, (axes,) = motion.plot("tail")
-    for k, name in enumerate(("pitch 1", "yaw 1", "pitch 2", "yaw 2")):
-        drawn = np.radians(curves(axes)[name].get_ydata())
-        np.testing.assert_allclose(drawn, links * motion.tail[:, k])
-    # the bend is the angle between the segment's ends: as many turns as there are links
-    turn = Rotation.from_euler("x", motion.tail[5, 0]).as_matrix()
-    whole = Rotation.from_matrix(np.linalg.matrix_power(turn, links)).as_rotvec()[0]
-    assert np.radians(curves(axes)["pitch 1"].get_ydata()[5]) == pytest.approx(whole)
-
-
-def test_without_a_model_the_tail_is_shown_by_its_coordinates():
+    for links in (1, 4):
+        motion.model.links = links
+        _, (axes,) = motion.plot("tail")
+        for k, name in enumerate(("pitch 1", "yaw 1", "pitch 2", "yaw 2")):
+            drawn = np.radians(curves(axes)[name].get_ydata())
+            np.testing.assert_allclose(drawn, links * motion.tail[:, k])
+        # the bend is the angle between the segment's ends: as many turns as there are links
+        turn = Rotation.from_euler("x", motion.tail[5, 0]).as_matrix()
+        whole = Rotation.from_matrix(np.linalg.matrix_power(turn, links)).as_rotvec()[0]
+        assert np.radians(curves(axes)["pitch 1"].get_ydata()[5]) == pytest.approx(whole)
     motion = dataclasses.replace(flight(), model=None)
     _, (axes,) = motion.plot("tail")
     assert labels(axes) == ["tail coord. [deg]"]
-    np.testing.assert_allclose(
-        np.radians(curves(axes)["yaw 2"].get_ydata()), motion.tail[:, 3], atol=1e-15
-    )
+    drawn = np.radians(curves(axes)["yaw 2"].get_ydata())
+    np.testing.assert_allclose(drawn, motion.tail[:, 3], atol=1e-15)
     assert labels(motion.plot("tail", model=flight().model)[1]) == ["bend of segment [deg]"]
 
 
-def tumbling():
-    """A pitching torso that is rolled by a degree: near the vertical, roll and yaw jump."""
+def test_angles_have_gaps_where_they_mean_little_and_the_tilt_has_none():
+    """Of a pitching torso that is rolled by a degree: near the vertical, roll and yaw jump."""
     motion = flight(samples=401)
     turn = Rotation.from_euler("YX", np.stack([0 * motion.t + 0.02, 20 * motion.t], axis=1))
     q = motion.q.copy()
     q[:, 3:7] = turn.as_quat()[:, [3, 0, 1, 2]]
-    return dataclasses.replace(motion, q=q)
-
-
-def test_angles_have_gaps_where_they_mean_little():
-    motion = tumbling()
+    motion = dataclasses.replace(motion, q=q)
     angles = np.radians(attitude(motion, None).curves)
     upright = np.abs(rotation_matrix(motion.attitude)[:, 2, 1])  # sine of the pitch
     np.testing.assert_array_equal(np.isnan(angles[:, 1]), np.isnan(angles[:, 2]))
@@ -117,10 +119,7 @@ def test_angles_have_gaps_where_they_mean_little():
     # what is drawn without a break is steady: no spikes
     steps = np.abs(np.diff(angles[:, 1:], axis=0))
     assert np.nanmax(steps) < np.radians(5)
-
-
-def test_the_tilt_is_the_angle_of_the_back_to_the_vertical():
-    motion = tumbling()
+    # whereas the tilt is the angle of the back to the vertical
     _, (axes,) = motion.plot("tilt")
     wanted = np.degrees(np.arccos(rotation_matrix(motion.attitude)[:, 2, 2]))
     np.testing.assert_allclose(curves(axes)["tilt"].get_ydata(), wanted, atol=1e-5)
@@ -136,8 +135,7 @@ def test_everything_is_labelled_and_legends_cover_nothing():
     for axes in every:
         assert axes.get_ylabel().endswith("]")
         low, high = axes.get_ylim()
-        lines = curves(axes).values()
-        legend = axes.get_legend()
+        lines, legend = curves(axes).values(), axes.get_legend()
         if legend is None:
             assert len(lines) == 1
             continue
@@ -149,7 +147,61 @@ def test_everything_is_labelled_and_legends_cover_nothing():
             assert np.nanmin(data) >= low and np.nanmax(data) <= min(high, bottom)
 
 
-def test_a_conserved_momentum_is_drawn_flat():
-    constant = np.full((59, 3), 1e-3) * (1 + 1e-13 * np.eye(59, 3))
-    _, (axes,) = dataclasses.replace(flight(), angular_momentum=constant).plot("angular_momentum")
-    assert np.ptp(axes.get_ylim()) >= 0.01
+# All figures.
+
+
+def test_figures_are_the_same_twice_in_every_format_whatever_the_user_has_set(tmp_path):
+    for name, draw in DRAWN.items():
+        for suffix, start in STARTS.items():
+            first, second = (tmp_path / f"new {k}" / f"{name}{suffix}" for k in (1, 2))
+            figure, axes = draw(flight(), first)
+            assert first.read_bytes().startswith(start) and set(axes.ravel()) <= set(figure.axes)
+            with matplotlib.rc_context(OTHERS):
+                draw(flight(), second)
+                assert matplotlib.rcParams["font.size"] == 20
+            assert first.read_bytes() == second.read_bytes(), first.name
+    written = {path.name for path in tmp_path.glob("new*/*")}
+    assert written == {f"{name}{suffix}" for name in DRAWN for suffix in STARTS}
+
+
+def test_a_figure_keeps_its_look_until_it_is_saved(tmp_path):
+    """Whoever saves it, with whatever settings: Matplotlib makes ticks when it draws."""
+    for draw in (flight().filmstrip, flight().plot):
+        figures = [draw()[0] for _ in range(2)]
+        figures[0].savefig(tmp_path / "a.png")
+        with matplotlib.rc_context(OTHERS):
+            figures[1].savefig(tmp_path / "b.png")
+        assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+        assert figures[0]._repr_png_().startswith(STARTS[".png"])
+
+
+def test_drawing_leaves_pyplot_alone_and_importing_leaves_matplotlib_alone(tmp_path):
+    code = (
+        "import sys, serpentail.pictures.film, serpentail.pictures.filmstrip, "
+        "serpentail.pictures.plot, serpentail.motion.trajectory\n"
+        "assert not {'matplotlib', 'scipy', 'PIL'} & set(sys.modules)\n"
+        "from tests.support.drawn_flight import flight\n"
+        "flight().filmstrip('film.svg', frames=1), flight().plot('tilt', path='times.svg')\n"
+        "flight().film('film.gif', speed=9.0)\n"
+        "assert 'matplotlib.pyplot' not in sys.modules\n"
+    )
+    packages = [str(Path(st.__file__).parents[1]), str(Path(__file__).parents[2])]
+    own = os.environ | {"PYTHONPATH": os.pathsep.join(packages), "PYTHONDONTWRITEBYTECODE": "1"}
+    subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=own, check=True)
+
+
+def test_a_failed_drawing_leaves_the_old_file(tmp_path, monkeypatch):
+    def cut_short(figure, stream, **options):
+        stream.write(b"half")
+        raise OSError("no space left")
+
+    path = tmp_path / "a.svg"
+    path.write_bytes(b"before")
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", cut_short)
+    for draw in DRAWN.values():
+        with pytest.raises(OSError, match="no space left"):
+            draw(flight(samples=20), path)
+        for name in ("film.gif", "film", "film.svgz"):
+            with row(name), pytest.raises(ValueError, match=r"\.pdf, \.png, \.svg"):
+                draw(flight(), tmp_path / "new" / name)
+        assert path.read_bytes() == b"before" and list(tmp_path.iterdir()) == [path]

@@ -7,11 +7,8 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.scenes.simulate import scenario
-from serpentail_codegen.scene.parse import load_scene
+from tests.motion.conftest import simulated
 from tests.support import page, zoo
-from tests.support.models import folder_of
-from tests.support.scenes import SCENES
 
 ARRAYS = ("t", "q", "v", "tau", "kinetic", "potential", "linear_momentum", "angular_momentum")
 
@@ -20,22 +17,6 @@ ARRAYS = ("t", "q", "v", "tau", "kinetic", "potential", "linear_momentum", "angu
 def built():
     """The page."""
     page.need(page.need_page)
-
-
-@cache
-def scene_of(name):
-    path = SCENES / f"{name}.toml"
-    return scenario(path, folder_of(load_scene(path)))
-
-
-@cache
-def simulated(name):
-    return scene_of(name).simulate()
-
-
-@pytest.fixture
-def kick_scene():
-    return scene_of("kick")
 
 
 @pytest.fixture
@@ -58,6 +39,13 @@ def flight():
     return flown(zoo.model("arcs2"))
 
 
+@pytest.fixture
+def single(flight):
+    """Its first sample alone."""
+    return dataclasses.replace(flight, **{n: getattr(flight, n)[:1] for n in ARRAYS})
+
+
+@pytest.fixture
 def silent():
     """A motion of a model that lacks ``tail_points``."""
     return dataclasses.replace(flown(zoo.model("m1_n1")), model=zoo.model("bare"))
@@ -70,9 +58,3 @@ def plan():
     goal = st.Goal(attitude=None, tail=(0.0, 0.0))
     settings = {"duration": 0.2, "tolerance": None, "intervals": 4, "rounds": 0}
     return st.plan(zoo.model("m1_n3"), start=(q, np.zeros(8)), goal=goal, **settings)
-
-
-@pytest.fixture
-def single(flight):
-    """Its first sample alone."""
-    return dataclasses.replace(flight, **{n: getattr(flight, n)[:1] for n in ARRAYS})

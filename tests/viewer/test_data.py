@@ -1,4 +1,6 @@
-"""What a page holds: the motion's numbers, in at most 1 MB, and words on what is not shown."""
+"""What a page holds: the motion's numbers, in at most 1 MB, and words on what is not shown; tails
+as thick as they are, and a torso and joints large enough to be seen.
+"""
 
 import dataclasses
 import pickle
@@ -7,17 +9,25 @@ import numpy as np
 import pytest
 
 import serpentail as st
+from serpentail.pictures.frames import body_of
 from serpentail.viewer.packing import packed
+from serpentail.viewer.shape import shape
+from serpentail.watching.poses import animal
+from tests.motion.conftest import scene_of, told
 from tests.support import page, zoo
 from tests.support.page import data_of
+from tests.support.rows import row
 
 from .conftest import ARRAYS, flown, plan
+
+WEIGHT = 9.8 * (0.10572 + 0.00351)
+RADIUS = 0.0029  # m: the rat's usual one
 
 
 def single_run(path):
     data = data_of(path)
-    assert len(data["runs"]) == 1
-    return data, data["runs"][0]
+    (run,) = data["runs"]
+    return data, run
 
 
 def test_samples_are_packed_bit_by_bit():
@@ -33,15 +43,19 @@ def test_samples_are_packed_bit_by_bit():
     assert beyond.ravel().tolist() == [largest, -largest]
 
 
-def test_the_kick_is_whole_and_below_1_mb(tmp_path, kick, kick_scene):
+def test_the_kick_is_whole_and_below_1_mb(tmp_path, kick):
     path = kick.view(tmp_path / "run.html")
-    _, run = single_run(path)
+    data, run = single_run(path)
+    check_words(data, run, kick)
+    loaded = st.Trajectory.load(kick.save(tmp_path / "kick.npz"))
+    again = loaded.view(tmp_path / "loaded.html", model=kick.model)
+    assert loaded.model is None and again.read_bytes() == path.read_bytes()
     assert path == tmp_path / "run.html" and path.stat().st_size <= 1e6
     assert run["rows"] == len(kick.t) == 1201
 
     # times, poses and points are the motion's
-    arrays, model = run["arrays"], kick_scene.model
-    legs = st.leg_joints(model, kick, kick_scene.legs.curve.at(kick.t)[0])
+    arrays, model = run["arrays"], kick.model
+    legs = st.leg_joints(model, kick, scene_of("kick").legs.curve.at(kick.t)[0])
     pushed = np.linalg.norm(kick.contact.forces, axis=2) > 0
     expected = {
         "pose": kick.q[:, :7],
@@ -66,17 +80,15 @@ def test_the_kick_is_whole_and_below_1_mb(tmp_path, kick, kick_scene):
     np.testing.assert_allclose(feet, kick.contact.points, atol=1e-7)
 
 
-def test_the_kick_s_numbers_and_events(tmp_path, kick, kick_scene):
-    data, run = single_run(kick.view(tmp_path / "run.html"))
-    numbers, summary = dict(run["numbers"]), kick_scene.summary(kick)
+def check_words(data, run, kick):
+    numbers, summary = dict(run["numbers"]), told(kick)
     assert float(numbers["take-off (s)"]) == pytest.approx(summary["take_off_s"], rel=1e-3)
     assert float(numbers["highest torso (m)"]) == pytest.approx(summary["apex_m"], rel=1e-3)
     assert numbers["samples"] == "1201" and numbers["landed, and stands at the end"] == "no"
     largest = np.linalg.norm(kick.contact.forces.sum(axis=1), axis=1).max()
-    weight = 9.8 * (0.10572 + 0.00351)
     said = "largest force of the ground at the samples"
     assert float(numbers[f"{said} (N)"]) == pytest.approx(largest, rel=1e-4)
-    assert float(numbers[f"{said} (body weights)"]) == pytest.approx(largest / weight, rel=1e-4)
+    assert float(numbers[f"{said} (body weights)"]) == pytest.approx(largest / WEIGHT, rel=1e-4)
     assert float(numbers["tilt at the end (deg)"]) == pytest.approx(0.795, abs=0.01)
     assert data["notes"] == [] and data["warnings"] == kick.warnings and len(kick.warnings) == 5
     assert [event["time"] for event in run["events"]] == [event["time"] for event in kick.events]
@@ -85,7 +97,7 @@ def test_the_kick_s_numbers_and_events(tmp_path, kick, kick_scene):
     assert data["force_scale"] == pytest.approx(np.percentile(forces[forces > 0], 95))
     shown = [plot["curves"][0]["array"] for plot in data["plots"]]
     assert shown == ["height", "tilt", "bends", "torque", "force", "energy"]
-    assert [plot["compressed"] for plot in data["plots"]] == pytest.approx([0] * 4 + [weight, 0])
+    assert [plot["compressed"] for plot in data["plots"]] == pytest.approx([0] * 4 + [WEIGHT, 0])
     assert [plot["least"] for plot in data["plots"]] == [1e-3, 0.1, 0.1, 0, 0, 0]
 
 
@@ -96,7 +108,7 @@ def test_a_flight_has_no_ground_and_no_legs(tmp_path, flight, single):
     assert not run["body"]["jointed"]
     assert not any("force" in plot["title"] for plot in data["plots"])
     assert not data["notes"] and not any("force" in label for label, _ in run["numbers"])
-    assert data["force_scale"] == pytest.approx(9.8 * (0.10572 + 0.00351))
+    assert data["force_scale"] == pytest.approx(WEIGHT)
     # the torso is the ellipsoid of its inertia
     parameters = flight.model.parameters
     squares = np.array(run["body"]["semi_axes"]) ** 2
@@ -119,26 +131,16 @@ def test_many_samples_are_thinned_and_the_page_says_so(tmp_path, flight):
     assert dict(run["numbers"])["samples"] == "100001"
 
 
-def test_a_run_that_failed_is_shown_up_to_there(tmp_path, kick_scene):
+def test_a_run_that_failed_is_shown_up_to_there(tmp_path, kick):
     with pytest.raises(st.SimulationError) as caught:
-        kick_scene.simulate(most_steps=400)
+        scene_of("kick").simulate(most_steps=400)
     cut = caught.value.trajectory
     cut.save(tmp_path / "cut.npz")
     for motion in (cut, st.Trajectory.load(tmp_path / "cut.npz")):
-        data, run = single_run(st.view(motion, tmp_path / "run.html", model=kick_scene.model))
+        data, run = single_run(st.view(motion, tmp_path / "run.html", model=kick.model))
         assert len(data["notes"]) == 1 and data["notes"][0].endswith(str(caught.value))
         assert data["warnings"] == cut.warnings != []
         assert run["rows"] == len(cut.t) and 1 < len(cut.t) < 1201
-
-
-def test_a_saved_motion_has_the_same_page(tmp_path, kick):
-    own = kick.view(tmp_path / "own.html")
-    loaded = st.Trajectory.load(kick.save(tmp_path / "kick.npz"))
-    again = loaded.view(tmp_path / "loaded.html", model=kick.model)
-    assert loaded.model is None and own.read_bytes() == again.read_bytes()
-    copy = pickle.loads(pickle.dumps(kick))
-    assert copy.model is None and kick.model is not None
-    assert copy.q.tobytes() == kick.q.tobytes()
 
 
 def test_several_motions_have_names_that_stay_data(tmp_path, kick, flight):
@@ -195,3 +197,57 @@ def test_a_long_tail_and_another_scale(tmp_path):
     assert data["length"] == pytest.approx(3 + 2 * run["body"]["semi_axes"][1])
     radii = run["body"]["tail_radii"]
     assert len(radii) == 12 and 0.01 < radii[-1] < radii[0] < 0.1
+
+
+# Shapes.
+
+
+def thick(name):
+    """A model of the zoo with links and arcs of chosen radii; the last link has no inertia along
+    itself. Return it and the radii of links and arcs (m).
+    """
+    model, changes = zoo.model(name), {}
+    links, arcs = (len(model.parameters.get(each, ())) for each in ("link_masses", "arc_masses"))
+    of_links, of_arcs = np.linspace(0.004, 0.001, links), np.linspace(0.003, 0.002, arcs)
+    if links:
+        masses = np.linspace(2e-3, 1e-3, links)
+        along = masses * of_links**2 / 2
+        along[-1], of_links[-1] = 0, 0.015 * model.parameters["tail_length"]
+        inertias = np.stack([2e-8 + 0 * along, along, 2e-8 + 0 * along], axis=1)
+        changes = {"link_masses": masses, "link_inertias": inertias}
+    if arcs:  # as thick as that mass of water
+        lengths = np.array(model.parameters["arc_lengths"])
+        changes["arc_masses"] = 1e3 * np.pi * of_arcs**2 * lengths
+    return model.with_parameters(**changes), of_links, np.repeat(of_arcs, model.samples or 1)
+
+
+def test_links_and_arcs_are_drawn_as_thick_as_they_are():
+    for name in ("own_links", "own_arcs", "mixed"):
+        model, links, arcs = thick(name)
+        radii = np.concatenate([links, arcs])
+        if name == "mixed":  # an arc, two links, an arc, three links
+            radii = np.concatenate([arcs[:3], links[:2], arcs[3:], links[2:]])
+        q = np.zeros((2, model.nq))
+        q[:, 3] = 1
+        scales = animal(model, q, None)["tail"].scales
+        with row(name):
+            np.testing.assert_allclose(shape(model)["tail_radii"], radii)
+            np.testing.assert_allclose(body_of(model).thickness, radii / radii.mean())
+            np.testing.assert_allclose(scales[: len(radii), 0], radii)
+            np.testing.assert_allclose(scales[len(radii) :, 1], radii)
+
+
+def test_equal_links_have_one_thickness_and_thin_torsos_and_fixed_bases_are_seen():
+    model = zoo.model("m2_n2")
+    assert body_of(model).thickness == ()
+    found = shape(model)
+    np.testing.assert_allclose(found["tail_radii"], RADIUS * (1.15 - 0.5 * np.arange(4) / 5))
+    assert found["jointed"] and not shape(zoo.model("arcs2"))["jointed"]
+    flat = model.with_parameters(torso_inertia=(8e-5, 8e-5, 1.6e-4))  # a disc
+    least, most, _ = np.sort(shape(flat)["semi_axes"])
+    assert least == 0.15 * most
+    # a fixed base is a ball at the mount
+    model = zoo.model("fixed")
+    reach = np.linalg.norm(model.parameters["tail_mount"])
+    assert shape(model)["semi_axes"] == [max(reach, 2 * RADIUS)] * 3
+    assert shape(model.with_parameters(tail_mount=(0, 0, 0)))["semi_axes"] == [2 * RADIUS] * 3

@@ -1,5 +1,6 @@
 """Every function of a model answers with finite numbers or refuses, whatever it is given; the same
-numbers give the same bits in whatever form they come; a batch is its single calls.
+numbers give the same bits in whatever form they come. Trajectories are made, sampled anew and kept,
+or refused by a ValueError.
 """
 
 import inspect
@@ -10,13 +11,14 @@ from hypothesis import assume
 from hypothesis import strategies as some
 
 import serpentail as st
+from tests.motion.conftest import fields, motion
 from tests.support import zoo
+from tests.support.rows import row
 
-from .searching import answer, outputs
+from .conftest import answer
 from .strange import FORMS, plain, strange
 
 MODELS = some.sampled_from(["ground_m1_n1", "arcs1", "single"])
-CLOSE = {np.float64: 1e-9, np.float32: 2e-3}  # of a batch to its states, of the largest number
 
 
 def functions(model):
@@ -36,6 +38,10 @@ def calls(draw):
     model = zoo.model(draw(MODELS))
     name, shapes = draw(some.sampled_from(sorted(functions(model).items())))
     return getattr(model, name), {word: draw(plain(shape)) for word, shape in shapes.items()}
+
+
+def outputs(result) -> tuple:
+    return result if isinstance(result, tuple) else (result,)
 
 
 def upright(arguments):
@@ -73,28 +79,6 @@ def test_the_same_numbers_give_the_same_bits(search):
     search(law, call=calls(), batch=some.booleans(), form=some.sampled_from(sorted(FORMS)))
 
 
-def test_a_batch_is_its_single_calls(search):
-    """Arguments of one state are repeated over the batch."""
-
-    def law(call, several, count):
-        method, arguments = call
-        upright(arguments)
-        rows = {}
-        for k, (word, x) in enumerate(arguments.items()):
-            rows[word] = x if k and several[k] else np.linspace(0.5, 1.5, count)[:, None] * x
-        found = answer(method, **rows)
-        assume(found is not None)
-        for k in range(count):
-            of_k = {word: x if x.ndim == 1 else x[k] for word, x in rows.items()}
-            for one, many in zip(outputs(answer(method, **of_k)), outputs(found), strict=True):
-                size = max(np.abs(one).max(), 1e-12)
-                near = CLOSE[many.dtype.type]
-                np.testing.assert_allclose(many[k], one, rtol=near, atol=near * size)
-
-    several = some.lists(some.booleans(), min_size=8, max_size=8)
-    search(law, call=calls(), several=several, count=some.sampled_from([1, 2, 3, 9]))
-
-
 def test_a_step_is_made_or_refused(search):
     """One argument or all may be strange; one run, or nine."""
 
@@ -111,15 +95,9 @@ def test_a_step_is_made_or_refused(search):
             given["h"] = data.draw(strange())
         answer(model.step, **given)
 
-    search(
-        law,
-        name=some.sampled_from(["ground_m1_n1", "m1_n1"]),
-        many=some.booleans(),
-        wrong=some.integers(0, 5),
-        every=some.booleans(),
-        steps=some.sampled_from([1, 3]),
-        data=some.data(),
-    )
+    names, steps = some.sampled_from(["ground_m1_n1", "m1_n1"]), some.sampled_from([1, 3])
+    how = {"wrong": some.integers(0, 5), "every": some.booleans(), "data": some.data()}
+    search(law, name=names, many=some.booleans(), steps=steps, **how)
 
 
 def test_parameters_are_taken_or_refused(search):
@@ -162,3 +140,61 @@ def test_unknown_words_and_too_many_are_type_errors():
             getattr(model, name)(*[np.zeros(3)] * (len(shapes) + 3))
         with pytest.raises(TypeError):
             getattr(model, name)(nothing=1)
+
+
+# Trajectories.
+
+REFUSED = (ValueError, st.SerpentailError)
+INSIDE = some.lists(some.floats(0, 0.4), min_size=1, max_size=5, unique=True).map(sorted)
+
+
+@pytest.fixture(scope="module")
+def flight():
+    return motion(np.linspace(0, 0.4, 21), segments=1)
+
+
+def test_fields_are_taken_or_refused(flight, taken_or_refused):
+    own, value = fields(flight), strange((21,)) | strange((21, 9))
+    taken_or_refused(st.Trajectory, [*own, "contact"], value, own, REFUSED)
+
+
+def test_the_same_numbers_make_the_same_motion(flight):
+    for form, formed in FORMS.items():
+        given = {name: x for name, x in fields(flight).items() if name != "info"}
+        if form == "float32":
+            given = {name: x.astype(np.float32).astype(float) for name, x in given.items()}
+        expected = st.Trajectory(**given)
+        found = st.Trajectory(**{name: formed(x) for name, x in given.items()})
+        for name in given:
+            with row(form, name):
+                np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
+                assert type(getattr(found, name)) is np.ndarray
+                assert getattr(found, name).flags.c_contiguous
+
+
+def test_new_samples_are_one_by_one_what_they_are_together(flight, search):
+    def law(times, odd):
+        answer(flight.resample, odd, refusals=REFUSED)
+        together = answer(flight.resample, times)
+        for k, t in enumerate(times):
+            alone = answer(flight.resample, [t])
+            for name in ("q", "v", "tau", "kinetic"):
+                one, same = getattr(alone, name)[0], getattr(together, name)[k]
+                np.testing.assert_allclose(one, same, rtol=0, atol=1e-13)
+
+    search(law, times=INSIDE, odd=strange((3,)) | some.lists(some.floats(-0.1, 0.5), max_size=5))
+
+
+def test_names_of_files_are_taken_or_refused(flight, search, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = some.text(some.characters(codec="utf-8", exclude_characters="/"), max_size=300)
+
+    def law(method, name):
+        found = answer(getattr(flight, method), name, refusals=(*REFUSED, TypeError))
+        assert found is None or found.stat().st_size > 100
+        if found is not None and method == "save":
+            np.testing.assert_array_equal(st.Trajectory.load(found).q, flight.q)
+        assert {p.resolve().parent for p in tmp_path.iterdir()} <= {tmp_path.resolve()}
+
+    methods = some.sampled_from(["save", "to_csv", "to_netcdf"])
+    search(law, method=methods, name=names | some.none() | some.integers())

@@ -1,4 +1,6 @@
-"""Trajectories: what their fields must be, and files that give them back bit by bit."""
+"""Trajectories: what their fields must be, files that give them back bit by bit, and motions
+between samples, against analytic ones.
+"""
 
 import dataclasses
 import json
@@ -7,18 +9,20 @@ import zipfile
 import numpy as np
 import pytest
 
+from serpentail.attitude import rotation_matrix
 from serpentail.motion.trajectory import Trajectory
 from tests.support.rows import row
 
-from .analytic import assert_same, fields, motion
+from .conftest import assert_same, fields, motion
 
 
 def test_fields_are_private_and_read_only(flight):
     assert flight.segments == 2
-    assert np.array_equal(flight.energy, flight.kinetic + flight.potential)
-    assert np.array_equal(flight.attitude, flight.q[:, 3:7])
-    assert np.array_equal(flight.tail, flight.q[:, 7:])
-    assert np.array_equal(flight.tail_rate, flight.v[:, 6:])
+    for name, expected in {
+        **{"energy": flight.kinetic + flight.potential, "attitude": flight.q[:, 3:7]},
+        **{"tail": flight.q[:, 7:], "tail_rate": flight.v[:, 6:]},
+    }.items():
+        np.testing.assert_array_equal(getattr(flight, name), expected)
     given = fields(flight)
     given = {name: value if name == "info" else value.copy() for name, value in given.items()}
     trajectory = Trajectory(**given)
@@ -73,38 +77,21 @@ def test_quaternions_may_drift_from_unit_norm_by_a_thousandth(flight):
         assert dataclasses.replace(flight, q=q).q[7, 3] == q[7, 3]
 
 
-def test_load_returns_what_was_saved_bit_by_bit(tmp_path):
-    """Whatever the number of segments; equal motions make equal files."""
+# Files.
+
+
+def test_load_returns_what_was_saved_bit_by_bit(tmp_path, flight):
+    """Equal motions make equal files; the suffix is added to any name."""
+    path = tmp_path / "new" / "run.v2.npz"
+    times = np.sort(np.random.default_rng(1).uniform(0, 1, 57))
     for segments in (0, 1, 3):
-        times = np.sort(np.random.default_rng(1).uniform(0, 1, 57))
         trajectory = motion(times, segments)
-        path = trajectory.save(tmp_path / "new" / "run.npz")
-        assert path == tmp_path / "new" / "run.npz"
-        assert_same(trajectory, Trajectory.load(path))
+        assert trajectory.save(path) == trajectory.save(str(path.with_suffix(""))) == path
+        assert_same(trajectory, Trajectory.load(path.with_suffix("")))
         assert Trajectory.load(path).segments == segments
         assert trajectory.save(tmp_path / "other").read_bytes() == path.read_bytes()
-
-
-def test_suffix_is_added_to_any_name(tmp_path, flight):
-    assert flight.save(tmp_path / "run") == tmp_path / "run.npz"
-    assert flight.save(str(tmp_path / "run.v2")) == tmp_path / "run.v2.npz"
-    assert_same(flight, Trajectory.load(tmp_path / "run"))
     with pytest.raises(FileNotFoundError, match=r"gone\.npz"):
         Trajectory.load(tmp_path / "gone")
-
-
-def test_a_save_cut_short_leaves_the_old_file_and_nothing_else(tmp_path, flight, monkeypatch):
-    path = flight.save(tmp_path / "run")
-    before = path.read_bytes()
-
-    def cut_short(stream, **arrays):
-        stream.write(b"half a file")
-        raise OSError("no space left")
-
-    monkeypatch.setattr(np, "savez", cut_short)
-    with pytest.raises(OSError, match="no space left"):
-        motion(np.linspace(0, 1, 301)).save(path)
-    assert path.read_bytes() == before and list(tmp_path.iterdir()) == [path]
 
 
 def test_a_flipped_byte_or_a_cut_is_an_error_or_harmless(tmp_path):
@@ -147,12 +134,84 @@ def test_other_files_are_refused_without_unpickling_or_filling_the_memory(tmp_pa
     lying(flight.save(tmp_path / "lie"))
     for name, content in (("empty", b""), ("text", b"no zip"), ("cut", b"PK\x03\x04" + bytes(200))):
         (tmp_path / f"{name}.npz").write_bytes(content)
-    for name, words in {
-        **{"other": "not a trajectory: .*q", "pickle": "damaged", "short": "v has shape"},
-        **{"bomb": r"damaged .*0\.08 GB", "lie": "damaged", "empty": "damaged"},
-        **{"text": "damaged", "cut": "damaged"},
-    }.items():
-        with row(name), pytest.raises(ValueError, match=rf"{name}\.npz' .*{words}"):
+    words = {
+        "other": "not a trajectory: .*q",
+        "short": "v has shape",
+        "bomb": r"damaged .*0\.08 GB",
+    }
+    for name in ("other", "pickle", "short", "bomb", "lie", "empty", "text", "cut"):
+        match = rf"{name}\.npz' .*{words.get(name, 'damaged')}"
+        with row(name), pytest.raises(ValueError, match=match):
             Trajectory.load(tmp_path / f"{name}.npz")
     np.savez_compressed(tmp_path / "small.npz", **own | {"info": "{}"})
     assert_same(dataclasses.replace(flight, info={}), Trajectory.load(tmp_path / "small.npz"))
+
+
+# Between samples.
+
+
+def test_resample_reproduces_the_samples(flight):
+    again = flight.resample(flight.t)
+    assert again.info == flight.info
+    for name in ("t", "q", "tau"):
+        np.testing.assert_allclose(getattr(again, name), getattr(flight, name), rtol=0, atol=4e-16)
+    for name in ("v", "kinetic", "potential", "linear_momentum", "angular_momentum"):
+        found, wanted = getattr(again, name), getattr(flight, name)
+        np.testing.assert_allclose(found, wanted, rtol=1e-14, atol=1e-15)
+
+
+def errors(trajectory):
+    """Largest errors of attitude (rad), tail and velocities."""
+    truth = motion(trajectory.t)
+    turn = rotation_matrix(truth.attitude).swapaxes(1, 2) @ rotation_matrix(trajectory.attitude)
+    angle = np.linalg.norm(turn - np.eye(3), axis=(1, 2)).max() / np.sqrt(2)
+    others = [np.abs(getattr(trajectory, n) - getattr(truth, n)).max() for n in ("tail", "v")]
+    return np.array([angle, *others])
+
+
+def test_resample_converges_to_the_free_top_and_the_sines():
+    fine = np.linspace(0, 0.4, 1234)
+    coarse, half = (errors(motion(np.linspace(0, 0.4, n)).resample(fine)) for n in (41, 81))
+    assert coarse[0] < 2e-5
+    np.testing.assert_allclose(np.log2(coarse / half)[:2], 4, atol=0.1)
+    assert np.log2(coarse / half)[2] > 3.5 and coarse[2] < 1e-3
+
+
+def test_resample_is_exact_for_a_parabola_of_linear_torque_and_does_not_overshoot(flight):
+    t = np.linspace(0, 0.4, 997)
+    dense = flight.resample(t)
+    np.testing.assert_allclose(dense.q[:, :3], motion(t).q[:, :3], rtol=0, atol=1e-15)
+    np.testing.assert_allclose(dense.v[:, :3], motion(t).v[:, :3], rtol=0, atol=1e-14)
+    np.testing.assert_allclose(np.linalg.norm(dense.attitude, axis=1), 1, rtol=0, atol=4e-16)
+    expected = np.stack([np.interp(t, flight.t, column) for column in flight.tau.T], axis=1)
+    np.testing.assert_allclose(dense.tau, expected, rtol=0, atol=1e-14)
+    step = np.where(flight.t < 0.2, 0.0, 1.0)
+    energy = dataclasses.replace(flight, kinetic=step).resample(t).kinetic
+    assert energy.min() == 0 and energy.max() == 1
+    # whatever the signs of the quaternions
+    q = flight.q.copy()
+    q[1:, 3:7] *= np.random.default_rng(2).choice([-1.0, 1.0], len(q) - 1)[:, None]
+    np.testing.assert_array_equal(dataclasses.replace(flight, q=q).resample(t).q, dense.q)
+
+
+def test_no_motion_goes_on_beyond_its_samples(flight):
+    """The first time outside is named; what rounding adds at the ends is inside."""
+    for t, words in (
+        *(([0.1, 0.5, 0.6], "t = 0.5 s .* 0.0 to 0.4"), ([-0.25, 0.1], "t = -0.25 s")),
+        *((t, "^t") for t in ([], [0.2, 0.1], [[0.1, 0.2]], [np.nan], 0.1)),
+    ):
+        with row(t), pytest.raises(ValueError, match=words):
+            flight.resample(t)
+    for samples in (1, 2, 41):
+        short = motion(np.linspace(0.4, 0, samples)[::-1])
+        for beyond in (-1e-3, -1e-9, 0.4 + 1e-9, 0.401, 1e9, -1e300):
+            for t in ([beyond], sorted([0.4, beyond])):
+                with row(samples, t), pytest.raises(ValueError, match="outside"):
+                    short.resample(t)
+    assert flight.resample([0.0, np.nextafter(0.4, 1)]).t[-1] == 0.4
+    # one sample and no tail will do
+    alone = motion(np.array([0.1]), segments=0)
+    again = alone.resample([0.1])
+    np.testing.assert_allclose(again.q, alone.q, rtol=0, atol=4e-16)
+    assert_same(dataclasses.replace(again, q=alone.q), alone)
+    assert motion(np.linspace(0, 1, 101), segments=0).resample([0.5]).tau.shape == (1, 0)

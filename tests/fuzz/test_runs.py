@@ -1,4 +1,6 @@
-"""Simulations and what acts in them are run or refused, whatever they are given."""
+"""Simulations, what acts in them, and plans before anything is derived: taken or refused, whatever
+they are given.
+"""
 
 import numpy as np
 import pytest
@@ -6,18 +8,28 @@ from hypothesis import strategies as some
 
 import serpentail as st
 from tests.support import zoo
+from tests.support.posed import posed
 
-from .searching import answer
+from .conftest import answer
 from .strange import strange
 
-METHODS = some.sampled_from(
-    ["rk4", "tsit5", "ros34pw2", "implicit_euler", "dop853", "lsoda", "auto"]
-)
+CUT = ("tsit5", "ros34pw2")  # methods that take most_steps
+METHODS = some.sampled_from([*CUT, "rk4", "implicit_euler", "dop853", "lsoda", "auto"])
 SPAN = 0.002  # s
 # numbers of a setting: steps of less than this and more than nothing would take for ever
 SHORT = 1e-5
 NOT_ENDLESS = strange((3,)).filter(lambda x: not (isinstance(x, float) and 0 < abs(x) < SHORT))
 TIMES = NOT_ENDLESS.filter(lambda x: not (isinstance(x, int | float) and x > SPAN))
+FIELDS = {
+    st.Goal: ("goal", ("attitude", "torso_rate", "tail", "tail_rate", "turns")),
+    st.Bounds: ("bounds", ("angle", "rate", "torque", "torque_rate")),
+}
+SETTINGS = (
+    *("objective", "smoothing", "damping", "path", "formulation", "attitude"),
+    *("rule", "degree", "intervals", "most_intervals", "tolerance", "rounds", "solver", "options"),
+    *("guess", "guess_damping", "multi_start", "retries", "seed", "dynamics", "time_limit"),
+    *("track", "unknown"),
+)
 
 
 @pytest.fixture(scope="module")
@@ -33,27 +45,19 @@ def start(model):
     return common | {"output_step": SPAN / 2, "legs": st.Legs.fixed(3.6, -0.3)}
 
 
-def test_a_run_from_a_strange_state_is_made_or_refused(model, search):
-    def law(name, value, method):
-        most = {"most_steps": 10_000} if method in ("tsit5", "ros34pw2") else {}
-        answer(st.simulate, model, **start(model) | {name: value, "method": method} | most)
-
-    value = strange((model.nq,)) | strange((model.nv,))
-    search(law, name=some.sampled_from(["q0", "v0"]), value=value, method=METHODS)
-
-
-def test_settings_are_taken_or_refused(model, search):
+def test_states_and_settings_of_a_run_are_taken_or_refused(model, search):
     names = ("rtol", "atol", "step", "first_step", "least_step", "most_step", "most_steps", "bad")
 
-    def law(name, value, method):
-        settings = start(model) | {"method": method, name: value}
-        if name != "most_steps":
-            settings["most_steps"] = 10_000
-        if method not in ("tsit5", "ros34pw2"):
-            settings.pop("most_steps")
-        answer(st.simulate, model, **settings)
+    def law(state, x, setting, value, method):
+        most = {"most_steps": 10_000} if method in CUT else {}
+        usual = start(model) | {"method": method}
+        answer(st.simulate, model, **usual | {state: x} | most)
+        given = most | {setting: value} if method in CUT or setting != "most_steps" else {}
+        answer(st.simulate, model, **usual | given)
 
-    search(law, name=some.sampled_from(names), value=NOT_ENDLESS, method=METHODS)
+    x = strange((model.nq,)) | strange((model.nv,))
+    states, settings = some.sampled_from(["q0", "v0"]), some.sampled_from(names)
+    search(law, state=states, x=x, setting=settings, value=NOT_ENDLESS, method=METHODS)
 
 
 def test_what_a_run_is_told_is_taken_or_refused(model, search):
@@ -99,9 +103,17 @@ ACTING = {
     "Phases time": lambda x: st.Phases([(0.0, None), (x, None)]),
     "Phases controller": lambda x: st.Phases([(0.0, x)]),
     "a function": lambda x: lambda t, q, v: x,
-    "Pfl reference": pfl("reference"),
-    "Pfl kp": pfl("kp"),
-    "Pfl kd": pfl("kd"),
+    **{f"Pfl {name}": pfl(name) for name in ("reference", "kp", "kd")},
+}
+MADE = {
+    st.Legs: {"times": [0.0, 1.0], "gamma": 3.6, "delta": [0.0, 1.0]},
+    st.Legs.fixed: {"gamma": 3.6, "delta": -0.3},
+    st.Legs.ramp: {"gamma": 3.6, "delta": (-0.3, -1.0), "at": 0.4, "rate": -70.0},
+    st.Reference: {"times": [0.0, 1.0], "angles": np.zeros((2, 2)), "blend": "quintic"},
+    st.polar_to_bend: dict.fromkeys(("phi", "theta", "phi_dot", "theta_dot"), 0.3),
+    st.bend_to_polar: dict.fromkeys(("a", "b", "a_dot", "b_dot"), 0.3),
+    st.rotation_matrix: {"quaternion": np.array([0.5, 0.5, -0.5, 0.5])},
+    st.pitch_roll_yaw: {"q": np.full(9, 0.5)},
 }
 
 
@@ -117,18 +129,6 @@ def test_what_acts_is_taken_or_refused(model, search):
     search(law, name=some.sampled_from(sorted(ACTING)), value=strange((2,)) | strange((2, 2)))
 
 
-MADE = {
-    st.Legs: {"times": [0.0, 1.0], "gamma": 3.6, "delta": [0.0, 1.0]},
-    st.Legs.fixed: {"gamma": 3.6, "delta": -0.3},
-    st.Legs.ramp: {"gamma": 3.6, "delta": (-0.3, -1.0), "at": 0.4, "rate": -70.0},
-    st.Reference: {"times": [0.0, 1.0], "angles": np.zeros((2, 2)), "blend": "quintic"},
-    st.polar_to_bend: dict.fromkeys(("phi", "theta", "phi_dot", "theta_dot"), 0.3),
-    st.bend_to_polar: dict.fromkeys(("a", "b", "a_dot", "b_dot"), 0.3),
-    st.rotation_matrix: {"quaternion": np.array([0.5, 0.5, -0.5, 0.5])},
-    st.pitch_roll_yaw: {"q": np.full(9, 0.5)},
-}
-
-
 def test_what_is_made_of_strange_things_is_made_or_refused(search):
     def law(which, value):
         function, name = which
@@ -136,3 +136,35 @@ def test_what_is_made_of_strange_things_is_made_or_refused(search):
 
     every = [(function, name) for function, given in MADE.items() for name in given]
     search(law, which=some.sampled_from(every), value=strange() | strange((2, 2)))
+
+
+# Plans.
+
+
+def asked(**given):
+    """What `st.plan` checks first."""
+    model = zoo.model("m2_n2")
+    q = np.zeros(model.nq)
+    q[3] = 1.0
+    usual = {"start": (q, np.zeros(model.nv)), "goal": None, "duration": 0.5, "bounds": None}
+    return posed(model, **usual | given)
+
+
+def test_starts_and_durations_are_taken_or_refused(taken_or_refused):
+    vectors = strange((11,))
+    pairs = some.tuples(vectors, strange((10,))) | some.lists(vectors, max_size=3)
+    taken_or_refused(asked, ["start", "duration"], pairs | strange())
+
+
+def test_settings_of_plans_are_taken_or_refused(taken_or_refused):
+    taken_or_refused(asked, SETTINGS, strange((4,)))
+
+
+def test_goals_and_bounds_are_taken_or_refused(search):
+    def law(kind, which, value):
+        word, names = FIELDS[kind]
+        answer(lambda: asked(**{word: kind(**{names[which % len(names)]: value})}))
+        answer(lambda: asked(**{word: value}))
+
+    kinds, which = some.sampled_from([st.Goal, st.Bounds]), some.integers(0, 19)
+    search(law, kind=kinds, which=which, value=strange((4,)) | strange((3,)))
