@@ -4,16 +4,14 @@ to 40 digits.
 
 from functools import lru_cache
 
-import mpmath
 import numpy as np
 
+from tests.references.digits import Bodies, ManyDigits, skew
 from tests.references.metrics import BLOCKS
 
-TORSO_ROTATION = range(3, 6)
 
-
-class ExactContinuum:
-    """Sums over slices at Gauss-Legendre nodes; float64 in, float64 rounded from many digits out.
+class ExactContinuum(ManyDigits):
+    """Sums over slices at Gauss-Legendre nodes.
 
     A motion is an array of Taylor coefficients in the time t, up to t^2. It starts at q with the
     rates v and v_dot; the rate of the motion along one coordinate is a column of the Jacobian. The
@@ -22,68 +20,14 @@ class ExactContinuum:
     """
 
     def __init__(self, parameters, segments, digits=40, nodes=24):
-        """Open a private context of that many digits and read the parameters exactly."""
-        self.segments = segments
-        self.nq, self.nv = 7 + 2 * segments, 6 + 2 * segments
-        self.mp = mpmath.mp.clone()
-        self.mp.dps = digits
-        self._stumpff_taylor = lru_cache(maxsize=4096)(
-            self._stumpff_taylor
-        )  # the same bends in every motion
+        """Read the parameters; the same bends in every motion are expanded once."""
+        super().__init__(parameters, segments, digits)
+        self._stumpff_taylor = lru_cache(maxsize=4096)(self._stumpff_taylor)
         self._jacobian = lru_cache(maxsize=64)(self._jacobian)
-        torso_mass, tail_mass, tail_length = (
-            self.mp.mpf(parameters[name]) for name in ("torso_mass", "tail_mass", "tail_length")
-        )
         self.nodes, weights = self._gauss_legendre(nodes)
-        self.masses = np.array([torso_mass, *np.tile(weights * (tail_mass / segments), segments)])
-        self.segment_length = tail_length / segments
-        self.gravity = self._exact([0, 0, parameters["gravity"]])
-        self.mount = self._exact(parameters["tail_mount"])
-        self.torso_inertia = self._exact(parameters["torso_inertia"])
-
-    def mass_matrix(self, q):
-        """H of Eqs. 2 and 18."""
-        return _rounded(self._mass_matrix(self._jacobian(tuple(q))))
-
-    def bias_force(self, q, v):
-        """C of Eq. 3, gravity included: the inverse dynamics at v_dot = 0."""
-        return self.inverse_dynamics(q, v, np.zeros(self.nv))
-
-    def inverse_dynamics(self, q, v, v_dot):
-        """H v_dot + C, by Eqs. 3 and 19 at that v_dot."""
-        return _rounded(self._force(self._jacobian(tuple(q)), q, v, v_dot))
-
-    def forward_dynamics(self, q, v, tau, generalized_force=None):
-        """v_dot of H v_dot + C = [0; tau] + generalized_force."""
-        jacobian, force = self._jacobian(tuple(q)), self._exact([*np.zeros(6), *tau])
-        if generalized_force is not None:
-            force = force + self._exact(generalized_force)
-        force = force - self._force(jacobian, q, v, np.zeros(self.nv))
-        mass_matrix = self.mp.matrix(self._mass_matrix(jacobian).tolist())
-        return _rounded(list(self.mp.cholesky_solve(mass_matrix, self.mp.matrix(force.tolist()))))
-
-    def energy(self, q, v):
-        """(kinetic, potential), the potential sum m g z."""
-        points, velocities = self._points(q, v)
-        turning = np.dot(self.torso_inertia, self._exact(v[3:6]) ** 2)
-        kinetic = np.dot(self.masses, (velocities**2).sum(axis=1)) + turning
-        return float(kinetic / 2), float(np.dot(self.masses, points @ self.gravity))
-
-    def momentum(self, q, v):
-        """(linear, angular about the COM), in world axes."""
-        points, velocities = self._points(q, v)
-        linear, center = self.masses @ velocities, self.masses @ points / sum(self.masses)
-        angular = self.masses @ np.cross(points - center, velocities)
-        spin = self._torso_axes(q) @ (self.torso_inertia * self._exact(v[3:6]))
-        return _rounded(linear), _rounded(angular + spin)
-
-    def center_of_mass(self, q, v):
-        """(position, velocity, J) of the centre of mass, in world axes."""
-        points, velocities = self._points(q, v)
-        shares = self.masses / sum(self.masses)
-        columns = self._jacobian(tuple(q)).reshape(self.nv, len(shares), 3)
-        J = np.array([shares @ column for column in columns]).T
-        return _rounded(shares @ points), _rounded(shares @ velocities), _rounded(J)
+        slices = np.tile(weights * (self.tail_mass / segments), segments)
+        self.masses = np.array([self.torso_mass, *slices])
+        self.segment_length = self.tail_length / segments
 
     def tail_points(self, q, samples):
         """World positions (m samples + 1, 3) of equally spaced slices, from the mount to the
@@ -92,36 +36,20 @@ class ExactContinuum:
         fractions = [self.mp.mpf(sample) / samples for sample in range(1, samples + 1)]
         frames = list(self._frames(*self._path(q)))
         slices = [self._slices(*frame, fractions)[0] for frame in frames]
-        return _rounded(np.concatenate([frames[0][0][0], *slices]))
+        return np.concatenate([frames[0][0][0], *slices]).astype(float)
 
-    def _exact(self, vector):
-        """The entries, float64 or already numbers of this continuum's context, as such numbers."""
-        return np.array(
-            [
-                entry if isinstance(entry, self.mp.mpf) else self.mp.mpf(float(entry))
-                for entry in vector
-            ]
-        )
+    def _bodies(self, q, v, v_dot):
+        """B and every slice at a node, of which the torso alone turns."""
+        places, _, halves = self._points(q, v, v_dot)
+        R = self._torso_axes(self._exact(q[3:7]))
+        W = R @ np.eye(self.nv)[3:6]
+        turning = R * self.torso_inertia @ R.T, W, W @ self._exact(v_dot)
+        points = self.masses, places, self._jacobian(tuple(q)), 2 * halves
+        return Bodies(*points, *(part[None] for part in turning))
 
     def _jacobian(self, q):
-        """J^T (nv, 3 points): the rates of all points in the motion along each coordinate."""
-        return np.array([self._points(q, unit)[1].ravel() for unit in np.eye(self.nv)])
-
-    def _mass_matrix(self, jacobian):
-        """H = sum_x m_x J_x^T J_x + J_omega^T I_b J_omega (Eqs. 2, 18)."""
-        mass_matrix = (jacobian * np.repeat(self.masses, 3)) @ jacobian.T
-        mass_matrix[TORSO_ROTATION, TORSO_ROTATION] += self.torso_inertia
-        return mass_matrix
-
-    def _force(self, jacobian, q, v, v_dot):
-        """sum_x J_x^T m_x (p_ddot_x + g) + J_omega^T (I_b omega_dot + omega~ I_b omega) (Eqs. 3,
-        19).
-        """
-        accelerations = 2 * self._points(q, v, v_dot)[2]
-        force = jacobian @ (self.masses[:, None] * (accelerations + self.gravity)).ravel()
-        omega, omega_dot = self._exact(v[3:6]), self._exact(v_dot[3:6])
-        force[3:6] += self.torso_inertia * omega_dot + np.cross(omega, self.torso_inertia * omega)
-        return force
+        """The rates of all points in the motion along each coordinate."""
+        return np.stack([self._points(q, unit)[1] for unit in np.eye(self.nv)], axis=2)
 
     def _points(self, q, *rates):
         """Motion (order + 1, points, 3) of B and of every slice at a node, in world axes."""
@@ -134,24 +62,13 @@ class ExactContinuum:
         2).
         """
         # up to t^2: its second derivative at t = 0 is R_b (omega~ omega~ + omega_dot~)
-        rates = [
-            self._exact(rate) / self.mp.factorial(order) for order, rate in enumerate(rates, 1)
-        ]
-        position = self._exact(q)
-        starts = (position[:3], 0 * position[:3], position[7:])
+        q, rates = self._exact(q), [self._exact(x) / order for order, x in enumerate(rates, 1)]
+        starts = (q[:3], 0 * q[:3], q[7:])
         origin, turn, bends = (
             np.array([start, *(rate[block] for rate in rates)])
             for start, block in zip(starts, BLOCKS, strict=True)
         )
-        return origin, _product([self._torso_axes(q)], self._rotation(turn)), bends
-
-    def _torso_axes(self, q):
-        """R_b = I + 2 (w e~ + e~ e~) / |quaternion|^2, with the quaternion (w, e)."""
-        quaternion = self._exact(q[3:7])
-        cross = _skew(quaternion[1:])
-        return np.eye(3) + (cross * quaternion[0] + cross @ cross) * (
-            2 / np.dot(quaternion, quaternion)
-        )
+        return origin, _product([self._torso_axes(q[3:7])], self._rotation(turn)), bends
 
     def _frames(self, origin, axes, bends):
         """Yield each segment's (root, R_i, [a_i, b_i]) (Eqs. 33, 34)."""
@@ -177,7 +94,7 @@ class ExactContinuum:
 
     def _rotation(self, vector):
         """Exp(w) = I + c_1 w~ + c_2 w~ w~, c_k at w . w."""
-        cross, argument = np.array([_skew(w) for w in vector]), _product(vector, vector)
+        cross, argument = np.array([skew(w) for w in vector]), _product(vector, vector)
         rotation = _product(self._stumpff(1, argument), cross)
         rotation = rotation + _product(self._stumpff(2, argument), _product(cross, cross))
         rotation[0] += np.eye(3)
@@ -193,10 +110,8 @@ class ExactContinuum:
 
     def _stumpff_taylor(self, k, argument):
         """(c_k, c_k', c_k'' / 2) of c_k(z) = sum_j (-z)^j / (2 j + k)!, term by term."""
-        guard = 20 + int(
-            1.5 * self.mp.sqrt(argument)
-        )  # bits; the largest term is below exp(sqrt(z))
-        with self.mp.workprec(self.mp.prec + guard):
+        # bits of guard: the largest term is below exp(sqrt(z))
+        with self.mp.workprec(self.mp.prec + 20 + int(1.5 * self.mp.sqrt(argument))):
             return [self._stumpff_derivative(k, argument, order) for order in range(3)]
 
     def _stumpff_derivative(self, k, argument, order):
@@ -220,16 +135,6 @@ class ExactContinuum:
                 value, slope = _legendre(count, roots)
                 roots = roots - value / slope
             return (1 - roots) / 2, 1 / ((1 - roots**2) * _legendre(count, roots)[1] ** 2)
-
-
-def _rounded(values):
-    """The nearest float64 of every entry."""
-    return np.array(values, dtype=float)
-
-
-def _skew(a):
-    """a~, so that a~ b = a x b."""
-    return np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
 
 
 def _product(a, b):

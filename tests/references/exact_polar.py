@@ -17,7 +17,7 @@ class ExactPolar:
     def __init__(self, parameters, segments, digits=50):
         """Open the continuum in bend components of that many digits."""
         self.bend = ExactContinuum(parameters, segments, digits)
-        self.mp, self.nv = self.bend.mp, self.bend.nv
+        self.mp, self.nv, self._exact = self.bend.mp, self.bend.nv, self.bend._exact
 
     def state(self, q, v):
         """(q, v) in bend components, entries of many digits."""
@@ -68,12 +68,3 @@ class ExactPolar:
             here = slice(6 + 2 * k, 8 + 2 * k)
             jacobian[here, here] = [[theta * s, -c], [theta * c, s]]
         return jacobian
-
-    def _exact(self, vector):
-        """The entries as numbers of many digits."""
-        return np.array(
-            [
-                entry if isinstance(entry, self.mp.mpf) else self.mp.mpf(float(entry))
-                for entry in vector
-            ]
-        )

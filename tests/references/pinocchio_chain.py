@@ -34,19 +34,14 @@ class PinocchioChain:
     def inverse_dynamics(self, q, v, v_dot):
         """H v_dot + C = T^T rnea(q_full, T v, T v_dot + T_dot v)."""
         full_q, transform = self._full_configuration(q)
-        full_v = transform @ v
-        full_v_dot = transform @ v_dot
-        full_v_dot[:3] -= np.cross(
-            v[3:6], full_v[:3]
-        )  # d(R^T p_dot)/dt = R^T p_ddot - omega x R^T p_dot
+        full_v, full_v_dot = transform @ v, transform @ v_dot
+        # d(R^T p_dot)/dt = R^T p_ddot - omega x R^T p_dot
+        full_v_dot[:3] -= np.cross(v[3:6], full_v[:3])
         return transform.T @ pin.rnea(self.model, self.data, full_q, full_v, full_v_dot)
 
-    def forward_dynamics(self, q, v, tau, generalized_force=None):
-        """v_dot of H v_dot + C = [0; tau] + generalized_force."""
-        force = -self.bias_force(q, v)
-        force[6:] += tau
-        if generalized_force is not None:
-            force += generalized_force
+    def forward_dynamics(self, q, v, tau):
+        """v_dot of H v_dot + C = [0; tau]."""
+        force = np.concatenate([np.zeros(6), tau]) - self.bias_force(q, v)
         return cho_solve(cho_factor(self.mass_matrix(q)), force)
 
     def energy(self, q, v):
@@ -66,11 +61,8 @@ class PinocchioChain:
         full_q, transform = self._full_configuration(q)
         pin.centerOfMass(self.model, self.data, full_q, transform @ v)
         position, velocity = self.data.com[0].copy(), self.data.vcom[0].copy()
-        return (
-            position,
-            velocity,
-            pin.jacobianCenterOfMass(self.model, self.data, full_q) @ transform,
-        )
+        jacobian = pin.jacobianCenterOfMass(self.model, self.data, full_q)
+        return position, velocity, jacobian @ transform
 
     def tail_points(self, q):
         """World positions (N+1, 3) of the N joints and the tip."""
@@ -82,11 +74,11 @@ class PinocchioChain:
         full_q, transform = self._full_configuration(q)
         pin.computeJointJacobians(self.model, self.data, full_q)
         pin.updateFramePlacements(self.model, self.data)
-        return np.array([self._full_jacobian(point) @ transform for point in self.points])
-
-    def _full_jacobian(self, point):
-        """Linear rows of one point's Jacobian on the full chain, world axes."""
-        return pin.getFrameJacobian(self.model, self.data, point, pin.LOCAL_WORLD_ALIGNED)[:3]
+        found = [
+            pin.getFrameJacobian(self.model, self.data, point, pin.LOCAL_WORLD_ALIGNED)[:3]
+            for point in self.points
+        ]
+        return np.array(found) @ transform
 
     def _full_configuration(self, q):
         """q_full, its quaternion (x, y, z, w), and T with v_full = T v = [R^T p_dot, omega, G
@@ -102,40 +94,24 @@ class PinocchioChain:
 
 def _build(parameters, count):
     """Pinocchio's model of the torso and `count` links, and the frame ids of the tail points."""
-    model = pin.Model()
+    model, still = pin.Model(), pin.SE3.Identity()
     model.gravity.linear = np.array([0.0, 0.0, -parameters["gravity"]])
-    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "torso")
-    model.appendBodyToJoint(joint, _torso_inertia(parameters), pin.SE3.Identity())
-    step, inertia = (
-        np.array([0.0, -parameters["tail_length"] / count, 0.0]),
-        _link_inertia(parameters, count),
-    )
-    points, origin = [], np.array(parameters["tail_mount"], dtype=float)
+    joint = model.addJoint(0, pin.JointModelFreeFlyer(), still, "torso")
+    torso = np.diag(parameters["torso_inertia"])  # about B, its COM
+    model.appendBodyToJoint(joint, pin.Inertia(parameters["torso_mass"], np.zeros(3), torso), still)
+    points, place = [], pin.SE3(np.eye(3), np.array(parameters["tail_mount"], dtype=float))
     for index in range(count):
-        points.append(_add_point(model, joint, origin, f"joint_{index}"))
-        joint = _add_link(model, joint, origin, inertia, index)
-        origin = step
-    return model, [*points, _add_point(model, joint, step, "tip")]
+        points.append(_add_point(model, joint, place, index))
+        pitch = model.addJoint(joint, pin.JointModelRX(), place, f"alpha_{index}")
+        joint = model.addJoint(pitch, pin.JointModelRZ(), still, f"beta_{index}")
+        model.appendBodyToJoint(joint, _link_inertia(parameters, count), still)
+        place = pin.SE3(np.eye(3), np.array([0.0, -parameters["tail_length"] / count, 0.0]))
+    return model, [*points, _add_point(model, joint, place, count)]
 
 
-def _add_link(model, parent, origin, inertia, index):
-    """Append Rx, then Rz with the link on it; the id of the Rz joint."""
-    placement = pin.SE3(np.eye(3), origin)
-    pitch = model.addJoint(parent, pin.JointModelRX(), placement, f"alpha_{index}")
-    yaw = model.addJoint(pitch, pin.JointModelRZ(), pin.SE3.Identity(), f"beta_{index}")
-    model.appendBodyToJoint(yaw, inertia, pin.SE3.Identity())
-    return yaw
-
-
-def _add_point(model, joint, position, name):
-    """A frame at a fixed position of a joint's frame; its id."""
-    placement = pin.SE3(np.eye(3), position)
-    return model.addFrame(pin.Frame(f"point_{name}", joint, placement, pin.FrameType.OP_FRAME))
-
-
-def _torso_inertia(parameters):
-    """The torso's inertia, its COM at B."""
-    return pin.Inertia(parameters["torso_mass"], np.zeros(3), np.diag(parameters["torso_inertia"]))
+def _add_point(model, joint, place, index):
+    """A frame at a fixed place of a joint's frame; its id."""
+    return model.addFrame(pin.Frame(f"point_{index}", joint, place, pin.FrameType.OP_FRAME))
 
 
 def _link_inertia(parameters, count):
