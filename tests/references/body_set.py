@@ -6,6 +6,7 @@ point masses at Gauss-Legendre nodes. It shares no formula with the recursions u
 """
 
 from dataclasses import dataclass
+from functools import cache
 
 import mpmath
 import numpy as np
@@ -89,17 +90,10 @@ class Animal:
 
     def _jacobians(self, q):
         columns = [self._rates(q, unit) for unit in np.eye(6 + 2 * len(self.segments))]
-        return [
-            list(zip(*(column[k] for column in columns), strict=True))
-            for k in range(len(columns[0]))
-        ]
-
-    def mass_matrix(self, q):
-        """H for (p_dot world, omega body, q_t_dot) in float64."""
-        return self.inertia(exact(q)).astype(float)
+        return [list(zip(*of_body, strict=True)) for of_body in zip(*columns, strict=True)]
 
     def inertia(self, q):
-        """H."""
+        """H for (p_dot world, omega body, q_t_dot)."""
         size = 6 + 2 * len(self.segments)
         H = np.full((size, size), MP.mpf(0))
         for (mass, _, R, moments), (linear, angular) in zip(
@@ -123,15 +117,11 @@ class Animal:
             a = a + exact([0, 0, self.gravity])
             w, w_dot = spins[1][k][1], (spins[2][k][1] - spins[0][k][1]) / (2 * STEP)
             tensor = (R * moments).dot(R.T)
-            moment = tensor.dot(w_dot) + crossed(w, tensor.dot(w))
+            moment = tensor.dot(w_dot) + np.cross(w, tensor.dot(w))
             force = force + np.array(
                 [mass * J.dot(a) + W.dot(moment) for J, W in zip(linear, angular, strict=True)]
             )
         return force
-
-    def force(self, q, v, v_dot):
-        """H v_dot + C in float64."""
-        return self.inverse_dynamics(q, v, v_dot).astype(float)
 
     def energy(self, q, v):
         """Kinetic and potential energy."""
@@ -146,20 +136,15 @@ class Animal:
 
     def momentum(self, q, v):
         """Momentum, and angular momentum about the COM, world axes, in float64."""
-        linear, angular = self.momenta(exact(q), exact(v))
-        return linear.astype(float), angular.astype(float)
-
-    def momenta(self, q, v):
-        """Momentum, and angular momentum about the COM."""
-        bodies, rates = self.bodies(q)[0], self._rates(q, v)
+        bodies, rates = self.bodies(exact(q))[0], self._rates(exact(q), exact(v))
         total = sum(mass for mass, *_ in bodies)
         com = sum(mass * place for mass, place, *_ in bodies) / total
         linear = sum(b[0] * u for b, (u, _) in zip(bodies, rates, strict=True))
         angular = sum(
-            mass * crossed(place - com, u) + (R * moments).dot(R.T).dot(w)
+            mass * np.cross(place - com, u) + (R * moments).dot(R.T).dot(w)
             for (mass, place, R, moments), (u, w) in zip(bodies, rates, strict=True)
         )
-        return linear, angular
+        return linear.astype(float), angular.astype(float)
 
     def tail_points(self, q):
         """The tail's points in the world."""
@@ -174,11 +159,7 @@ def exact(values):
     return np.array([x if isinstance(x, MP.mpf) else MP.mpf(float(x)) for x in values])
 
 
-def crossed(a, b):
-    """a x b."""
-    return np.array(
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    )
+ONE = np.array([exact(row) for row in np.eye(3)])
 
 
 def about(axis, angle):
@@ -193,11 +174,8 @@ def rotation(quaternion):
     """R of (w, x, y, z) of any norm, column by column: q e q*."""
     w, e = quaternion[0], quaternion[1:]
     square = w * w + e.dot(e)
-    columns = []
-    for unit in np.eye(3, dtype=int):
-        u = exact(unit)
-        columns.append((u * (w * w - e.dot(e)) + 2 * e * e.dot(u) + 2 * w * crossed(e, u)) / square)
-    return np.array(columns).T
+    columns = [u * (w * w - e.dot(e)) + 2 * e * e.dot(u) + 2 * w * np.cross(e, u) for u in ONE]
+    return np.array(columns).T / square
 
 
 def turned(quaternion, turn):
@@ -205,7 +183,7 @@ def turned(quaternion, turn):
     angle = MP.sqrt(turn.dot(turn))
     c, s = MP.cos(angle / 2), (MP.sin(angle / 2) / angle if angle else MP.mpf(1) / 2)
     w, e, f = quaternion[0], quaternion[1:], turn * s
-    return np.array([w * c - e.dot(f), *(w * f + c * e + crossed(e, f))])
+    return np.array([w * c - e.dot(f), *(w * f + c * e + np.cross(e, f))])
 
 
 def moved(q, v, t, v_dot=None):
@@ -232,28 +210,24 @@ def bent(a, b, length):
     """
     axis = np.array([a, MP.mpf(0), b])
     angle = MP.sqrt(axis.dot(axis))
-    y, length = exact([0, 1, 0]), MP.mpf(length)
+    y, length = ONE[1], MP.mpf(length)
     if angle == 0:
-        return -y * length, np.array([exact(row) for row in np.eye(3)])
+        return -y * length, ONE
     k = axis / angle
     s, c = MP.sin(angle), MP.cos(angle)
     K = np.array([[0 * s, -k[2], k[1]], [k[2], 0 * s, -k[0]], [-k[1], k[0], 0 * s]])
-    one = np.array([exact(row) for row in np.eye(3)])
-    turn = one + s * K + (1 - c) * K.dot(K)
-    mean = one + (1 - c) / angle * K + (1 - s / angle) * K.dot(K)
+    turn = ONE + s * K + (1 - c) * K.dot(K)
+    mean = ONE + (1 - c) / angle * K + (1 - s / angle) * K.dot(K)
     return -mean.dot(y) * length, turn
 
 
-_NODES: list = []
-
-
+@cache
 def nodes():
     """Gauss-Legendre nodes and weights on [0, 1]."""
-    if not _NODES:
-        x, _ = np.polynomial.legendre.leggauss(NODES)
-        for guess in x:
-            root = MP.findroot(lambda s: MP.legendre(NODES, s), MP.mpf(guess))
-            slope = NODES * (root * MP.legendre(NODES, root) - MP.legendre(NODES - 1, root))
-            slope /= root * root - 1
-            _NODES.append(((root + 1) / 2, 1 / ((1 - root * root) * slope * slope)))
-    return _NODES
+    found = []
+    for guess in np.polynomial.legendre.leggauss(NODES)[0]:
+        root = MP.findroot(lambda s: MP.legendre(NODES, s), MP.mpf(guess))
+        slope = NODES * (root * MP.legendre(NODES, root) - MP.legendre(NODES - 1, root))
+        slope /= root * root - 1
+        found.append(((root + 1) / 2, 1 / ((1 - root * root) * slope * slope)))
+    return found

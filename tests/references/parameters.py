@@ -23,7 +23,7 @@ def random_states(segments, seed, count, kind):
     """Arrays (q, v, v_dot, tau), count rows each, with tail angles of the given kind."""
     rng = np.random.default_rng([seed, segments, KINDS.index(kind)])
     base = np.hstack([rng.uniform(-1, 1, (count, 3)), _quaternions(rng, count)])
-    q = np.hstack([base, _TAIL_ANGLES[kind](rng, (count, 2 * segments))])
+    q = np.hstack([base, _tail_angles(rng, kind, (count, 2 * segments))])
     v = _blocks(rng, count, segments, (2.0, 20.0, 10.0))
     v_dot = _blocks(rng, count, segments, (20.0, 500.0, 500.0))
     return q, v, v_dot, rng.uniform(-1e-3, 1e-3, (count, 2 * segments))
@@ -43,21 +43,12 @@ def _blocks(rng, count, segments, scales):
     )
 
 
-def _random_angles(rng, shape):
-    """Moderate bends, up to 1 rad per joint."""
-    return rng.uniform(-1, 1, shape)
-
-
-def _straight_angles(_rng, shape):
-    """No bend at all."""
-    return np.zeros(shape)
-
-
-def _folded_angles(rng, shape):
-    """Even rows within 0.01 rad of +-pi per joint, odd rows anywhere within two turns."""
+def _tail_angles(rng, kind, shape):
+    """Up to 1 rad per joint; none; or even rows near +-pi and odd ones anywhere in two turns."""
+    if kind == "straight":
+        return np.zeros(shape)
+    if kind == "random":
+        return rng.uniform(-1, 1, shape)
     near_pi = rng.choice([-pi, pi], shape) + rng.uniform(-0.01, 0.01, shape)
     large = rng.uniform(-2 * pi, 2 * pi, shape)
     return np.where(np.arange(shape[0])[:, None] % 2 == 0, near_pi, large)
-
-
-_TAIL_ANGLES = {"random": _random_angles, "straight": _straight_angles, "folded": _folded_angles}

@@ -18,11 +18,8 @@ QUIET = {"ipopt.print_level": 0, "print_time": False, "ipopt.sb": "yes", "ipopt.
 
 def rate(q, v):
     """Return the rate of q: the quaternion rotates with the angular velocity in body axes."""
-    w, x, y, z = (q[3 + k] for k in range(4))
-    a, b, c = (v[3 + k] for k in range(3))
-    turn = casadi.vertcat(
-        -x * a - y * b - z * c, w * a + y * c - z * b, w * b - x * c + z * a, w * c + x * b - y * a
-    )
+    w, e, omega = q[3], q[4:7], v[3:6]
+    turn = casadi.vertcat(-casadi.dot(e, omega), w * omega + casadi.cross(e, omega))
     return casadi.vertcat(v[:3], 0.5 * turn, v[6:])
 
 
@@ -40,23 +37,18 @@ def problem(f, parameters, nodes):
         torque = TORQUE * tau[:, k]
         defects.append((q[:, k + 1] - q[:, k]) / STEP - rate(*at))
         if forward:
-            defects.append(
-                2e-3 / nt**2 * (slope - f(*at, torque, parameters))
-            )  # light segments accelerate more
+            # light segments accelerate more
+            defects.append(2e-3 / nt**2 * (slope - f(*at, torque, parameters)))
         else:
             defects.append(f(*at, slope, parameters) - casadi.vertcat(casadi.MX.zeros(6), torque))
     start_q, start_v = np.zeros(nq), np.zeros(nv)
     start_q[3], start_v[3], start_v[6] = 1, 0.3, 0.2
     ends = [q[:, 0] - start_q, v[:, 0] - start_v, q[7:, nodes] - 0.15 * np.arange(1, nt + 1) / nt]
-    nlp = {
-        "x": casadi.veccat(q, v, tau),
-        "f": casadi.sumsqr(tau),
-        "g": casadi.veccat(*defects, *ends),
-    }
-    guess = np.concatenate(
-        [np.tile(start_q, nodes + 1), np.tile(start_v, nodes + 1), np.ones(nt * nodes)]
+    states = (np.tile(x, nodes + 1) for x in (start_q, start_v))
+    nlp = {"x": casadi.veccat(q, v, tau), "f": casadi.sumsqr(tau)}
+    return nlp | {"g": casadi.veccat(*defects, *ends)}, np.concatenate(
+        [*states, np.ones(nt * nodes)]
     )
-    return nlp, guess
 
 
 def plan(f, parameters, nodes=8, **options):
@@ -64,13 +56,11 @@ def plan(f, parameters, nodes=8, **options):
     solver's statistics.
     """
     nlp, guess = problem(f, parameters, nodes)
-    solver = casadi.nlpsol(
-        "solver", "ipopt", nlp, QUIET | {f"ipopt.{key}": value for key, value in options.items()}
-    )
+    options = QUIET | {f"ipopt.{key}": value for key, value in options.items()}
+    solver = casadi.nlpsol("solver", "ipopt", nlp, options)
     found = solver(x0=guess, lbg=0, ubg=0)
-    return SimpleNamespace(
-        x=np.array(found["x"]).ravel(), value=float(found["f"]), **solver.stats()
-    )
+    x, value = np.array(found["x"]).ravel(), float(found["f"])
+    return SimpleNamespace(x=x, value=value, **solver.stats())
 
 
 def derivatives(f):
@@ -90,29 +80,21 @@ def blocks(f, at):
     """Return the outputs of a derivative that do not concern the parameters, as sparse matrices by
     name.
     """
-    seeds = {
-        name: np.sin(1 + np.arange(f.numel_in(name))) for name in f.name_in() if name not in at
-    }
-    found = f(**{name: at[name] if name in at else seeds[name] for name in f.name_in()})
+    seeds = {name: np.sin(1 + np.arange(f.numel_in(name))) for name in f.name_in()}
+    found = f(**{name: at.get(name, seed) for name, seed in seeds.items()})
     return {name: casadi.DM(value) for name, value in found.items() if "parameters" not in name}
 
 
 def main(module_folder, module_name, library, parameters):
     """Compare the compiled functions with those of the module; print what differs."""
     sys.path.insert(0, module_folder)
-    module, parameters, bad = (
-        __import__(module_name),
-        casadi.DM([float(x) for x in parameters.split(",")]),
-        [],
-    )
+    module, bad = __import__(module_name), []
+    parameters = casadi.DM([float(x) for x in parameters.split(",")])
     for name, last in (("forward_dynamics", "tau"), ("inverse_dynamics", "v_dot")):
         prefix = module_name.removesuffix("_casadi")
         f, g = casadi.external(f"{prefix}_casadi_{name}", library), module.function(name)
-        at = {key: np.cos(1 + np.arange(f.numel_in(key))) for key in ("q", "v", last)} | {
-            "parameters": parameters
-        }
-        at["tau"] = 1e-3 * at.get("tau", np.zeros(1))
-        at = {key: value for key, value in at.items() if key in f.name_in()}
+        at = {key: np.cos(1 + np.arange(f.numel_in(key))) for key in ("q", "v", last)}
+        at |= {"parameters": parameters} | ({"tau": 1e-3 * at["tau"]} if last == "tau" else {})
         for kind, mine in derivatives(f).items():
             theirs = blocks(derivatives(g)[kind], at)
             bad += [

@@ -7,81 +7,41 @@ from math import pi
 
 import numpy as np
 
-import serpentail as st
 from serpentail_codegen.functions.catalogue import function_of
 from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.ir.dataflow import inlined
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.pipeline import tail_of
 from serpentail_codegen.scene.parse import parse_scene
-from serpentail_codegen.scene.signatures.table import DERIVATIVES
 from tests.references.metrics import BLOCKS
 from tests.references.parameters import random_states
-from tests.support.models import model_folder
 
 COMPLEX = Numbers(np, complex)
 STEP = 1e-30  # of the imaginary part: without a subtraction, derivatives are as exact as values
 # part of the largest derivative in the same rows: smaller blocks are compared with that
 NEGLIGIBLE = 1e-6
 KINDS = ("random", "straight", "folded", "still", "scaled")
-# for every derivative function: the differentiated function, and for its outputs (output,
-# argument)
+
+
+def _of(output, *arguments):
+    """Derivatives of one of several outputs: their names, and what is differentiated by what."""
+    return {f"{output}_d{argument}": (output, argument) for argument in arguments}
+
+
+def _alone(output, *arguments):
+    """Derivatives of a function's only output."""
+    return {f"d{argument}": (output, argument) for argument in arguments}
+
+
+# for every derivative function: the differentiated one, and for its outputs (output, argument)
 FIRST = {
-    "inverse_dynamics_derivatives": (
-        "inverse_dynamics",
-        {"dq": ("force", "q"), "dv": ("force", "v")},
-    ),
-    "forward_dynamics_derivatives": (
-        "forward_dynamics",
-        {"dq": ("v_dot", "q"), "dv": ("v_dot", "v"), "dtau": ("v_dot", "tau")},
-    ),
-    "inverse_dynamics_parameter_derivatives": (
-        "inverse_dynamics",
-        {"dparameters": ("force", "parameters")},
-    ),
-    "forward_dynamics_parameter_derivatives": (
-        "forward_dynamics",
-        {"dparameters": ("v_dot", "parameters")},
-    ),
-    "energy_derivatives": (
-        "energy",
-        {
-            "kinetic_dq": ("kinetic", "q"),
-            "kinetic_dv": ("kinetic", "v"),
-            "potential_dq": ("potential", "q"),
-        },
-    ),
-    "momentum_derivatives": (
-        "momentum",
-        {
-            "linear_dq": ("linear", "q"),
-            "linear_dv": ("linear", "v"),
-            "angular_dq": ("angular", "q"),
-            "angular_dv": ("angular", "v"),
-        },
-    ),
+    "inverse_dynamics_derivatives": ("inverse_dynamics", _alone("force", "q", "v")),
+    "forward_dynamics_derivatives": ("forward_dynamics", _alone("v_dot", "q", "v", "tau")),
+    "inverse_dynamics_parameter_derivatives": ("inverse_dynamics", _alone("force", "parameters")),
+    "forward_dynamics_parameter_derivatives": ("forward_dynamics", _alone("v_dot", "parameters")),
+    "energy_derivatives": ("energy", _of("kinetic", "q", "v") | _of("potential", "q")),
+    "momentum_derivatives": ("momentum", _of("linear", "q", "v") | _of("angular", "q", "v")),
 }
-
-
-@cache
-def derivative_model(segments, links, emission, **options):
-    """Return a compiled model with all derivatives and the functions that they are compared
-    with.
-    """
-    wanted = [
-        *DERIVATIVES,
-        "mass_matrix",
-        "inverse_dynamics",
-        "forward_dynamics",
-        "energy",
-        "momentum",
-    ]
-    options = {
-        "emission": emission,
-        "name": "tail",
-        "functions": [*options.pop("functions", wanted)],
-    } | options
-    return st.load(model_folder(segments, links, **options))
 
 
 def states(model, kind, count=2):
@@ -163,12 +123,6 @@ def complex_step(model, function, state, argument):
         / STEP
         for a in nest.of_role("output")
     }
-
-
-def tail_name(size):
-    """A name for a size and an emission."""
-    m, n, emission = size
-    return f"m{m}_n{n}_{emission}" if n else f"arcs{m}_{emission}"
 
 
 def spans(size, nv):

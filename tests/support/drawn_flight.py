@@ -10,16 +10,9 @@ from serpentail.model.layout import Layout
 from serpentail.motion.trajectory import Trajectory
 
 SEMI_AXES = np.array([0.0315, 0.0495, 0.027])
-
-
 MOUNT = np.array([0, -0.0405, 0.0045])
-
-
-SPEEDS = {
-    "up": (0.5, 2.8),
-    "far": (2.6, 2.8),
-    "still": (0.0, 0.0),
-}  # forward and up at the start, m/s
+# forward and up at the start, m/s
+SPEEDS = {"up": (0.5, 2.8), "far": (2.6, 2.8), "still": (0.0, 0.0)}
 
 
 @dataclass

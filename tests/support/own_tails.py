@@ -1,24 +1,15 @@
-"""Tails whose segments and links differ: their scenes, and the same tails as sets of bodies."""
+"""Tails of the zoo whose segments and links differ, as sets of bodies."""
 
-from pathlib import Path
-from typing import Any
 from unittest.mock import patch
 
 import numpy as np
 
-from serpentail_codegen.scene.parse import parse_scene
 from tests.references.body_set import Animal, Arc, Link, exact
 from tests.support import zoo
-from tests.support.models import folder_of
 
 TILT = tuple(zoo.MOUNTED["mount_angles"])
 TORSO = zoo.TORSO | {"tail_mount": zoo.MOUNTED["tail_mount"]}
 VALUES = {name: tuple(x) if isinstance(x, list) else x for name, x in TORSO.items()}
-FUNCTIONS = [
-    *("mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics"),
-    *("energy", "momentum", "tail_points", "inverse_dynamics_derivatives"),
-    *("inverse_dynamics_parameter_derivatives", "forward_dynamics_parameter_derivatives"),
-]
 LINK_BODIES = (
     [Link(5e-4, 0.02, 0.01, (4e-8, 2e-9, 3e-8))] * 3,
     [
@@ -29,18 +20,14 @@ LINK_BODIES = (
 )
 ARC_BODIES = (Arc(1.5e-3, 0.06, 3), Arc(1.1e-3, 0.09, 3))
 BOTH_BODIES = (ARC_BODIES[0], LINK_BODIES[1], ARC_BODIES[1], LINK_BODIES[0])
-TAILS: dict[str, tuple[dict[str, Any], tuple]] = {
-    "links": ({"kind": "articulated", "segments": zoo.OWN_LINKS}, LINK_BODIES),
-    "arcs": ({"kind": "continuum", "segments": zoo.OWN_ARCS, "samples": 3}, ARC_BODIES),
-    "both": ({"kind": "mixed", "segments": zoo.MIXED, "samples": 3}, BOTH_BODIES),
-}
+TAILS = {"links": LINK_BODIES, "arcs": ARC_BODIES, "both": BOTH_BODIES}
 IN_ZOO = {"own_links": "links", "own_arcs": "arcs", "mixed": "both"}
 
 
 def animal(tail: str, tilted: bool = False) -> Animal:
     """Return one of the tails as a set of bodies."""
     angles = TILT if tilted else (0.0, 0.0, 0.0)
-    return Animal(segments=TAILS[tail][1], mount_angles=angles, **VALUES)
+    return Animal(segments=TAILS[tail], mount_angles=angles, **VALUES)
 
 
 def dynamics(bodies: Animal, q, v, v_dot) -> tuple[np.ndarray, ...]:
@@ -49,17 +36,6 @@ def dynamics(bodies: Animal, q, v, v_dot) -> tuple[np.ndarray, ...]:
     with patch.object(Animal, "_jacobians", lambda *_: jacobians):
         H, force = bodies.inertia(exact(q)), bodies.inverse_dynamics(q, v, v_dot)
     return tuple(x.astype(float) for x in (H, force, force - H.dot(exact(v_dot))))
-
-
-def folder(tail: str, tilted: bool = False, **keys: Any) -> Path:
-    """Return the generated folder of one of the tails."""
-    return folder_of_tables(TAILS[tail][0], {"mount_angles": TILT} if tilted else {}, **keys)
-
-
-def folder_of_tables(tables: dict[str, Any], parameters: dict[str, Any], **keys: Any) -> Path:
-    """Return the generated folder of a scene's tables."""
-    scene = {"functions": FUNCTIONS, **tables, **keys, "parameters": {**TORSO, **parameters}}
-    return folder_of(parse_scene(scene, "own"))
 
 
 def states(nq: int, count: int = 2):

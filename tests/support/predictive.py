@@ -39,11 +39,8 @@ def airborne(model: st.Model):
     left = ca.substitute(h - angular, omega, np.zeros(3))
     turn = ca.solve(own, left)
     v_dot = model.casadi.forward_dynamics(q, ca.vertcat(np.zeros(3), turn, rate), tau)
-    w, a, b, d = ca.vertsplit(c)
-    E = ca.vertcat(
-        *(ca.horzcat(*row) for row in ((-a, -b, -d), (w, -d, b), (d, w, -a), (-b, a, w)))
-    )
-    x_dot = ca.vertcat(E @ turn / 2, rate, v_dot[6:])
+    turned = ca.vertcat(-ca.dot(c[1:], turn), c[0] * turn + ca.cross(c[1:], turn))
+    x_dot = ca.vertcat(turned / 2, rate, v_dot[6:])
     return ca.Function("airborne", [x, tau, h], [x_dot, turn])
 
 
@@ -115,13 +112,8 @@ class Reference:
     def bounds(self):
         """Return bounds of the correction: torques keep their bounds at all ends of steps."""
         parts = np.arange(self.steps + 1) / self.steps
-        rows = [
-            np.concatenate(
-                [self._planned(self.begin + (j + s) * self.width)["torque"] for s in parts]
-            )
-            for j in range(self.N)
-        ]
-        rows = np.stack(rows)
+        times = self.begin + (np.arange(self.N)[:, None] + parts) * self.width
+        rows = np.array([[self._planned(t)["torque"][0] for t in row] for row in times])
         return (-TORQUE - rows).max(axis=1).ravel(), (TORQUE - rows).min(axis=1).ravel()
 
     def step(self, d):

@@ -13,7 +13,8 @@ from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.ir.step import Step
 from serpentail_codegen.ir.tape import Tape
 
-EXACT = Numbers(SimpleNamespace(sin=None, cos=None, sqrt=None), Fraction)
+NONE = SimpleNamespace(sin=None, cos=None, sqrt=None)
+EXACT = Numbers(NONE, Fraction)
 
 
 class Dual:
@@ -44,7 +45,7 @@ class Dual:
         return Dual(-self.value, None if self.slopes is None else [-s for s in self.slopes])
 
 
-DUALS = Numbers(SimpleNamespace(sin=None, cos=None, sqrt=None), Dual)
+DUALS = Numbers(NONE, Dual)
 
 
 class Narrow(Run):

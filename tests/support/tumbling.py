@@ -16,12 +16,8 @@ EXACT = sorted(
 FUNCTIONS = [*EXACT, "bias_force", "pfl", "energy", "momentum", "rollout", "tail_points"]
 NODE = ["airborne_rates", "airborne_rates_derivatives", "airborne_rates_hessian"]
 DURATION = 0.4  # s
-AGAIN = {
-    "duration": DURATION,
-    "bounds": st.Bounds(angle=np.pi / 3),
-    "tolerance": None,
-    "track": False,
-}
+TIGHT = {"bounds": st.Bounds(angle=np.pi / 3), "track": False}
+AGAIN = {"duration": DURATION, "tolerance": None, **TIGHT}
 
 
 @cache
@@ -51,10 +47,7 @@ def start(model: st.Model, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
 def planned(**settings) -> st.Plan:
     """Return a plan for the first start, made once in a process."""
     model = rat()
-    bounds = st.Bounds(angle=np.pi / 3)
-    return st.plan(
-        model, start=start(model), duration=DURATION, bounds=bounds, track=False, **settings
-    )
+    return st.plan(model, start=start(model), duration=DURATION, **TIGHT, **settings)
 
 
 def rate(model, plan):
@@ -62,16 +55,10 @@ def rate(model, plan):
 
     def y_dot(t, y):
         q, v = y[: model.nq], y[model.nq :]
-        w, x, y_, z = q[3:7]
-        a, b, c = v[3:6]
-        turn = [
-            -x * a - y_ * b - z * c,
-            w * a + y_ * c - z * b,
-            w * b - x * c + z * a,
-            w * c + x * b - y_ * a,
-        ]
+        w, e, omega = q[3], q[4:7], v[3:6]
+        turn = [-e @ omega / 2, *(w * omega + np.cross(e, omega)) / 2]
         tau = plan.torque(t)[0] - plan.problem.damping * v[6:]
-        return np.concatenate([v[:3], np.array(turn) / 2, v[6:], model.forward_dynamics(q, v, tau)])
+        return np.concatenate([v[:3], turn, v[6:], model.forward_dynamics(q, v, tau)])
 
     return y_dot
 
