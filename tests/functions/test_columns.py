@@ -14,7 +14,6 @@ from serpentail_codegen.functions.sweeps.doubling import is_doubled
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.dataflow import inlined
 from serpentail_codegen.ir.interpret import Numbers, Run
-from serpentail_codegen.ir.ldl import ldl_factor, ldl_solve
 from serpentail_codegen.ir.program import Factor, Solve, statements
 from serpentail_codegen.passes.unrolled_ldl import unrolled_ldl
 from serpentail_codegen.targets.c.form import RULE, fastest
@@ -92,9 +91,6 @@ def test_every_pivot_is_guarded():
     assert signs(segments, tail_mass=[-1.0], link_inertia=[-1.0] * 3)[:2] == [False] * 2
 
 
-# ---- doubling ------------------------------------------------------------------------------------
-
-
 def in_digits(program, given, digits=40):
     """v_dot of a run in that many digits, of numbers and of arrays of them."""
     context = mpmath.mp.clone()
@@ -117,9 +113,6 @@ def test_chains_of_links_mean_what_links_mean_to_40_digits(size):
         expected, found = (in_digits(program, given) for program in (plain, doubled))
         error = max(abs(x - y) for x, y in zip(found, expected, strict=True))
         assert error <= 1e-30 * max(abs(x) for x in expected), bend
-
-
-# ---- choices -------------------------------------------------------------------------------------
 
 
 def test_forms_are_chosen_where_they_are_faster():
@@ -149,19 +142,6 @@ def test_the_manifest_tells_forms_and_the_rule_that_chose_them():
             assert manifest["functions"][FUNCTION]["emission"] == form
             assert manifest["functions"]["energy"]["emission"] in ("straight", "loops")
             assert manifest.get("forms") == (RULE if auto else None)
-
-
-# ---- eliminations --------------------------------------------------------------------------------
-
-
-def test_factor_and_solve_invert():
-    rng = np.random.default_rng(1)
-    half = rng.normal(size=(6, 6))
-    matrix, b = half @ half.T + np.eye(6), rng.normal(size=6)
-    factored, pivots = ldl_factor(Numbers(np), [list(matrix[k, : k + 1]) for k in range(6)])
-    found = ldl_solve(Numbers(np), factored, list(b))
-    np.testing.assert_allclose(found, np.linalg.solve(matrix, b), rtol=1e-10)
-    assert np.prod(np.array(pivots)) == pytest.approx(np.linalg.det(matrix), rel=1e-10)
 
 
 def test_eliminations_written_out_are_the_same():

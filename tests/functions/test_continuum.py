@@ -2,8 +2,6 @@
 polar angles.
 """
 
-import subprocess
-
 import casadi
 import numpy as np
 import pytest
@@ -130,15 +128,6 @@ def test_a_wider_range_is_right_too(exact):
     assert block_error(model.bias_force(q, v), exact.bias_force(q, v)) <= 1e-12
 
 
-def test_a_flight_keeps_energy_and_momentum():
-    q, v = np.zeros(9), np.zeros(8)
-    q[3], q[7:], v[3:] = 1.0, (0.8, 0.5), (6.0, 1.0, -2.0, 3.0, -4.0)
-    flight = st.simulate(zoo.model("arcs1"), q, v, t_span=0.5, step=1e-4)
-    assert np.ptp(flight.energy) <= 1e-9 * flight.kinetic[0]
-    most = np.abs(flight.angular_momentum).max()
-    assert np.ptp(flight.angular_momentum, axis=0).max() <= 1e-10 * most
-
-
 def test_polar_angles_are_a_conversion():
     rng = np.random.default_rng(0)
     phi, theta, phi_dot, theta_dot = rng.uniform(0.1, 3.0, (4, 50))
@@ -162,13 +151,3 @@ def test_a_model_tells_of_arcs():
     assert (model.kind, model.links, model.samples) == ("continuum", None, 5)
     assert "1 continuum segments" in repr(model)
     assert model.tail_points(bent(1.0)[0]).shape == (6, 3)
-
-
-def test_the_c_example_without_forward_dynamics_tells_the_sizes(tmp_path):
-    """Every model of the zoo has forward dynamics."""
-    folder = model_folder(2, None, functions=["energy"])
-    sources = [folder / "example" / "main.c", folder / "src" / f"{folder.name}.c"]
-    command = ["cc", "-std=c99", "-I", folder / "include", *sources, "-lm", "-o", tmp_path / "main"]
-    subprocess.run(command, check=True)
-    printed = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=True).stdout
-    assert printed == "continuum_m2: 2 segments, 5 samples each\n"

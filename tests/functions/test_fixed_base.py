@@ -8,10 +8,8 @@ from serpentail_codegen.functions.fixed_base import FUNCTIONS as BASED
 from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.tail import Tail
-from serpentail_codegen.scene.parse import parse_scene, scene_to_dict
-from serpentail_codegen.scene.problems import SceneError
 from serpentail_codegen.scene.shape import Shape
-from serpentail_codegen.scene.signatures.table import DEFAULT, FIXED
+from serpentail_codegen.scene.signatures.table import FIXED
 from serpentail_codegen.targets.c.straight import straight_line
 from tests.support import zoo
 from tests.support.rows import row
@@ -90,20 +88,6 @@ def test_a_fixed_base_costs_less():
             assert weightless <= fixed - (name != "mass_matrix")
 
 
-def test_the_table_of_functions_is_that_of_assemblies():
-    assert {*FIXED, *PARTS} - {"implicit", "rollout"} == set(BASED)
-    assert scene().functions == tuple(name for name in DEFAULT if name in FIXED)
-    assert set(scene(functions="all").functions) == set(FIXED)
-
-
-def scene(**keys):
-    """The scene of an arc on a fixed base."""
-    return parse_scene({"kind": "continuum", "segments": 1, "base": "fixed", **keys}, "bench")
-
-
-# ---- no weight -----------------------------------------------------------------------------------
-
-
 def test_without_weight_is_without_gravity():
     free, model = zoo.model("m1_n3").with_parameters(gravity=0), zoo.model("weightless")
     assert model.parameters["gravity"] == 0
@@ -120,24 +104,3 @@ def test_without_weight_is_without_gravity():
         near(getattr(model, function)(q, v, last), expected, 1e-12)
     with pytest.raises(st.ModelError, match="gravity"):
         model.with_parameters(gravity=9.8)
-
-
-def test_scenes_are_read_again_as_they_are():
-    found = scene(weightless=True)
-    assert parse_scene(scene_to_dict(found), "other") == found
-    plain = scene_to_dict(parse_scene({"kind": "continuum", "segments": 1}, "plain"))
-    assert not {"base", "weightless"} & plain.keys()
-
-
-def test_what_cannot_be_is_refused():
-    for keys, field in (
-        ({"base": "floating"}, "base"),
-        ({"weightless": 1}, "weightless"),
-        ({"contacts": ["tail"]}, "contacts"),
-        ({"functions": ["airborne_rates"]}, "functions"),
-        ({"parameters": {"torso_mass": 1}}, "parameters.torso_mass"),
-        ({"weightless": True, "parameters": {"gravity": 1}}, "parameters.gravity"),
-    ):
-        with row(field), pytest.raises(SceneError) as refused:
-            scene(**keys)
-        assert field in {problem.field for problem in refused.value.problems}, field

@@ -50,9 +50,6 @@ def test_every_law_holds():
     assert [check.name for check in laws(zoo.model("mixed")) if not check.passed] == []
 
 
-# ---- programs ------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("kind", ["articulated", "continuum"])
 def test_equal_pieces_by_themselves_are_the_default_tail(kind):
     """The same numbers, whether a tail's mass and length are shared or each piece has its own."""
@@ -111,9 +108,6 @@ def test_steps_are_those_of_a_stretch():
         mechanism(draft).pose()
 
 
-# ---- models --------------------------------------------------------------------------------------
-
-
 def test_models_tell_their_kinds():
     model = zoo.model("mixed")
     assert model.kind == "mixed"
@@ -166,10 +160,3 @@ def test_a_flight_keeps_energy_and_momentum_and_is_labelled():
     assert contents(run).labels["joint"] == names
     bent = [each for each in run.warnings if "bent" in each]
     assert ["segment 1 " in bent[0], "segment 4 " in bent[1]] == [True, True]
-
-
-@pytest.mark.parametrize("kind", ["urdf", "xml"])
-def test_other_formats_have_no_arcs(kind, tmp_path):
-    name = "mjcf" if kind == "xml" else kind
-    with pytest.raises(st.ExportError, match="articulated"):
-        st.export(zoo.model("mixed"), name, tmp_path / f"both.{kind}")

@@ -63,9 +63,6 @@ def assert_near(found, expected, limit=1e-11):
     assert np.abs(np.asarray(found) - expected).max() <= limit * scale
 
 
-# ---- programs ------------------------------------------------------------------------------------
-
-
 def test_only_the_parts_of_a_scene_are_emitted():
     """A program knows the parameters of its parts alone, and is longer by these."""
     for name in ("forward_dynamics", "energy", "implicit_factor"):
@@ -89,9 +86,6 @@ def test_every_form_has_the_same_acceleration(form):
         expected, found = outputs(plain, given)["v_dot"], outputs(other, given)["v_dot"]
         assert plain != other
         assert_near(found, expected, 1e-12)
-
-
-# ---- models --------------------------------------------------------------------------------------
 
 
 def test_forces_and_torques_have_the_passive_forces(pair):
@@ -140,15 +134,6 @@ def test_energy_has_what_springs_and_stops_store(pair):
         found = pair.elastic.energy(q, v)
         assert found[0] == kinetic and stored > 0
         assert found[1] == pytest.approx(potential + stored, rel=1e-13, abs=1e-15)
-
-
-def test_casadi_functions_mean_the_same(pair):
-    for q, v, v_dot, tau in pair.states(3):
-        for name, last in (("forward_dynamics", tau), ("inverse_dynamics", v_dot)):
-            found = getattr(pair.elastic.casadi, name)(q, v, last).full().ravel()
-            assert block_error(found, getattr(pair.elastic, name)(q, v, last)) < 1e-10
-        energies = pair.elastic.casadi.energy(q, v)
-        assert list(map(float, energies)) == pytest.approx(pair.elastic.energy(q, v), rel=1e-12)
 
 
 @pytest.mark.parametrize("gains", [(0.0, 0.0), (4e4, 400.0)], ids=["free", "tracked"])

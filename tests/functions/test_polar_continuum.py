@@ -2,7 +2,6 @@
 at theta = 0 and where they have no function.
 """
 
-import subprocess
 from functools import cache
 
 import mpmath
@@ -11,14 +10,11 @@ import pytest
 import sympy
 
 import serpentail as st
-from serpentail.verification.report import laws
 from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.mechanics import polar_arc
-from serpentail_codegen.scene.parse import parse_scene, scene_for, scene_to_dict
-from serpentail_codegen.scene.problems import SceneError
 from serpentail_codegen.scene.signatures.table import VALUES
 from tests.references.exact_polar import ExactPolar
 from tests.references.metrics import block_error, equilibrated_condition, mass_matrix_error
@@ -103,9 +99,6 @@ def in_bend(q, v):
     return q_bend, v_bend
 
 
-# ---- the closed forms ----------------------------------------------------------------------------
-
-
 def f_v(theta, x):
     """Eq. 27."""
     s, c = mpmath.sin(theta * x), mpmath.cos(theta * x)
@@ -133,9 +126,6 @@ def test_entries_of_appendix_b_are_the_integrals(theta):
                     lambda x, k=k, j=j, f=other: f_v(bend, x)[k] * f(bend, x)[j], [0, 1]
                 )
                 assert abs(mpmath.mpf(str(matrix[k, j].evalf(60))) - expected) <= 1e-35, (k, j)
-
-
-# ---- right where they can be, and how they fail --------------------------------------------------
 
 
 @pytest.mark.parametrize("segments", [1, 2])
@@ -177,9 +167,6 @@ def test_down_to_the_papers_switch_no_digit_is_left(theta):
     assert max(bend_errors(zoo.model("arcs1"), polar_state(1, theta))) <= 1e-14
 
 
-# ---- the other functions -------------------------------------------------------------------------
-
-
 def test_everything_else_follows_from_the_bend_form():
     polar, bend = zoo.model("polar"), zoo.model("arcs1")
     q, v, *_ = polar_state(1, 1.3)
@@ -209,19 +196,6 @@ def test_external_loads_balance():
     assert np.abs(residual).max() <= 1e-12 * np.abs(load).max()
 
 
-def test_the_c_example_runs_at_a_bend(tmp_path):
-    polar = zoo.model("polar")
-    sources = [polar.folder / "example" / "main.c", polar.folder / "src" / f"{polar.name}.c"]
-    strict = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror"]
-    command = ["cc", *strict, "-I", polar.folder / "include", *sources, "-lm"]
-    subprocess.run([*command, "-o", tmp_path / "example"], check=True)
-    run = subprocess.run([tmp_path / "example"], capture_output=True, text=True, check=True)
-    printed = [float(line.split(" = ")[1]) for line in run.stdout.splitlines()]
-    q, v, tau = np.array([0, 0, 0, 1.0, 0, 0, 0, 0, 0.5]), np.zeros(8), np.zeros(2)
-    v[3], tau[0] = 1, 1e-4
-    np.testing.assert_allclose(printed, polar.forward_dynamics(q, v, tau), rtol=1e-6, atol=1e-6)
-
-
 def test_casadi_and_c_agree():
     polar, state = zoo.model("polar"), polar_state(1, 1.3)
     given = dict(zip(("q", "v", "v_dot", "tau"), state, strict=True))
@@ -236,9 +210,6 @@ def test_casadi_and_c_agree():
                 np.testing.assert_allclose(
                     np.ravel(x), np.ravel(np.array(y)), rtol=1e-11, atol=most
                 )
-
-
-# ---- refusals ------------------------------------------------------------------------------------
 
 
 def test_a_straight_segment_is_refused():
@@ -260,29 +231,3 @@ def test_a_straight_segment_is_refused():
 def test_beyond_the_range_is_refused():
     with pytest.raises(st.StateError, match=r"segment 1 .*6\.3 .*6\.28"):
         zoo.model("polar").mass_matrix(polar_state(1, 6.3)[0])
-
-
-def test_verification_is_refused():
-    with pytest.raises(st.ModelError, match="bend"):
-        laws(zoo.model("polar"))
-
-
-def test_what_has_no_polar_form_is_refused():
-    polar = {"kind": "continuum", "coordinates": "polar"}
-    for keys, named in (
-        ({"kind": "articulated", "links": 2, "coordinates": "polar"}, "polar"),
-        ({"kind": "continuum", "coordinates": "joint"}, "joint"),
-        (polar | {"functions": ["airborne_rates"]}, "airborne_rates"),
-        (polar | {"functions": ["forward_dynamics_derivatives"]}, "forward_dynamics_derivatives"),
-    ):
-        with row(named), pytest.raises(SceneError, match=named) as caught:
-            parse_scene({"segments": 1, **keys}, "refused")
-        assert [problem.field for problem in caught.value.problems] == ["coordinates"]
-
-
-def test_polar_is_a_choice_of_a_continuum_only():
-    assert scene_for("continuum", 1).coordinates == "bend"
-    scene = scene_for("continuum", 1, coordinates="polar")
-    assert parse_scene(scene_to_dict(scene), "other") == scene
-    header = next((zoo.folder("polar") / "include").glob("*.h"))
-    assert "For comparison only" in header.read_text()
