@@ -6,7 +6,7 @@ import numpy as np
 
 from serpentail_codegen.autodiff.forward import tangent_program
 from serpentail_codegen.ir.interpret import Run
-from serpentail_codegen.ir.program import Fill, Index, statements
+from serpentail_codegen.ir.program import Index, statements
 from tests.support.programs import EXACT, NEXT, PROGRAMS, SQUARE, Narrow, built, jacobian, numbers
 from tests.support.rows import row
 
@@ -134,31 +134,9 @@ def test_lanes_left_out_are_zero():
         assert any(getattr(s, "columns", None) for s, _ in statements(few.body)), name
 
 
-def test_fills_are_added_where_lanes_differ():
-    """Rows that are written in few lanes and read in all begin as zeros."""
-    bounded = tangent_program(chain_up(), ("x",), 3, bound=of_x)
-    filled = {s.target.array.name for s in bounded.body if isinstance(s, Fill)}
-    assert "d_a" in filled and "a" not in filled
-    whole = [s for s in tangent_program(chain_up(), ("x",), 3).body[:-1] if isinstance(s, Fill)]
-    assert "d_a" not in {s.target.array.name for s in whole if s.target.size > 1}
-
-
 def test_what_does_not_move_has_no_tangents():
     arrays = tangent_program(PROGRAMS["guarded"], ("mass",)).arrays
     names = {a.name for a in arrays}
     assert {"d_mass", "d_t", "d_u"} <= names
     assert not {"d_x", "d_y", "d_w", "dead", "d_dead", "w"} & names
     assert [a.role for a in arrays if a.name == "d_mass"] == ["input"]
-
-
-def test_what_is_stored_anew_forgets_its_tangents():
-    b, _, x, y, u, _ = built()
-    t = b.array("t", 1)
-    b.copy(t[0], x[0])
-    b.copy(u[0], t[0])
-    for k, store in enumerate((lambda: b.fill(t[0], 3), lambda: b.copy(t[0], y[0])), start=1):
-        b.copy(t[0], x[0], adds=True)
-        store()
-        b.copy(u[k], t[0])
-    found = ran(tangent_program(b.finish(), ("x",)), numbers(b.finish()) | {"d_x": [7, 0, 0]})
-    assert found["d_u"] == [7, 0, 0]

@@ -48,11 +48,6 @@ def all_three(model, arguments):
     return (y,), J, model.airborne_rates_hessian(*rates, arguments["weights"])
 
 
-def condition(model, q):
-    """Condition number of H."""
-    return equilibrated_condition(model.mass_matrix(q))
-
-
 def blocks(*sizes):
     """Slices of a vector with one unit each."""
     return [slice(a, b) for a, b in pairwise(np.cumsum([0, *sizes]))]
@@ -96,7 +91,7 @@ def test_rates_are_those_of_full_dynamics_at_that_momentum(name):
         (y,), (first, J), (second, same, H) = all_three(model, arguments)
         rows.append((arguments, (y, J, H)))
         quaternion, rate, acceleration, omega = np.split(y, np.cumsum([4, len(tau), len(tau)]))
-        most = condition(model, q)
+        most = equilibrated_condition(model.mass_matrix(q))
         with row(at):
             assert np.abs(omega - v[3:6]).max() <= 2e-14 * most * max(np.abs(v).max(), 1e-300)
             expected = model.forward_dynamics(q, v, tau)[6:]
@@ -121,7 +116,7 @@ def test_derivatives_are_those_of_a_complex_step(name):
     by, of = blocks(4, nt, nt, nt), blocks(4, nt, nt, 3)
     for at, (q, _, _), arguments in [*calls(model)][::2]:
         y, J, H = all_three(model, arguments)[2]
-        limit = ROUNDING * condition(model, q)
+        limit = ROUNDING * equilibrated_condition(model.mass_matrix(q))
         steps = along(model, "airborne_rates_derivatives", arguments)["J"]
         expected = np.einsum("r,rck->ck", arguments["weights"], steps.reshape(len(y), *H.shape))
         with row(at):

@@ -2,15 +2,12 @@
 polar angles.
 """
 
-import subprocess
-
 import casadi
 import numpy as np
 import pytest
 
 import serpentail as st
-from tests.references.body_set import MP, Animal, Arc, moved
-from tests.references.body_set import exact as exact_numbers
+from tests.references.body_set import MP, Animal, Arc, exact, moved
 from tests.references.exact_continuum import ExactContinuum
 from tests.references.metrics import block_error, equilibrated_condition, mass_matrix_error
 from tests.references.parameters import TABLE_1
@@ -20,11 +17,7 @@ from tests.support.rows import row
 
 BENDS = (0.0, 1e-300, 1e-16, 1e-8, 1e-4, 1e-2, 0.5, 2.0, np.pi, 5.0, 2 * np.pi)
 SHIFT = MP.mpf(10) ** -7
-
-
-@pytest.fixture(scope="module")
-def exact():
-    return ExactContinuum(dict(TABLE_1), 1)
+EXACT = ExactContinuum(dict(TABLE_1), 1)
 
 
 def bent(theta):
@@ -36,15 +29,15 @@ def bent(theta):
     return q, v, 1e-3 * rng.normal(size=2)
 
 
-def test_every_bend_is_right_to_rounding(exact):
+def test_every_bend_is_right_to_rounding():
     model = zoo.model("arcs1")
     for theta in BENDS:
         q, v, tau = bent(theta)
-        H = exact.mass_matrix(q)
+        H = EXACT.mass_matrix(q)
         with row(theta):
             assert mass_matrix_error(model.mass_matrix(q), H) <= 1e-14
-            assert block_error(model.bias_force(q, v), exact.bias_force(q, v)) <= 2e-14
-            v_dot = model.forward_dynamics(q, v, tau), exact.forward_dynamics(q, v, tau)
+            assert block_error(model.bias_force(q, v), EXACT.bias_force(q, v)) <= 2e-14
+            v_dot = model.forward_dynamics(q, v, tau), EXACT.forward_dynamics(q, v, tau)
             assert block_error(*v_dot) <= 5e-15 * equilibrated_condition(H)
 
 
@@ -63,12 +56,10 @@ def test_derivatives_are_right_at_every_bend(bends):
         q, v, tau = bent(bend)
         (by_q, by_v), (v_dot, weights) = rng.normal(size=(2, 2, 8))
         by_q[:3], by_v[:3] = 0, 0
-        sides = [
-            animal.inverse_dynamics(
-                moved(exact_numbers(q), by_q, h), exact_numbers(v) + h * exact_numbers(by_v), v_dot
-            )
-            for h in (-SHIFT, 0 * SHIFT, SHIFT)
-        ]
+        sides = []
+        for h in (-SHIFT, 0 * SHIFT, SHIFT):
+            there, rates = moved(exact(q), by_q, h), exact(v) + h * exact(by_v)
+            sides.append(animal.inverse_dynamics(there, rates, v_dot))
         first = ((sides[2] - sides[0]) / (2 * SHIFT)).astype(float)
         second = ((sides[2] - 2 * sides[1] + sides[0]) / SHIFT**2).astype(float) @ weights
         dq, dv = model.inverse_dynamics_derivatives(q, v, v_dot)
@@ -78,9 +69,8 @@ def test_derivatives_are_right_at_every_bend(bends):
         with row(bend):
             near(dq @ by_q + dv @ by_v, first, 1e-12)
             assert abs(curved - second) <= most
-            slope, curve, of_motion = along_by_casadi(
-                model, (q, v, v_dot, tau), by_q, by_v, weights
-            )
+            state = q, v, v_dot, tau
+            slope, curve, of_motion = along_by_casadi(model, state, by_q, by_v, weights)
             near(slope, first, 1e-12)
             assert abs(curve - second) <= most
             dq, dv, _ = model.forward_dynamics_derivatives(q, v, tau)
@@ -96,15 +86,11 @@ def along_by_casadi(model, state, by_q, by_v, weights):
     """The slope of forces, weights times their second derivative, and the slope of v_dot."""
     q, v, v_dot, tau = state
     s = casadi.SX.sym("s")
-    angle = np.linalg.norm(by_q[3:6])
+    turn, w, e = by_q[3:6], q[3], q[4:7]
+    angle = np.linalg.norm(turn)
     c, k = casadi.cos(s * angle / 2), casadi.sin(s * angle / 2) / angle
-    turn = by_q[3:6]
-    w, e = q[3], q[4:7]
-    there = [
-        w * c - k * (e @ turn),
-        *(c * e[i] + k * (w * turn + np.cross(e, turn))[i] for i in range(3)),
-    ]
-    place = casadi.vertcat(*q[:3], *there, q[7:] + s * by_q[6:])
+    there = w * c - k * (e @ turn), c * e + k * (w * turn + np.cross(e, turn))
+    place = casadi.vertcat(q[:3], *there, q[7:] + s * by_q[6:])
     force = model.casadi.inverse_dynamics(place, v + s * by_v, v_dot)
     motion = model.casadi.forward_dynamics(place, v + s * by_v, tau)
     slope = casadi.jacobian(force, s)
@@ -122,24 +108,15 @@ def test_beyond_the_range_is_refused():
     assert np.isnan(np.array(model.casadi.mass_matrix(q))).any()
 
 
-def test_a_wider_range_is_right_too(exact):
+def test_a_wider_range_is_right_too():
     """The range is the point: the series of the model are longer."""
     model = st.load(model_folder(1, None, bend_range=12.0, functions=["mass_matrix", "bias_force"]))
     q, v, _ = bent(11.9)
-    assert mass_matrix_error(model.mass_matrix(q), exact.mass_matrix(q)) <= 1e-13
-    assert block_error(model.bias_force(q, v), exact.bias_force(q, v)) <= 1e-12
+    assert mass_matrix_error(model.mass_matrix(q), EXACT.mass_matrix(q)) <= 1e-13
+    assert block_error(model.bias_force(q, v), EXACT.bias_force(q, v)) <= 1e-12
 
 
-def test_a_flight_keeps_energy_and_momentum():
-    q, v = np.zeros(9), np.zeros(8)
-    q[3], q[7:], v[3:] = 1.0, (0.8, 0.5), (6.0, 1.0, -2.0, 3.0, -4.0)
-    flight = st.simulate(zoo.model("arcs1"), q, v, t_span=0.5, step=1e-4)
-    assert np.ptp(flight.energy) <= 1e-9 * flight.kinetic[0]
-    most = np.abs(flight.angular_momentum).max()
-    assert np.ptp(flight.angular_momentum, axis=0).max() <= 1e-10 * most
-
-
-def test_polar_angles_are_a_conversion():
+def test_polar_angles_are_a_conversion_and_a_straight_segment_has_none():
     rng = np.random.default_rng(0)
     phi, theta, phi_dot, theta_dot = rng.uniform(0.1, 3.0, (4, 50))
     a, b, a_dot, b_dot = st.polar_to_bend(phi, theta, phi_dot, theta_dot)
@@ -150,9 +127,6 @@ def test_polar_angles_are_a_conversion():
     ahead = st.polar_to_bend(phi + step * phi_dot, theta + step * theta_dot)[:2]
     np.testing.assert_allclose((ahead[0] - a) / step, a_dot, rtol=1e-5, atol=1e-5)
     np.testing.assert_allclose((ahead[1] - b) / step, b_dot, rtol=1e-5, atol=1e-5)
-
-
-def test_a_straight_segment_has_no_polar_angle():
     with pytest.raises(st.StateError, match=r"segment \[1\]"):
         st.bend_to_polar([0.1, 0.0], [0.2, 0.0])
 
@@ -162,13 +136,3 @@ def test_a_model_tells_of_arcs():
     assert (model.kind, model.links, model.samples) == ("continuum", None, 5)
     assert "1 continuum segments" in repr(model)
     assert model.tail_points(bent(1.0)[0]).shape == (6, 3)
-
-
-def test_the_c_example_without_forward_dynamics_tells_the_sizes(tmp_path):
-    """Every model of the zoo has forward dynamics."""
-    folder = model_folder(2, None, functions=["energy"])
-    sources = [folder / "example" / "main.c", folder / "src" / f"{folder.name}.c"]
-    command = ["cc", "-std=c99", "-I", folder / "include", *sources, "-lm", "-o", tmp_path / "main"]
-    subprocess.run(command, check=True)
-    printed = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=True).stdout
-    assert printed == "continuum_m2: 2 segments, 5 samples each\n"

@@ -8,7 +8,6 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from serpentail.model.kernel import Kernel
 from serpentail_codegen.scene.signatures.table import DERIVATIVES
 from tests.references.metrics import block_error
 from tests.support.derivative_models import (
@@ -22,7 +21,7 @@ from tests.support.derivative_models import (
 )
 from tests.support.rows import row
 
-from .compared import QUICK, ROUNDING, called, every_free, limit, marked, model_of
+from .compared import ROUNDING, called, limit, marked, model_of
 
 PASSIVE = ["elastic", "elastic_arcs"]
 FIXED = ["fixed", "fixed_arcs", "fixed_mixed"]
@@ -56,55 +55,6 @@ def test_first_derivatives_are_those_of_a_complex_step(name):
                     assert error <= limit(model, derivative, state)
 
 
-@pytest.mark.parametrize("name", QUICK)
-def test_batches_are_those_of_single_states(name, monkeypatch):
-    """In the C of many states side by side, with a rest."""
-    monkeypatch.setattr("serpentail.model.batch.MIN_BATCH", 1)
-    model = model_of(name)
-    singles = [state for _, state in of_every_kind(model)]
-    singles = [singles[k % len(singles)] for k in range(model.batch_library.states + 1)]
-    stack = {argument: np.array([s[argument] for s in singles]) for argument in singles[0]}
-    for function in ("inverse_dynamics_derivatives", "forward_dynamics_derivatives"):
-        alone = [called(model, function, state) for state in singles]
-        with monkeypatch.context() as within:
-            within.setattr(Kernel, "_each", lambda *_: pytest.fail("one by one"))
-            together = called(model, function, stack)
-        for k, state in enumerate(singles):
-            for output, expected in alone[k].items():
-                error = jacobian_error(together[output][k], expected, model.nv)
-                assert error <= limit(model, function, state), (function, output, k)
-
-
-# ---- energy, momentum and position ---------------------------------------------------------------
-
-
-@every_free
-def test_position_and_velocity_of_the_torso_matter_to_nothing_but_its_energy(name):
-    """Every column of the position is zero, to the last bit, and so is the velocity's but in the
-    momentum.
-    """
-    model = model_of(name)
-    mass = model.parameters["torso_mass"] + model.parameters["tail_mass"]
-    for at, state in of_every_kind(model):
-        with row(at):
-            for derivative in FIRST:
-                for output, values in called(model, derivative, state).items():
-                    if output.endswith("dq") and not output.startswith("potential"):
-                        assert not np.any(values[..., :3])
-                    if output == "dv":
-                        assert not np.any(values[..., :3])
-            potential = called(model, "energy_derivatives", state)["potential_dq"]
-            pull = [0, 0, mass * model.parameters["gravity"]]
-            np.testing.assert_allclose(potential[:3], pull, rtol=1e-14, atol=1e-16)
-            J = called(model, "momentum_derivatives", state)
-            of_speed = mass * np.eye(3)
-            np.testing.assert_allclose(J["linear_dv"][:, :3], of_speed, rtol=0, atol=1e-14 * mass)
-            assert np.abs(J["angular_dv"][:, :3]).max() <= 1e-15 * np.abs(J["angular_dv"]).max()
-
-
-# ---- products with Jacobians ---------------------------------------------------------------------
-
-
 @free_or_passive
 def test_products_are_those_with_the_jacobians(name):
     """From the left and from the right, by sweeps that never form a Jacobian."""
@@ -125,9 +75,6 @@ def test_products_are_those_with_the_jacobians(name):
         expected = sum(J[d] @ along[d] for d in J)
         with row(at, "from the right"):
             assert block_error(found, expected) <= limit(model, "forward", state)
-
-
-# ---- second derivatives --------------------------------------------------------------------------
 
 
 @cache

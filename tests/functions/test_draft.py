@@ -37,9 +37,7 @@ def test_parameters_are_found_by_their_names_and_all_else_is_passed():
     reads, weightless = {name: given[name] for name in "Ra"}, draft.zero(1)
     draft.step(step, reads, Instead({"gravity": weightless}), p_ddot=given["p_ddot"])
     assert applied(draft)["gravity"] == "zero_1"
-
-
-def test_what_only_an_unwanted_output_needs_may_be_missing():
+    # what only an output needs that is not wanted may be missing
     draft, given = draft_with(a=3, force=3, F_next=6)
     force = given.pop("force")
     draft.step(torso.torso_wrench, given, force=force)
@@ -75,15 +73,12 @@ def test_wrong_reads_and_writes_are_refused():
 @pytest.mark.parametrize("kind", [dict, Vectors])
 def test_no_read_shadows_a_parameter(kind):
     """A work array called ``mu`` once stood for the coefficient of friction."""
-    draft, given = draft_with(velocity=3, force=3, rate=2)
+    sizes = {"drag": 1, "mobility": 1, "p": 3, "arm": 3, "bristle": 2, "velocity": 3}
+    draft, reads = draft_with(**sizes)
     law = derive(contact.contact_force, friction="cone")
-    sizes = {"drag": 1, "mobility": 1, "p": 3, "arm": 3, "bristle": 2}
-    reads = {name: draft.vector(name, size) for name, size in sizes.items()}
-    reads |= {"velocity": given["velocity"], "mu": draft.vector("response", 1)}
-    writes = {name: given[name] for name in ("force", "rate")}
+    writes = {name: draft.vector(name, size) for name, size in (("force", 3), ("rate", 2))}
     with pytest.raises(ValueError, match=r"contact_force_.* in drafted: mu"):
-        draft.step(law, kind(reads), **writes)
-    del reads["mu"]
+        draft.step(law, kind(reads | {"mu": draft.vector("response", 1)}), **writes)
     draft.step(law, kind(reads), **writes)
     assert applied(draft)["mu"] == "mu"
 

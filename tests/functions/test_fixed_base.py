@@ -8,10 +8,8 @@ from serpentail_codegen.functions.fixed_base import FUNCTIONS as BASED
 from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.tail import Tail
-from serpentail_codegen.scene.parse import parse_scene, scene_to_dict
-from serpentail_codegen.scene.problems import SceneError
 from serpentail_codegen.scene.shape import Shape
-from serpentail_codegen.scene.signatures.table import DEFAULT, FIXED
+from serpentail_codegen.scene.signatures.table import FIXED
 from serpentail_codegen.targets.c.straight import straight_line
 from tests.support import zoo
 from tests.support.rows import row
@@ -19,7 +17,6 @@ from tests.support.rows import row
 # on a fixed base, and the same tail on a torso that moves
 PAIRS = {"fixed": "m2_n2", "fixed_arcs": "arcs2", "fixed_mixed": "mixed"}
 PARTS = {"implicit_factor", "implicit_solve", "tracked_dynamics"}  # of pfl and implicit
-every_pair = pytest.mark.parametrize("name", PAIRS)
 
 
 def near(found, expected, limit):
@@ -27,18 +24,13 @@ def near(found, expected, limit):
     np.testing.assert_allclose(found, expected, rtol=0, atol=limit * np.abs(expected).max())
 
 
-def cases(model, count=3):
-    """Yield q, v, v_dot and torques of the tail."""
-    for q, v, v_dot, tau in np.random.default_rng(3).normal(size=(count, 4, model.nq)):
-        yield q, 4 * v, 20 * v_dot, 1e-4 * tau
-
-
-@every_pair
+@pytest.mark.parametrize("name", PAIRS)
 def test_it_is_the_tails_part_of_a_torso_at_rest(name):
     model, free = zoo.model(name), zoo.model(PAIRS[name])
     assert model.nq == model.nv == 2 * model.segments and model.fixed
     mass = free.parameters["torso_mass"] / free.parameters["tail_mass"] + 1
-    for q, v, v_dot, tau in cases(model):
+    scales = np.array([1, 4, 20, 1e-4])[:, None]
+    for q, v, v_dot, tau in scales * np.random.default_rng(3).normal(size=(3, 4, model.nq)):
         there = np.r_[0, 0, 0, 1, 0, 0, 0, q], np.r_[np.zeros(6), v]
         H, bias = free.mass_matrix(there[0])[6:, 6:], free.bias_force(*there)[6:]
         near(model.mass_matrix(q), H, 1e-14)
@@ -56,17 +48,10 @@ def test_it_is_the_tails_part_of_a_torso_at_rest(name):
         for found in (model.center_of_mass(q, v), model.casadi.center_of_mass(q, v)):
             for x, expected in zip(found, (position, velocity, J[:, 6:]), strict=True):
                 near(np.array(x).squeeze(), expected, 1e-13)
-
-
-@every_pair
-def test_derivatives_of_its_state(name):
-    model = zoo.model(name)
-    q, v, _, tau = next(cases(model))
-    none, by = np.zeros((model.nv, model.nv)), model.forward_dynamics_derivatives(q, v, tau)
-    A, B = model.x_dot_derivatives(np.r_[q, v], tau)
-    np.testing.assert_array_equal(A[model.nv :], np.hstack(by[:2]))
-    np.testing.assert_array_equal(A[: model.nv], np.hstack([none, np.eye(model.nv)]))
-    np.testing.assert_array_equal(B, np.vstack([none, by[2]]))
+        none, by = np.zeros((model.nv, model.nv)), model.forward_dynamics_derivatives(q, v, tau)
+        A, B = model.x_dot_derivatives(np.r_[q, v], tau)
+        np.testing.assert_array_equal(A, np.block([[none, np.eye(model.nv)], [*by[:2]]]))
+        np.testing.assert_array_equal(B, np.vstack([none, by[2]]))
 
 
 def test_nothing_of_the_torso_is_there():
@@ -76,32 +61,15 @@ def test_nothing_of_the_torso_is_there():
 
 
 def test_a_fixed_base_costs_less():
-    """Of the lines of a free torso; weightless ones have no gravity in them."""
     shapes = Shape(), Shape(fixed=True), Shape(fixed=True, weightless=True)
     for name in ("mass_matrix", "bias_force", "forward_dynamics"):
         free, fixed, weightless = (
-            straight_line(
-                assemble(functions[name], Tail(2, 3, shape=shape)), "double", "x"
-            ).operations
-            for functions, shape in zip((FUNCTIONS, BASED, BASED), shapes, strict=True)
+            straight_line(assemble(of[name], Tail(2, 3, shape=shape)), "double", "x").operations
+            for of, shape in zip((FUNCTIONS, BASED, BASED), shapes, strict=True)
         )
         with row(name):
             assert free > 1.05 * fixed
             assert weightless <= fixed - (name != "mass_matrix")
-
-
-def test_the_table_of_functions_is_that_of_assemblies():
-    assert {*FIXED, *PARTS} - {"implicit", "rollout"} == set(BASED)
-    assert scene().functions == tuple(name for name in DEFAULT if name in FIXED)
-    assert set(scene(functions="all").functions) == set(FIXED)
-
-
-def scene(**keys):
-    """The scene of an arc on a fixed base."""
-    return parse_scene({"kind": "continuum", "segments": 1, "base": "fixed", **keys}, "bench")
-
-
-# ---- no weight -----------------------------------------------------------------------------------
 
 
 def test_without_weight_is_without_gravity():
@@ -120,24 +88,3 @@ def test_without_weight_is_without_gravity():
         near(getattr(model, function)(q, v, last), expected, 1e-12)
     with pytest.raises(st.ModelError, match="gravity"):
         model.with_parameters(gravity=9.8)
-
-
-def test_scenes_are_read_again_as_they_are():
-    found = scene(weightless=True)
-    assert parse_scene(scene_to_dict(found), "other") == found
-    plain = scene_to_dict(parse_scene({"kind": "continuum", "segments": 1}, "plain"))
-    assert not {"base", "weightless"} & plain.keys()
-
-
-def test_what_cannot_be_is_refused():
-    for keys, field in (
-        ({"base": "floating"}, "base"),
-        ({"weightless": 1}, "weightless"),
-        ({"contacts": ["tail"]}, "contacts"),
-        ({"functions": ["airborne_rates"]}, "functions"),
-        ({"parameters": {"torso_mass": 1}}, "parameters.torso_mass"),
-        ({"weightless": True, "parameters": {"gravity": 1}}, "parameters.gravity"),
-    ):
-        with row(field), pytest.raises(SceneError) as refused:
-            scene(**keys)
-        assert field in {problem.field for problem in refused.value.problems}, field

@@ -8,7 +8,6 @@ import pytest
 import serpentail as st
 from tests.mechanics.test_contact import LAWS, TAILS, each, near_ground, untilted
 from tests.references.contact import Contacts
-from tests.references.parameters import random_states
 from tests.support import zoo
 from tests.support.rows import row
 
@@ -69,35 +68,6 @@ def test_solution_is_that_of_the_dense_system(name, gains):
             with row(w, share):
                 np.testing.assert_allclose(found, expected, rtol=1e-8, atol=most)
     assert slides and refused <= 3, (slides, refused)
-
-
-@pytest.mark.parametrize("name", ["m1_n3", "arcs2", "mixed"])
-def test_in_flight_only_damping_and_gains_are_left(name):
-    model = zoo.model(name)
-    rng, damping = np.random.default_rng(2), np.linspace(1e-3, 2e-3, model.nv - 6)
-    nv, tail = model.nv, slice(6, None)
-    for q, v in zip(*random_states(model.segments, 3, 5, "random")[:2], strict=True):
-        H, r, w = model.mass_matrix(q), right_hand_side(model, rng, 0), 3e-3
-        acting = np.zeros((nv, 2 * nv))
-        acting[tail, 6:nv] = -4e4 * H[tail, tail]
-        acting[tail, nv + 6 :] = -400 * H[tail, tail] - np.diag(damping)
-        J = np.vstack([np.hstack([np.zeros((nv, nv)), np.eye(nv)]), np.linalg.solve(H, acting)])
-        expected = np.linalg.solve(np.eye(2 * nv) - w * J, np.concatenate(r))
-        found = solved(model, (q, v), damping, (4e4, 400.0), [w], r)
-        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-10 * np.abs(expected).max())
-
-
-def test_in_the_air_bristles_relax_and_nothing_else_happens():
-    model = zoo.model("ground")
-    q = np.array([0, 0, 5.0, 1, 0.2, 0, 0, 0.1, 0.2])
-    legs, rng = np.array([3.6, -0.3, 3.6, -0.3, 0, 0, 0, 0]), np.random.default_rng(1)
-    r = right_hand_side(model, rng, 20)
-    state = (q, rng.normal(size=8), rng.normal(size=20), legs)
-    w = 0.01
-    expected = np.concatenate([r[0] + w * r[1], r[1], r[2] / (1 + w / model.parameters["D_f"])])
-    np.testing.assert_allclose(
-        solved(model, state, np.zeros(2), (0, 0), (w, 1.0), r), expected, rtol=1e-14
-    )
 
 
 def refused(model, seed, w):

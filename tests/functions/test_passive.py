@@ -10,7 +10,7 @@ from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.cost import executed
 from serpentail_codegen.scene.passive import PASSIVE, PASSIVE_NAMES
-from tests.functions.test_columns import arguments, outputs
+from tests.functions.test_columns import assert_same
 from tests.references.metrics import block_error
 from tests.references.parameters import TABLE_1, random_states
 from tests.references.passive import PassiveTail
@@ -43,27 +43,21 @@ class Pair:
 def unequal(segments):
     """Return parameters of all passive parts, different ones for each coordinate."""
     rng, size = np.random.default_rng(17), 2 * segments
-    ranges = {
-        **{"tail_stiffness": (0.001, 0.01), "tail_rest": (-0.3, 0.3)},
-        **{"tail_damping": (1e-5, 1e-3), "tail_stop_lower": (-0.9, -0.2)},
-        **{"tail_stop_upper": (0.2, 0.9), "tail_stop_stiffness": (0.01, 0.1)},
-        "tail_stop_width": (0.02, 0.2),
-    }
+    ranges = {"tail_stiffness": (0.001, 0.01), "tail_rest": (-0.3, 0.3)}
+    ranges |= {"tail_damping": (1e-5, 1e-3), "tail_stop_lower": (-0.9, -0.2)}
+    ranges |= {"tail_stop_upper": (0.2, 0.9), "tail_stop_stiffness": (0.01, 0.1)}
+    ranges["tail_stop_width"] = 0.02, 0.2
     return {name: rng.uniform(*ends, size) for name, ends in ranges.items()}
 
 
 @pytest.fixture(scope="module", params=PAIRS)
 def pair(request):
-    """A passive tail and the same without its passive parts."""
     return Pair(request.param)
 
 
 def assert_near(found, expected, limit=1e-11):
     scale = np.abs(expected).max() or 1.0
     assert np.abs(np.asarray(found) - expected).max() <= limit * scale
-
-
-# ---- programs ------------------------------------------------------------------------------------
 
 
 def test_only_the_parts_of_a_scene_are_emitted():
@@ -83,72 +77,43 @@ def test_only_the_parts_of_a_scene_are_emitted():
 @pytest.mark.parametrize("form", ["lanes", "segments"])
 def test_every_form_has_the_same_acceleration(form):
     for name in ("forward_dynamics", "forward_dynamics_external"):
-        tail = Tail(3, 2, passive=PARTS)
-        plain, other = (assemble(CATALOGUE[name], tail, each) for each in ("composite", form))
-        given = arguments(plain) | {"tail_stop_lower": [-0.1] * 6, "tail_stop_upper": [0.1] * 6}
-        expected, found = outputs(plain, given)["v_dot"], outputs(other, given)["v_dot"]
-        assert plain != other
-        assert_near(found, expected, 1e-12)
+        assert_same(name, Tail(3, 2, passive=PARTS), form, 1e-12)
 
 
-# ---- models --------------------------------------------------------------------------------------
-
-
-def test_forces_and_torques_have_the_passive_forces(pair):
-    for q, v, v_dot, _ in pair.states():
+def test_dynamics_and_energy_have_the_passive_parts(pair):
+    for q, v, v_dot, tau in pair.states():
         force = np.r_[np.zeros(6), pair.force(q, v)]
-        for name, last in (
-            ("bias_force",) * 2,
-            ("bias_force_world",) * 2,
-            ("inverse_dynamics", v_dot),
+        for name, *given in (
+            ("bias_force", q, v),
+            ("bias_force_world", q, v),
+            ("inverse_dynamics", q, v, v_dot),
         ):
-            given = (q, v) if last is name else (q, v, last)
-            expected = getattr(pair.plain, name)(*given) + force
+            found, expected = (getattr(m, name)(*given) for m in (pair.elastic, pair.plain))
             with row(name):
-                assert block_error(getattr(pair.elastic, name)(*given), expected) < 1e-12
+                assert block_error(found, expected + force) < 1e-12
         wanted = v_dot[TAIL]
-        tau = pair.elastic.pfl(q, v, wanted)
-        assert_near(tau, pair.plain.pfl(q, v, wanted) + force[TAIL])
-        assert_near(pair.elastic.forward_dynamics(q, v, tau)[TAIL], wanted, 1e-9)
-
-
-def test_forward_dynamics_has_the_passive_forces(pair):
-    for q, v, _, tau in pair.states():
-        left = tau - pair.force(q, v)
-        expected = pair.plain.forward_dynamics(q, v, left)
-        assert block_error(pair.elastic.forward_dynamics(q, v, tau), expected) < 1e-10
-        load = np.linspace(-1, 1, 6 + 3 * len(pair.plain.tail_points(q)))
-        pushed = pair.plain.forward_dynamics(q, v, left, load)
-        assert block_error(pair.elastic.forward_dynamics(q, v, tau, load), pushed) < 1e-10
+        torques = pair.elastic.pfl(q, v, wanted)
+        assert_near(torques, pair.plain.pfl(q, v, wanted) + force[TAIL])
+        assert_near(pair.elastic.forward_dynamics(q, v, torques)[TAIL], wanted, 1e-9)
+        left, load = tau - force[TAIL], np.linspace(-1, 1, 6 + 3 * len(pair.plain.tail_points(q)))
+        for pushed in ((), (load,)):
+            expected = pair.plain.forward_dynamics(q, v, left, *pushed)
+            found = pair.elastic.forward_dynamics(q, v, tau, *pushed)
+            assert block_error(found, expected) < 1e-10
+        kinetic, potential = pair.plain.energy(q, v)
+        stored, found = pair.reference.energy(q[7:]), pair.elastic.energy(q, v)
+        assert found[0] == pytest.approx(kinetic, rel=1e-15) and stored > 0
+        assert found[1] == pytest.approx(potential + stored, rel=1e-13, abs=1e-15)
 
 
 def test_mujoco_with_these_torques_accelerates_alike():
     pytest.importorskip("mujoco")
     from tests.references.mujoco_chain import MujocoChain
 
-    pair = Pair("elastic")
-    peer = MujocoChain(TABLE_1, 2, 2)
+    pair, peer = Pair("elastic"), MujocoChain(TABLE_1, 2, 2)
     for q, v, _, tau in pair.states():
         expected = peer.forward_dynamics(q, v, tau - pair.force(q, v))
         assert block_error(pair.elastic.forward_dynamics(q, v, tau), expected) < 1e-9
-
-
-def test_energy_has_what_springs_and_stops_store(pair):
-    for q, v, _, _ in pair.states():
-        kinetic, potential = pair.plain.energy(q, v)
-        stored = pair.reference.energy(q[7:])
-        found = pair.elastic.energy(q, v)
-        assert found[0] == kinetic and stored > 0
-        assert found[1] == pytest.approx(potential + stored, rel=1e-13, abs=1e-15)
-
-
-def test_casadi_functions_mean_the_same(pair):
-    for q, v, v_dot, tau in pair.states(3):
-        for name, last in (("forward_dynamics", tau), ("inverse_dynamics", v_dot)):
-            found = getattr(pair.elastic.casadi, name)(q, v, last).full().ravel()
-            assert block_error(found, getattr(pair.elastic, name)(q, v, last)) < 1e-10
-        energies = pair.elastic.casadi.energy(q, v)
-        assert list(map(float, energies)) == pytest.approx(pair.elastic.energy(q, v), rel=1e-12)
 
 
 @pytest.mark.parametrize("gains", [(0.0, 0.0), (4e4, 400.0)], ids=["free", "tracked"])

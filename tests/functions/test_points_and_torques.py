@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 
-import serpentail as st
-from serpentail.simulation.pfl import Pfl
 from tests.references.contact import attitude, joints
 from tests.references.exact_chain import ExactChain
 from tests.references.exact_continuum import ExactContinuum
@@ -16,28 +14,20 @@ from tests.support.rows import row
 
 ROUNDINGS = 1e-14  # of the largest number; 45 times the eps of double
 every_tail = pytest.mark.parametrize("name", ["m1_n1", "m2_n2", "loops", "arcs2_loops", "polar"])
-every_form = pytest.mark.parametrize("name", ["m1_n3", "loops", "arcs3", "arcs2_loops"])
-
-
-# ---- the centre of mass --------------------------------------------------------------------------
 
 
 def reference_of(model):
     """The exact reference of a model."""
     if model.kind == "articulated":
         return ExactChain(dict(TABLE_1), model.segments, model.links)
-    return (ExactPolar if is_polar(model) else ExactContinuum)(dict(TABLE_1), model.segments)
-
-
-def is_polar(model):
-    """Tell if a tail is in polar angles."""
-    return model.manifest["scene"].get("coordinates") == "polar"
+    of = ExactPolar if model.name == "polar" else ExactContinuum
+    return of(dict(TABLE_1), model.segments)
 
 
 def states_of(model):
     """Arrays q, v of all kinds; polar angles theta are kept off 0, where they are singular."""
     q, v = (np.array([s[x] for _, s in of_every_kind(model)]) for x in ("q", "v"))
-    if is_polar(model):
+    if model.name == "polar":
         q[:, 8::2] = 0.05 + abs(q[:, 8::2])
     return q, v
 
@@ -58,17 +48,10 @@ def test_the_center_of_mass_is_that_of_the_exact_reference(name):
 
 
 @every_tail
-def test_it_moves_with_J_and_B_and_a_speed_of_B_costs_no_digits(name):
+def test_place_and_speed_of_B_add_to_the_centers_and_cost_no_digits(name):
     model = zoo.model(name)
     q, v = states_of(model)
     position, velocity, J = model.center_of_mass(q, v)
-    mass, scale = (
-        model.parameters["torso_mass"] + model.parameters["tail_mass"],
-        abs(velocity).max(),
-    )
-    np.testing.assert_allclose(velocity, np.einsum("kij,kj->ki", J, v), atol=ROUNDINGS * scale)
-    momentum = model.momentum(q, v)[0]
-    np.testing.assert_allclose(mass * velocity, momentum, atol=ROUNDINGS * mass * scale)
     q[:, :3] += [1, 2, 4]
     v[:, :3] += [8, 16, 32]
     further, faster, same = model.center_of_mass(q, v)
@@ -76,8 +59,6 @@ def test_it_moves_with_J_and_B_and_a_speed_of_B_costs_no_digits(name):
     np.testing.assert_allclose(faster - velocity, np.tile([8, 16, 32], (len(q), 1)), rtol=1e-14)
     assert np.array_equal(same, J)
 
-
-# ---- the joints of both legs ---------------------------------------------------------------------
 
 LEGS = {"L_h2d": 0.01, "L_d2k": 0.02, "L_k2a": 0.03, "L_a2m": 0.04, "L_m2t": 0.05}
 
@@ -101,22 +82,12 @@ def test_joints_are_those_of_the_reference():
         np.testing.assert_allclose(graph, place, rtol=0, atol=2e-14)
 
 
-def test_models_without_joints_say_what_to_add():
-    with pytest.raises(st.ModelError, match="leg_points"):
-        zoo.model("bare").leg_points(np.eye(9)[3], np.zeros(4))
-
-
-# ---- partial feedback linearisation --------------------------------------------------------------
-
-
-@every_form
-def test_the_tail_gets_the_accelerations_asked_for(name):
-    """Eqs. 44 to 46, in flight: torques are those of eliminating in H and C."""
+@pytest.mark.parametrize("name", ["m1_n3", "loops", "arcs3", "arcs2_loops"])
+def test_torques_of_the_tail_are_those_of_eliminating_the_torso(name):
+    """Eqs. 44 to 46, in flight, in H and C."""
     model = zoo.model(name)
     q, v, v_dot, _ = random_states(model.segments, 3, 20, "random")
     wanted, tau = v_dot[:, 6:], model.pfl(q, v, v_dot[:, 6:])
-    near = {"rtol": 1e-9, "atol": 1e-10 * np.abs(wanted).max()}
-    np.testing.assert_allclose(model.forward_dynamics(q, v, tau)[:, 6:], wanted, **near)
     same, found = model.kernel("tracked_dynamics")(q, v, wanted)
     np.testing.assert_array_equal(found[:, 6:], wanted)
     np.testing.assert_allclose(same, tau, rtol=1e-12, atol=1e-14)
@@ -129,35 +100,3 @@ def test_the_tail_gets_the_accelerations_asked_for(name):
     np.testing.assert_allclose(tau, expected, atol=1e-9 * np.abs(expected).max())
     graph = np.array(model.casadi.pfl(q[0], v[0], wanted[0])).ravel()
     np.testing.assert_allclose(graph, tau[0], rtol=1e-10)
-
-
-def test_torques_depend_on_neither_place_nor_attitude_nor_gravity():
-    model = zoo.model("m2_n2")
-    q, v, v_dot, _ = (rows[0] for rows in random_states(2, 3, 1, "random"))
-    tau = model.pfl(q, v, v_dot[6:])
-    q[:7], v[:3] = [5, 6, 7, 0.1, 0.2, 0.3, 0.4], [8, 9, 10]
-    assert np.array_equal(model.pfl(q, v, v_dot[6:]), tau)
-    assert np.array_equal(model.with_parameters(gravity=0).pfl(q, v, v_dot[6:]), tau)
-
-
-@pytest.mark.parametrize("name", ["m1_n3", "polar"])
-def test_tracking_gives_what_the_error_asks_for_with_and_without_it(name):
-    """Eqs. 44 to 46 with the gains of Table 1; polar coordinates have no pfl."""
-    model, target = zoo.model(name), np.array([0.2, 1.1])
-    assert ("pfl" in model.manifest["functions"]) == (name != "polar")
-    q, v, _, _ = (rows[0] for rows in random_states(1, 3, 1, "random"))
-    q[8] = 0.9  # a bend that polar coordinates allow
-    tau = Pfl(model, (np.linspace(0, 1, 9), np.tile(target, (9, 1))))(0.3, q, v)
-    wanted = 4e4 * (target - q[7:]) - 400 * v[6:]
-    np.testing.assert_allclose(model.forward_dynamics(q, v, tau)[6:], wanted, rtol=1e-8)
-
-
-@pytest.mark.filterwarnings("ignore::serpentail.UnusualSize")
-def test_under_a_torso_that_stays_a_link_needs_its_own_inertia():
-    """One link on a torso so heavy that it stays: tau = (I + m (L / 2)^2) alpha_ddot."""
-    model = zoo.model("m1_n1").with_parameters(torso_mass=1e9, torso_inertia=[1e9] * 3)
-    names = ("tail_mass", "tail_length", "link_inertia")
-    m, length, inertia = (model.parameters[name] for name in names)
-    tau = model.pfl([0, 0, 0, 1, 0, 0, 0, 0, 0], np.zeros(8), [3.0, 5.0])
-    expected = np.array([3, 5]) * (np.array(inertia)[[0, 2]] + m * length**2 / 4)
-    np.testing.assert_allclose(tau, expected, rtol=1e-9)

@@ -2,8 +2,6 @@
 another.
 """
 
-from fractions import Fraction
-
 import pytest
 
 from serpentail_codegen.autodiff.forward import tangent_program
@@ -53,7 +51,7 @@ def diamond():
     return b.finish()
 
 
-def test_dependence_goes_both_ways():
+def test_dependence_goes_both_ways_and_around_loops():
     body = diamond().body
     forward = {"x": "x p q w u", "q": "q w", "mass": "mass"}  # a step is one: it may take x to u
     backward = {"w": "w p q x mass", "u": "u y"}  # an output that is not wanted needs nothing
@@ -62,15 +60,12 @@ def test_dependence_goes_both_ways():
             with row(slice_of.__name__, start):
                 assert slice_of(body, {start}) == set(reached.split())
 
-
-def test_dependence_goes_around_loops():
     b, _mass, x, _y, u, _w = built()
     s, t = b.array("s", 1), b.array("t", 1)
-    b.fill(s[0], 0)
     with b.loop("i", 3) as i:
+        b.copy(u[i], t[0])
         b.copy(t[0], s[0])
         b.copy(s[0], x[i])
-        b.copy(u[i], t[0])
     assert "u" in forward_slice(b.finish().body, {"x"})
     assert "x" in backward_slice(b.finish().body, {"u"})
 
@@ -147,24 +142,25 @@ def outer():
     return b, b.array("a", 1, 3, "input"), b.array("y", 1, 3, "input"), b.array("z", 1, 3, "output")
 
 
-def given_to(outer, inner):
-    """The outputs of an outer program, whose a is the inner one's x."""
-    given = numbers(inner)
-    return outputs(outer, {"mass": given["mass"], "a": given["x"], "y": given["y"]})
-
-
-def test_called_program_means_the_same():
+def test_called_programs_mean_the_same_and_have_arrays_of_their_own_each_time():
+    """In a loop, and one call after the other: the outputs of all are summed up."""
     for name in sorted(PROGRAMS.keys() - {"columns"}):
-        inner = PROGRAMS[name]
-        b, a, y, z = outer()
-        s, w = b.array("s", 1), b.array("w", 1, role="output")
+        inner, (b, a, y, z) = PROGRAMS[name], outer()
+        s, w, total = b.array("s", 1), b.array("w", 1), b.array("total", 1, role="output")
         b.fill(s[0], 7)
-        b.call(inner, x=a, y=y, u=z, w=w)
-        b.copy(w[0], s[0], adds=True)  # the inner program's own s is another
-        expected = outputs(inner, numbers(inner))
+        b.fill(total[0], 0)
+        for times in (2, 1, 1):
+            with b.loop("l", times):
+                b.call(inner, x=a, y=y, u=z, w=w)
+                b.copy(total[0], w[0], adds=True)
+        b.copy(total[0], s[0], adds=True)  # the inner program's own s is another
+        names = [array.name for array in dataflow.inlined(b.finish()).arrays]
+        given = numbers(inner)
+        expected = outputs(inner, given)
+        found = outputs(b.finish(), {"mass": given["mass"], "a": given["x"], "y": given["y"]})
         with row(name):
-            found = given_to(b.finish(), inner)
-            assert found == {"z": expected["u"], "w": [expected["w"][0] + 7]}
+            assert len(names) == 7 + 3 * sum(array.role == "local" for array in inner.arrays)
+            assert found == {"z": expected["u"], "total": [4 * expected["w"][0] + 7]}
 
 
 def test_called_names_carry_the_programs_name():
@@ -183,30 +179,3 @@ def test_arguments_that_are_not_bound_are_named():
         bound = {name: array for name, array in given.items() if name != left_out}
         with row(left_out), pytest.raises(ValueError, match=f"^nest in outer: {role} {left_out} "):
             b.call(PROGRAMS["nested"], **bound)
-
-
-def test_what_is_called_several_times_has_arrays_of_its_own_each_time():
-    """In a loop, and one call after the other: the outputs of all are summed up."""
-    for name in ("accumulators", "nested"):
-        inner, (b, a, y, z) = PROGRAMS[name], outer()
-        w, total = b.array("w", 1), b.array("total", 1, role="output")
-        b.fill(total[0], 0)
-        for times in (2, 1, 1):
-            with b.loop("l", times):
-                b.call(inner, x=a, y=y, u=z, w=w)
-                b.copy(total[0], w[0], adds=True)
-        names = [array.name for array in dataflow.inlined(b.finish()).arrays]
-        with row(name):
-            own = sum(array.role == "local" for array in inner.arrays)
-            assert len(names) == 6 + 3 * own
-            expected = outputs(inner, numbers(inner))["w"][0]
-            assert given_to(b.finish(), inner)["total"] == [4 * expected]
-
-
-def test_parameters_are_shared():
-    b, a, y, z = outer()
-    b.call(PROGRAMS["carry_up"], x=a, y=y, u=z, w=b.array("w", 1))
-    program = b.finish()
-    assert [array.name for array in program.of_role("parameters")] == ["mass"]
-    given = {"mass": [Fraction(3)], "a": [Fraction(0)] * 3, "y": [Fraction(1)] * 3}
-    assert outputs(program, given)["z"] == [1, 1, 1]

@@ -103,17 +103,12 @@ def assert_normal(nodes):
         assert below != ["const", "const"] and (op != "neg" or below != ["sub"])
 
 
-def test_same_operations_and_equal_constants_are_one_node(tape):
-    for op in UNARY + BINARY:
-        arguments = (2, 1) if op in BINARY else (2,)
-        node, size = getattr(tape, op)(*arguments), len(tape.nodes)
-        assert getattr(tape, op)(*arguments) == node == size - 1 and len(tape.nodes) == size
+def test_equal_constants_are_one_node(tape):
     assert len({tape.const(value) for value in (1, 1.0, Fraction(1), True)}) == 1
     assert len({tape.const(value) for value in (0, 0.0, -0.0)}) == 1
     assert tape.const(0.5) == tape.const(Fraction(1, 2))
     assert isinstance(tape.value(tape.const(3.0)), int)
     assert tape.const(Fraction(1, 3)) != tape.const(1 / 3)
-    assert tape.value(tape.const(-2.5)) == -2.5
     assert [tape.value(node) for node in (0, tape.neg(0), tape.add(0, 1))] == [None] * 3
 
 
@@ -124,27 +119,9 @@ def test_zero_and_one_vanish(tape):
     assert tape.mul(a, zero) == tape.mul(zero, a) == tape.div(zero, a) == tape.sub(a, a) == zero
     assert tape.sub(zero, a) == tape.mul(a, less) == tape.div(a, less) == tape.neg(a)
     assert tape.sin(zero) == tape.sqrt(zero) == zero and tape.cos(zero) == tape.sqrt(one) == one
-    for op in ("sin", "cos", "sqrt"):  # of other constants are left to the target
-        four = tape.const(4)
-        assert tape.nodes[getattr(tape, op)(four)] == (op, four)
     for numerator in (a, zero, one):
         with pytest.raises(ZeroDivisionError, match="zero"):
             tape.div(numerator, zero)
-
-
-def test_negation_moves_outward(tape):
-    a, b, minus_a, minus_b = 0, 1, tape.neg(0), tape.neg(1)
-    assert tape.neg(minus_a) == a
-    assert tape.neg(tape.sub(a, b)) == tape.sub(b, a)
-    assert tape.add(a, minus_b) == tape.add(minus_b, a) == tape.sub(a, b)
-    assert tape.add(minus_a, minus_b) == tape.sub(minus_a, b) == tape.neg(tape.add(a, b))
-    assert tape.sub(a, minus_b) == tape.add(a, b)
-    assert tape.sub(minus_a, minus_b) == tape.sub(b, a)
-    for op in (tape.mul, tape.div):
-        assert op(minus_a, b) == op(a, minus_b) == tape.neg(op(a, b))
-        assert op(minus_a, minus_b) == op(a, b)
-    assert tape.sin(minus_a) == tape.neg(tape.sin(a))
-    assert tape.cos(minus_a) == tape.cos(a)
 
 
 def test_selection_folds_where_the_choice_is_known_or_makes_no_difference(tape):
@@ -173,25 +150,7 @@ def test_operations_are_as_wide_as_their_operands(tape):
         tape.placed(wide, 0, 3, 1)
 
 
-def test_commutative_operands_are_ordered_and_nothing_else_is_rearranged(tape):
-    a, b, c, two = 0, 1, 2, tape.const(2)
-    for op in (tape.add, tape.mul):
-        assert op(3, 1) == op(1, 3) and tape.nodes[op(3, 1)][1:] == (1, 3)
-        assert op(op(a, b), c) != op(a, op(b, c))
-    assert tape.sub(3, 1) != tape.sub(1, 3) and tape.div(3, 1) != tape.div(1, 3)
-    assert tape.mul(a, tape.add(b, c)) != tape.add(tape.mul(a, b), tape.mul(a, c))
-    assert tape.mul(tape.div(a, b), b) != a and tape.sub(tape.add(a, b), b) != a
-    assert tape.mul(two, tape.mul(two, a)) != tape.mul(tape.const(4), a)
-
-
-def test_constants_fold_exactly(tape):
-    third, half = tape.div(tape.const(1), tape.const(3)), tape.const(Fraction(1, 2))
-    assert tape.value(third) == Fraction(1, 3)
-    assert tape.value(tape.add(third, half)) == Fraction(5, 6)
-    assert tape.value(tape.sub(third, half)) == Fraction(-1, 6)
-    assert tape.value(tape.mul(third, tape.const(3))) == 1
-    assert tape.value(tape.div(half, third)) == Fraction(3, 2)
-    assert tape.value(tape.div(tape.const(1.0), tape.const(3.0))) == Fraction(1, 3)
+def test_constants_fold_exactly():
     assert exact_quotient(1, 3) == Fraction(1, 3) and exact_quotient(1.0, 3) == 1 / 3
     assert exact_quotient(1, 3.0) == 1 / 3 and FLOATS.const(Fraction(1, 3)) == 1 / 3
     with mpmath.workdps(50):  # divided in the arithmetic of the run

@@ -38,11 +38,8 @@ def vee(S):
 
 def rotation(axis, angle):
     """Rodrigues' formula."""
-    return (
-        sympy.cos(angle) * eye(3)
-        + sympy.sin(angle) * skew(axis)
-        + (1 - sympy.cos(angle)) * axis * axis.T
-    )
+    c, s = sympy.cos(angle), sympy.sin(angle)
+    return c * eye(3) + s * skew(axis) + (1 - c) * axis * axis.T
 
 
 @cache
@@ -75,19 +72,12 @@ def moved(point, scale, R, vector):
 
 
 class Body(SimpleNamespace):
-    """A rigid body in motion: mass, principal inertia about the COM, and jets of R, its joint and
-    its COM.
-    """
+    """A rigid body: mass, principal inertia about the COM, and jets of R, its joint and its COM."""
 
     @property
     def omega(self):
         """Angular velocity in its own axes: R^T R_dot = skew(omega)."""
         return vee(self.R[0].T * self.R[1])
-
-    @property
-    def omega_dot(self):
-        """Time derivative of omega."""
-        return vee(self.R[0].T * self.R[2] + self.R[1].T * self.R[1])
 
     @property
     def spin(self):
@@ -97,7 +87,8 @@ class Body(SimpleNamespace):
     @property
     def spin_rate(self):
         """Time derivative of spin."""
-        return self.R[1] * self.inertia * self.omega + self.R[0] * self.inertia * self.omega_dot
+        omega_dot = vee(self.R[0].T * self.R[2] + self.R[1].T * self.R[1])
+        return self.R[1] * self.inertia * self.omega + self.R[0] * self.inertia * omega_dot
 
 
 class State(SimpleNamespace):
@@ -111,22 +102,14 @@ class State(SimpleNamespace):
 
         names = ("gravity", "torso_mass", "tail_mass", "tail_length")
         parameters = {name: numbers(1, 1) for name in names}
-        parameters |= {
-            "torso_inertia": numbers(3, 1),
-            "tail_mount": numbers(3),
-            "link_inertia": numbers(3, 1),
-        }
-        tail = Tail(m, n)
+        parameters |= {name: numbers(3, 1) for name in ("torso_inertia", "link_inertia")}
+        parameters["tail_mount"], tail = numbers(3), Tail(m, n)
         super().__init__(tail=tail, parameters=parameters, p=numbers(3), quaternion=numbers(4, 1))
-        self.halves, self.tau, self.f_ext = (
-            numbers(2 * m),
-            numbers(2 * m),
-            numbers(6 + 3 * (tail.total + 1)),
-        )
+        self.halves, self.tau = numbers(2 * m), numbers(2 * m)
+        self.f_ext = numbers(6 + 3 * (tail.total + 1))
         self.v, self.v_dot = numbers(tail.nv), numbers(tail.nv)
         self.mass, self.length = (
-            parameters["tail_mass"][0] / tail.total,
-            parameters["tail_length"][0] / tail.total,
+            parameters[name][0] / tail.total for name in ("tail_mass", "tail_length")
         )
 
     @property
@@ -136,10 +119,6 @@ class State(SimpleNamespace):
         own = {"q": q, "v": self.v, "v_dot": self.v_dot, "tau": self.tau, "f_ext": self.f_ext}
         return {name: list(values) for name, values in (self.parameters | own).items()}
 
-    def tail_vector(self, v, segment):
-        """The two entries of a velocity or acceleration that belong to a segment."""
-        return v[6 + 2 * segment : 8 + 2 * segment, :]
-
     def bodies(self, v=None, v_dot=None):
         """Torso and links, moving at v and v_dot (Eqs. 11 to 15 and their derivatives)."""
         v, v_dot = (zeros(self.tail.nv, 1) if x is None else x for x in (v, v_dot))
@@ -147,29 +126,19 @@ class State(SimpleNamespace):
         R = [R, R * spin, R * (spin * spin + skew(v_dot[3:6, :]))]
         p = [self.p, v[0:3, :], v_dot[0:3, :]]
         mount = moved(p, 1, R, self.parameters["tail_mount"])
-        inertia = diag(*self.parameters["torso_inertia"])
-        found = [
-            Body(
-                mass=self.parameters["torso_mass"][0],
-                inertia=inertia,
-                R=R,
-                joint=p,
-                com=p,
-                end=mount,
-            )
-        ]
+        torso, link = (diag(*self.parameters[f"{of}_inertia"]) for of in ("torso", "link"))
+        mass = self.parameters["torso_mass"][0]
+        found = [Body(mass=mass, inertia=torso, R=R, joint=p, com=p, end=mount)]
         for g in range(self.tail.total):
             i, parent = g // self.tail.links, found[-1]
-            halves = self.halves[2 * i : 2 * i + 2]
-            R = product(
-                parent.R, joint_turn(halves, self.tail_vector(v, i), self.tail_vector(v_dot, i))
-            )
+            own = slice(6 + 2 * i, 8 + 2 * i)
+            turn = joint_turn(self.halves[2 * i : 2 * i + 2], v[own, :], v_dot[own, :])
+            R = product(parent.R, turn)
             com, end = (
                 moved(parent.end, -part * self.length, R, Y) for part in (Rational(1, 2), 1)
             )
-            inertia = diag(*self.parameters["link_inertia"])
             found.append(
-                Body(mass=self.mass, inertia=inertia, R=R, joint=parent.end, com=com, end=end)
+                Body(mass=self.mass, inertia=link, R=R, joint=parent.end, com=com, end=end)
             )
         return found
 
@@ -179,23 +148,21 @@ class State(SimpleNamespace):
 
     def mass_matrix(self):
         """H from twice the kinetic energy as a quadratic form."""
-        columns = self.columns()
-        return Matrix(
-            self.tail.nv, self.tail.nv, lambda k, other: kinetic_form(columns[k], columns[other])
-        )
+        nv, columns = self.tail.nv, self.columns()
+        return Matrix(nv, nv, lambda k, other: kinetic_form(columns[k], columns[other]))
 
     def force(self, v_dot):
         """H v_dot + C by virtual work (d'Alembert)."""
         bodies, lift = self.bodies(self.v, v_dot), self.parameters["gravity"][0] * Z
-        return Matrix(
-            [
-                sum(
-                    b.mass * (b.com[2] + lift).dot(c.com[1]) + b.spin_rate.dot(c.R[0] * c.omega)
-                    for b, c in zip(bodies, column, strict=True)
-                )
-                for column in self.columns()
-            ]
-        )
+
+        def work(column):
+            pairs = zip(bodies, column, strict=True)
+            return sum(
+                b.mass * (b.com[2] + lift).dot(c.com[1]) + b.spin_rate.dot(c.R[0] * c.omega)
+                for b, c in pairs
+            )
+
+        return Matrix([work(column) for column in self.columns()])
 
     def point_jacobian(self):
         """d(tail points)/dt = J v, a row for each of x, y, z of each point."""
@@ -215,10 +182,8 @@ def kinetic_form(some, others):
 def run(name, state):
     """Run a function's program on exact numbers; return its outputs as columns."""
     p = assemble(FUNCTIONS[name], state.tail)
-    names = {array.name for array in (*p.of_role("parameters"), *p.of_role("input"))}
-    found = Run(
-        p, EXACT, {name: values for name, values in state.arguments.items() if name in names}
-    ).values
+    names = [array.name for array in (*p.of_role("parameters"), *p.of_role("input"))]
+    found = Run(p, EXACT, {name: state.arguments[name] for name in names}).values
     return {array.name: Matrix(found[array.name]) for array in p.of_role("output")}
 
 

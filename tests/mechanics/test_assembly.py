@@ -12,23 +12,15 @@ def state(request):
     return State(*request.param, seed=7)
 
 
-def world_map(state):
-    """(p_dot, omega body, q_t_dot) to (p_dot, omega world, q_t_dot)."""
-    return diag(eye(3), state.bodies()[0].R[0], eye(state.tail.nt))
-
-
-def test_mass_matrix_is_the_form_of_kinetic_energy(state):
+def test_mass_matrix_is_the_form_of_kinetic_energy_and_forces_are_virtual_work(state):
     nv, H = state.tail.nv, state.mass_matrix()
     assert Matrix(nv, nv, list(run("mass_matrix", state)["H"])) == H
-    to_world = world_map(state)
+    to_world = diag(eye(3), state.bodies()[0].R[0], eye(state.tail.nt))
     assert Matrix(nv, nv, list(run("mass_matrix_world", state)["H"])) == to_world * H * to_world.T
-
-
-def test_inverse_dynamics_is_virtual_work(state):
     assert run("inverse_dynamics", state)["force"] == state.force(state.v_dot)
-    C = state.force(zeros(state.tail.nv, 1))
+    C = state.force(zeros(nv, 1))
     assert run("bias_force", state)["force"] == C
-    assert run("bias_force_world", state)["force"] == world_map(state) * C
+    assert run("bias_force_world", state)["force"] == to_world * C
 
 
 def test_forward_dynamics_solves_the_equations_of_motion(state):
@@ -36,19 +28,14 @@ def test_forward_dynamics_solves_the_equations_of_motion(state):
     assert state.force(run("forward_dynamics", state)["v_dot"]) == tau
     J, f = state.point_jacobian(), state.f_ext
     at_torso = Matrix.vstack(f[:6, :], zeros(state.tail.nt, 1))
-    assert (
-        state.force(run("forward_dynamics_external", state)["v_dot"])
-        == tau + at_torso + J.T * f[6:, :]
-    )
+    pushed = run("forward_dynamics_external", state)["v_dot"]
+    assert state.force(pushed) == tau + at_torso + J.T * f[6:, :]
 
 
 def test_tail_points_and_their_jacobians(state):
     points = Matrix.vstack(*(body.end[0] for body in state.bodies()))
     assert run("tail_points", state)["points"] == points
-    J = Matrix(
-        3 * (state.tail.total + 1), state.tail.nv, list(run("tail_point_jacobians", state)["J"])
-    )
-    assert state.point_jacobian() == J
+    assert list(state.point_jacobian()) == list(run("tail_point_jacobians", state)["J"])
 
 
 def test_energy_and_momentum_are_sums_over_bodies(state):

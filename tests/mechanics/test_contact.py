@@ -12,7 +12,6 @@ from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.targets.c.loops import in_loops
 from serpentail_codegen.targets.c.straight import straight_line
-from tests.c.target.emitted import C99, compiled
 from tests.references.contact import Contacts, attitude
 from tests.references.parameters import random_states
 from tests.support import zoo
@@ -20,8 +19,6 @@ from tests.support.rows import row
 
 LAWS = ["ground", "box", "smooth", "paper"]  # all laws of friction on one tail
 TAILS = ["ground_m2_n2", "ground_arcs", "ground_mixed"]
-every_model = pytest.mark.parametrize("name", [*LAWS, *TAILS])
-every_law = pytest.mark.parametrize("name", LAWS)
 UPRIGHT = np.array([0, 0, 0, 1.0, 0, 0, 0, 0, 0])
 
 
@@ -32,16 +29,13 @@ def untilted(name):
 
 
 def near_ground(model, seed, count=20):
-    """Random states with the torso about as high as the legs are long: some points touch, some do
-    not.
-    """
+    """Random states with the torso about as high as the legs are long: some points touch."""
     rng = np.random.default_rng(seed)
     q, v, _, tau = random_states(model.segments, seed, count, "random")
     q[:, 2] = rng.uniform(-0.05, 0.15, count)
     q[:, 7:] *= 0.5
-    legs = rng.uniform(
-        [3, -1.5, 3, -1.5, -80, -80, -80, -80], [4.2, 0, 4.2, 0, 80, 80, 80, 80], (count, 8)
-    )
+    lowest, highest = [3, -1.5, 3, -1.5, *[-80] * 4], [4.2, 0, 4.2, 0, *[80] * 4]
+    legs = rng.uniform(lowest, highest, (count, 8))
     points = sum(entry["count"] for entry in model.manifest["contacts"])
     return q, v, tau, rng.normal(0, 2e-3, (count, 2 * points)), legs
 
@@ -49,9 +43,6 @@ def near_ground(model, seed, count=20):
 def each(model, seed=3, count=20):
     """The same, one by one."""
     return zip(*near_ground(model, seed, count), strict=True)
-
-
-# ---- points --------------------------------------------------------------------------------------
 
 
 def test_legs_have_the_numbers_of_the_mechanism():
@@ -69,19 +60,14 @@ def test_legs_have_the_numbers_of_the_mechanism():
         assert abs(found[1, 2] - found[2, 2]) < 1e-17
 
 
-def test_points_of_the_tail_are_those_of_its_kinematics():
-    """Also on a tilted mount."""
-    for name in ("ground_m2_n2", "ground_arcs", "ground_mixed"):
-        model = zoo.model(name)
-        tail = slice(6, 6 + model.contacts["tail"])
-        for q, v, _, _, legs in each(model, count=3):
-            positions, velocities = model.contact_points(q, v, legs)
-            with row(name):
-                points = model.tail_points(q)[1:]
-                np.testing.assert_allclose(positions[tail], points, atol=1e-14)
-                moving = (model.tail_point_jacobians(q) @ v).reshape(-1, 3)[1:]
-                scale = np.abs(moving).max()
-                np.testing.assert_allclose(velocities[tail], moving, atol=1e-13 * scale)
+def test_points_of_a_tail_on_a_tilted_mount_are_those_of_its_kinematics():
+    model = zoo.model("ground_mixed")
+    tail = slice(6, 6 + model.contacts["tail"])
+    for q, v, _, _, legs in each(model, count=3):
+        positions, velocities = model.contact_points(q, v, legs)
+        np.testing.assert_allclose(positions[tail], model.tail_points(q)[1:], atol=1e-14)
+        moving = (model.tail_point_jacobians(q) @ v).reshape(-1, 3)[1:]
+        np.testing.assert_allclose(velocities[tail], moving, atol=1e-13 * np.abs(moving).max())
 
 
 def test_the_torso_touches_by_its_lowest_point():
@@ -97,10 +83,7 @@ def test_the_torso_touches_by_its_lowest_point():
         assert np.sum((place / axes) ** 2) == pytest.approx(1, rel=1e-12)
 
 
-# ---- forces --------------------------------------------------------------------------------------
-
-
-@every_model
+@pytest.mark.parametrize("name", [*LAWS, *TAILS])
 def test_points_forces_powers_and_accelerations_are_the_references(name):
     """Eqs. 35 to 37, and the residual of H v_dot + C = [0; tau] + J^T f; a drive of the legs works
     against the ground's force on what it moves in the torso.
@@ -137,111 +120,40 @@ def test_points_forces_powers_and_accelerations_are_the_references(name):
     assert touched > 20 and driven > 1
 
 
-def test_a_leg_that_stretches_against_the_ground_does_work():
-    model = zoo.model("feet")
-    legs = np.radians([210, -15, 210, -15, 0, 0, 0, 0])
-    foot = model.contact_points(UPRIGHT, np.zeros(8), legs)[0]
-    q = UPRIGHT - [0, 0, foot[:, 2].min() + 0.002, 0, 0, 0, 0, 0, 0]
-    for rate in (-1.0, 1.0):
-        legs[[5, 7]] = rate
-        falling = model.contact_points(q, np.zeros(8), legs)[1][1, 2] < 0
-        *_, powers = model.kernel("contact_rates")(q, np.zeros(8), np.zeros(2), np.zeros(12), legs)
-        assert (powers[1] > 0) == falling == (rate < 0)
-
-
-def test_flight_is_contact_dynamics_high_up():
-    model = zoo.model("ground")
-    q, v, tau, bristles, legs = (rows[0] for rows in near_ground(model, 3, 1))
-    q[2] = 10.0
-    v_dot, rates, forces = model.contact_dynamics(q, v, tau, bristles, legs)
-    np.testing.assert_allclose(v_dot, model.forward_dynamics(q, v, tau), rtol=1e-12)
-    np.testing.assert_allclose(rates, -bristles / model.parameters["D_f"], rtol=1e-12)
-    assert not forces.any()
-
-
-def test_parameters_reach_the_compiled_function():
-    model = zoo.model("feet").with_parameters(mu=0.0, hip=(0.1, 0.2, 0.3))
-    legs, q, v = np.radians([210, -15, 210, -15, 0, 0, 0, 0]), UPRIGHT.copy(), np.eye(8)[0]
-    q[2], v[1] = -0.27, 1.0
-    _, _, forces = model.contact_dynamics(q, v, np.zeros(2), np.zeros(12), legs)
-    assert forces[:, 2].max() > 0 and not forces[:, :2].any()
-    assert model.contact_points(q, v, legs)[0][:, 0].tolist() == [0.1] * 3 + [-0.1] * 3
-
-
-# ---- the other targets ---------------------------------------------------------------------------
-
-
-@every_law
-def test_operations_are_those_of_the_functions(name):
-    model = zoo.model(name)
-    for state in each(model, count=5):
-        q, v, *_, legs = state
-        for function, given in (("contact_dynamics", state), ("contact_points", (q, v, legs))):
-            expected = getattr(model, function)(*given)
-            for one, other in zip(getattr(model.casadi, function)(*given), expected, strict=True):
-                most = 1e-9 * (1 + np.abs(other).max())
-                scalars = np.array(one).reshape(other.shape)
-                np.testing.assert_allclose(scalars, other, atol=most)
-
-
-@every_law
-def test_derivatives_are_numbers_in_the_air_and_right_on_the_ground(name):
-    """CasADi's derivatives of the operations against central differences of the compiled
-    function.
-    """
+@pytest.mark.parametrize("name", LAWS)
+def test_operations_and_their_derivatives_are_those_of_the_functions(name):
+    """By CasADi; slopes by central differences of the compiled function, and finite in the air."""
     model = zoo.model(name)
     f = model.casadi.contact_dynamics
     symbols = [casadi.MX.sym(name, f.size1_in(name)) for name in f.name_in()]
     slope = casadi.Function("slope", symbols, [casadi.jacobian(f(*symbols)[0], symbols[1])])
     units = 1e-5 * np.eye(model.nv)
-    for q, v, *others in each(model, count=6):
-        exact = np.array(slope(q, v, *others))
+    for state in each(model, count=6):
+        q, v, *others = state
+        for function, given in (
+            ("contact_dynamics", state),
+            ("contact_points", (q, v, others[-1])),
+        ):
+            expected = getattr(model, function)(*given)
+            for one, other in zip(getattr(model.casadi, function)(*given), expected, strict=True):
+                scalars, most = np.array(one).reshape(other.shape), 1e-9 * (1 + np.abs(other).max())
+                np.testing.assert_allclose(scalars, other, atol=most)
+        exact = np.array(slope(*state))
         ahead, behind = (
             model.contact_dynamics(q, v + side * units, *others)[0] for side in (1, -1)
         )
         most = 1e-5 * np.abs(exact).max()
         np.testing.assert_allclose(exact, (ahead - behind).T / 2e-5, rtol=1e-3, atol=most)
-    high = q + np.eye(model.nq)[2]
-    assert np.isfinite(np.array(slope(high, v, *others))).all()
+    assert np.isfinite(np.array(slope(q + np.eye(model.nq)[2], v, *others))).all()
 
 
 def test_a_flight_pays_nothing_for_contact():
     """Functions of a flight scene have the same C in a scene with contacts."""
     for name in ("mass_matrix", "forward_dynamics"):
+        flight, ground = (Tail(2, 2, contacts=contacts) for contacts in ((), ("feet",)))
         for printed in (straight_line, in_loops):
-            flight, ground = (
-                printed(assemble(FUNCTIONS[name], Tail(2, 2, contacts=contacts)), "double", "x")
-                for contacts in ((), ("feet",))
-            )
-            assert flight.lines == ground.lines, (name, printed)
-
-
-def test_single_precision_is_single_precision():
-    model, exact = zoo.model("single_ground"), zoo.model("ground")
-    for q, v, *others in each(model, count=5):
-        state = q, 0.1 * v, *others
-        found, expected = (m.contact_dynamics(*state) for m in (model, exact))
-        for one, other in zip(found, expected, strict=True):
-            most = 1e-4 * (1 + np.abs(other).max())
-            np.testing.assert_allclose(one, other, rtol=1e-3, atol=most)
-
-
-@pytest.mark.parametrize("name", ["single_ground", "ground_arcs"])
-def test_compiles_without_a_warning(tmp_path, name):
-    folder = zoo.folder(name)
-    for source in (f"src/{folder.name}.c", f"src/{folder.name}_host.c", "example/main.c"):
-        compiled(tmp_path, folder / source, *C99, "-fsyntax-only")
-
-
-def test_the_manifest_names_the_points():
-    model = zoo.model("ground")
-    groups = [(entry["group"], entry["count"]) for entry in model.manifest["contacts"]]
-    assert groups == [("feet", 6), ("tail", 3), ("torso", 1)]
-    assert "GROUND_CONTACTS = 10 " in (model.folder / "include" / "ground.h").read_text()
-    assert zoo.model("m1_n3").contacts == {}
-
-
-# ---- misuse --------------------------------------------------------------------------------------
+            texts = [printed(assemble(FUNCTIONS[name], t), "double", "x") for t in (flight, ground)]
+            assert texts[0].lines == texts[1].lines, (name, printed)
 
 
 def test_what_is_given_must_fit_the_contacts():
