@@ -81,12 +81,6 @@ def test_the_books_of_drops_balance(method):
     check_drops(method, 4)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("method", ["ros34pw2", "tsit5"])
-def test_the_books_of_many_drops_balance(method):
-    check_drops(method, 300)
-
-
 def check_drops(method, count):
     model = grounded()
     for rtol in METHODS[method]:

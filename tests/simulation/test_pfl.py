@@ -30,18 +30,6 @@ def test_tail_accelerations_are_those_commanded():
             np.testing.assert_allclose(v_dot[6:], expected, rtol=1e-8, err_msg=model.name)
 
 
-def test_torques_are_those_of_the_papers_formula():
-    """Eq. 46 as it stands: X^+ (S H^-1 C + ...), X = S H^-1 J_ta."""
-    model = zoo.model("m2_n2")
-    law = st.Pfl(model, (np.linspace(0, 1, 9), np.zeros((9, 4))), feedforward=False)
-    q, v, _, _ = (rows[0] for rows in random_states(2, 1, 1, "random"))
-    H, C = model.mass_matrix(q), model.bias_force(q, v)
-    S = np.eye(model.nv)[6:]
-    X = S @ np.linalg.solve(H, S.T)
-    expected = np.linalg.pinv(X) @ (S @ np.linalg.solve(H, C) - KD * v[6:] - KP * q[7:])
-    np.testing.assert_allclose(law(0.5, q, v), expected, rtol=1e-8)
-
-
 def test_functions_that_the_model_lacks_are_named_at_once_or_made_of_others():
     with pytest.raises(st.ModelError, match=r"without .*'inverse_dynamics'"):
         st.Pfl(zoo.model("bare"), STILL)

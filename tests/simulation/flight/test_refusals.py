@@ -48,6 +48,7 @@ SETTINGS = [
     ({"step": 1e-6, "rtol": 1e-6}, "rk4 .*'rtol'"),
     ({"method": "dop853", "step": 1}, "dop853 .*'step'.*rtol, atol, output_step"),
     ({"stp": 1}, "'stp'"),
+    *(({"watch": watch}, "watch: value ") for watch in (3, "print")),
     ({"output_step": 1e-8, "t_span": 1}, "more than 10000000 samples: give 1e-07 s"),
     ({"output_step": 1e-11, "t_span": (1e6, 1e6 + 1e-9)}, "too short to move the time"),
     *(({name: [1]}, f"^{name} .*no contacts") for name in ("legs", "bristles0", "stop_at")),

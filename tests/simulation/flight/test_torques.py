@@ -57,31 +57,11 @@ def test_a_table_is_linear_in_between_and_held_outside(damping):
         np.testing.assert_allclose(user.q, flight.q, rtol=0, atol=1e-9)
 
 
-def test_a_table_of_one_node_is_a_constant():
-    for node in (-1.0, 0.05, 7.0):
-        flight = fly(controller=st.TorqueTable([node], TORQUES[:1]), t_span=0.1)
-        np.testing.assert_array_equal(flight.tau, np.broadcast_to(TORQUES[0], flight.tau.shape))
-
-
 def test_a_table_beyond_numbers_is_refused_without_a_warning():
     for size in (1e308, 1e200):
         beyond = st.TorqueTable([0.0, 1e-3], np.outer([size, -size], np.eye(1, NT)))
         with row(size), pytest.raises(st.SimulationError):
             fly(controller=beyond, t_span=0.1, most_steps=2000)
-
-
-def test_the_start_time_is_the_clock_of_laws():
-    for how in on_all_methods():
-        times = []
-        if how["method"] == "dop853":  # at kinks, its steps depend on the last bit of t
-            how |= {"rtol": 1e-12, "atol": 1e-14}
-        early = fly(t_span=0.05, controller=st.TorqueTable([0.01, 0.02], TORQUES[:2]), **how)
-        late = fly(t_span=(3.0, 3.05), controller=st.TorqueTable([3.01, 3.02], TORQUES[:2]), **how)
-        law = lambda t, q, v, times=times: times.append(t) or TORQUES[0]  # noqa: E731
-        fly(t_span=(-1.0, -0.95), controller=law, **how)
-        np.testing.assert_allclose(late.t, early.t + 3, rtol=0, atol=1e-15)
-        np.testing.assert_allclose(late.q, early.q, rtol=0, atol=1e-9)
-        assert min(times) == -1.0 and max(times) == pytest.approx(-0.95, abs=1e-15)
 
 
 def test_a_function_gets_the_state_in_arrays_of_its_own():

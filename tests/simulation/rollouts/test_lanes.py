@@ -11,7 +11,6 @@ import serpentail as st
 from serpentail.model.snapshot import model_library
 from serpentail.simulation import batched_runs, parallel_runs
 from serpentail.simulation.adaptive_runs import AdaptiveRuns
-from tests.references.metrics import block_error
 from tests.support import zoo
 from tests.support.rows import row
 
@@ -59,17 +58,6 @@ def test_each_lane_steps_as_its_run_does_alone(method):
                 np.testing.assert_allclose(found, work, rtol=1e-8, atol=1e-16)
 
 
-def test_the_tolerance_holds_against_scipy():
-    q, v = starts(tail(), 9)
-    settings = {"t_span": 0.3, "output_step": 0.05, "controller": DAMPING}
-    exact = alone(tail(), q, v, method="dop853", rtol=1e-12, **settings)
-    for rtol in (1e-4, 1e-7, 1e-10):
-        found = st.simulate(tail(), q, v, method="tsit5", rtol=rtol, atol=rtol, **settings)
-        assert found.info["abreast"] == 8
-        errors = [block_error(found.v[k], exact[k].v) for k in range(9)]
-        assert max(errors) <= 300 * rtol
-
-
 def test_the_reproducible_profile_gives_the_same_bits():
     model, (q, v) = st.load(tail().folder, profile="reproducible"), unlike(11)
     for method, names in (("rk4", ("none", "damping")), ("tsit5", ("none", "table", "phases"))):
@@ -92,26 +80,6 @@ def test_every_form_of_a_model_has_lanes(name):
         with row(method):
             found, _ = both(model, q, v, law, compare=rounding, **own | {"t_span": 0.05})
             assert found.info["abreast"] == (16 if name == "single" else 8)
-
-
-@pytest.mark.parametrize("name", ["elastic", "elastic_arcs"])
-def test_each_lane_has_springs_and_damping_of_its_own(name):
-    model, rng = zoo.model(name), np.random.default_rng(5)
-    q = np.tile(np.eye(1, model.nq, 3), (9, 1))
-    q[:, 7:], v = rng.uniform(-0.3, 0.3, (9, 4)), np.zeros(model.nv)
-    own = {"tail_stiffness": rng.uniform(1e-3, 1e-2, (9, 4))}
-    own["tail_damping"] = rng.uniform(1e-5, 1e-3, (9, 1)) * np.ones(4)
-    for how in ({"method": "tsit5", "rtol": 1e-9}, {"method": "rk4", "step": 1e-4}):
-        many = st.simulate(model, q, v, parameters=own, t_span=0.1, **how)
-        assert many.info["abreast"] == 8 and many.errors == [None] * 9
-        for k in range(9):
-            changed = model.with_parameters(**{n: x[k] for n, x in own.items()})
-            run = st.simulate(changed, q[k], v, t_span=0.1, **how)
-            with row(how["method"], k):
-                np.testing.assert_allclose(many[k].q, run.q, atol=1e-8)
-                found, expected = (motion.info["work_J"]["damping"] for motion in (many[k], run))
-                assert found == pytest.approx(expected, rel=1e-7) and expected < -1e-6
-                assert many[k].info["imbalance"]["relative"] < 1e-5
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -163,15 +131,6 @@ def test_a_run_that_fails_loses_no_other(method):
         failed = {k for k in range(20) if found.errors[k]}
         assert failed >= {0, 2, 5} and (11 in failed) == (method == "tsit5") and len(failed) < 10
         assert np.isnan(found.q[2, 1:]).all()
-
-
-def test_runs_do_not_depend_on_their_order_or_on_threads():
-    q, v = unlike(40)
-    order = np.random.default_rng(3).permutation(40)
-    first = st.simulate(tail(), q, v, threads=1, **TSIT5)
-    other = st.simulate(tail(), q[order], v[order], threads=5, **TSIT5)
-    np.testing.assert_array_equal(other.q, first.q[order])
-    np.testing.assert_array_equal(other.v, first.v[order])
 
 
 def test_torques_of_their_own_fly_abreast_but_kinks_at_other_times_one_by_one():
@@ -240,13 +199,6 @@ def test_other_laws_fly_alone(built):
     assert st.simulate(model, q, v, **RK4).info["abreast"] == 8 and len(built) == 1
     st.simulate(model.with_parameters(torso_mass=1.0), q, v, **RK4)
     assert len(built) == 1
-
-
-def test_the_models_library_has_no_lanes():
-    """Batches and flights are compiled when they are needed."""
-    for name in ("side_by_side_forward_dynamics", "side_by_side_flights"):
-        with pytest.raises(AttributeError):
-            getattr(tail().library, f"m2_n2_{name}")
 
 
 @pytest.mark.parametrize(("price", "lanes"), [(1e-9, 8), (1.0, 1)])

@@ -240,5 +240,7 @@ def test_what_is_wrong_is_told_with_its_run():
         with row(words), pytest.raises(st.SimulationError, match=words):
             st.simulate(tail(), *starts(tail(), 3), controller=given, t_span=0.01)
     q, v = starts(tail(), 1)
+    with pytest.raises(st.SimulationError, match="watch: many starts"):
+        st.simulate(tail(), q, v, watch=print)
     with pytest.raises(st.SimulationError, match="a list of 1, one start"):
         st.simulate(tail(), q[0], v[0], controller=[DAMPING], t_span=0.01)
