@@ -2,8 +2,8 @@
 
 import gc
 import multiprocessing
-import threading
 import weakref
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -59,8 +59,8 @@ def test_bit_for_bit_what_it_is_the_first_time(name, nq):
         for how in HOW:
             model, asked = loaded(name), {"controller": controller, "t_span": (0.1, 0.3)} | how
             found = [st.simulate(model, *start(k, nq), **asked) for k in range(3)]
-            assert len(waits(model)) == 1
-            for k, motion in enumerate(found):
+            assert len(waits(model)) == 1 and not np.shares_memory(found[0].q, found[1].q)
+            for k, motion in enumerate(found):  # after all have run
                 with row(controller, how, k):
                     assert_same(motion, first_of(start(k, nq), name, **asked))
 
@@ -119,24 +119,9 @@ def test_auto_chooses_for_each_start():
     # just stiff for one of the starts
     rates = [float(words.split()[-2]) for words in decays]
     law = st.Damping(1e-3 * 5e3 / np.sqrt(np.prod(rates)))
-    runs = [
-        st.simulate(model, q, np.zeros(8), t_span=0.001, controller=law)
-        for q in (stretched, bent, stretched)
-    ]
-    found = [run.info["method"] for run in runs]
+    how, each = {"t_span": 1e-3, "controller": law}, (stretched, bent, stretched)
+    found = [st.simulate(model, q, np.zeros(8), **how).info["method"] for q in each]
     assert sorted({*found}) == ["ros34pw2", "tsit5"] and found[0] == found[2]
-
-
-def test_what_was_found_before_stays():
-    model = loaded()
-    first = st.simulate(model, *start(0), t_span=0.1)
-    before = {name: getattr(first, name).copy() for name in ("t", "q", "v", "tau")}
-    second = st.simulate(model, *start(1), t_span=0.1)
-    for name, array in before.items():
-        np.testing.assert_array_equal(getattr(first, name), array)
-        assert not np.shares_memory(getattr(first, name), getattr(second, name))
-    # books that are asked for late
-    assert first.info["imbalance"] == first_of(start(0), t_span=0.1).info["imbalance"]
 
 
 WRONG = [
@@ -206,21 +191,18 @@ def test_few_wait_and_none_keeps_its_model_alive():
 
 
 def test_threads_share_no_run():
-    model, wrong = loaded(), []
+    model = loaded()
     alone = [first_of(start(k), t_span=0.2) for k in range(4)]
 
     def fly(k):
         for _ in range(30):
             motion = st.simulate(model, *start(k), t_span=0.2)
-            if not (np.array_equal(motion.q, alone[k].q) and np.array_equal(motion.v, alone[k].v)):
-                wrong.append(k)
+            np.testing.assert_array_equal(motion.q, alone[k].q)
+            np.testing.assert_array_equal(motion.v, alone[k].v)
 
-    threads = [threading.Thread(target=fly, args=(k,)) for k in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert not wrong and len(waits(model)) == 1
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(fly, range(4)))
+    assert len(waits(model)) == 1
 
 
 @pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="needs fork")

@@ -85,6 +85,9 @@ CONTROLLERS = [
     (lambda: Path("nowhere"), "controller: value PosixPath"),  # has parts
     (lambda: st.TorqueCurve(3), "Piecewise of 4 channels"),
     (lambda: st.NativeTorque("f"), "ctypes function or an address"),
+    (lambda: st.Sampled(None, 100.0), "function: value None"),
+    (lambda: st.Sampled(len, 0.0), "rate: value 0.0"),
+    (lambda: st.Sampled(len, 100.0, -1.0), "delay: value -1.0"),
     (lambda: st.Reference(TIMES, [[0] * 4] * 2, "cubic"), "blend: value 'cubic'.*'quintic'"),
     (lambda: st.Reference([1, 0], [[0] * 4] * 2), "increasing times"),
     (lambda: st.Reference([0], [[0] * 4]), "one node only"),
@@ -99,13 +102,9 @@ def test_a_wrong_controller_is_named():
 
 
 def test_functions_left_out_are_named_before_the_flight():
+    q, v, law = np.eye(1, 9, 3)[0], np.zeros(8), lambda *_: pytest.fail("was called")
     with pytest.raises(st.ModelError, match=r"bare .*'rollout'.*'energy'.*'momentum'"):
-        st.simulate(
-            zoo.model("bare"),
-            [0, 0, 0, 1, 0, 0, 0, 0, 0],
-            [0] * 8,
-            controller=lambda *_: pytest.fail("was called"),
-        )
+        st.simulate(zoo.model("bare"), q, v, controller=law)
 
 
 PUSH = st.TorqueTable([0], [[1e6] * NT])
@@ -139,10 +138,11 @@ def test_degrees_are_told_where_they_are_given():
     with pytest.warns(st.UnusualSize, match=words.format(r"1\]\[")) as again:
         st.simulate(tail(), [upright, q], v, t_span=1e-3)
     assert {each.filename for each in (*caught, *again)} == {__file__}
-    for shape, place in (((2,), r"\[1\]\[0\]"), ((2, 2), r"\[1\]\[0\]\[0\]")):
-        bends = np.zeros((2, *shape))
-        bends[1].flat[0] = 90
-        words = rf"bends{place}: value 90 rad: .*radians\(90\)"
+    for bends, place in (
+        ([[0, 0], [90, 0]], ""),
+        ([np.zeros((2, 2)), [[90, 0], [0, 0]]], r"\[0\]"),
+    ):
+        words = rf"bends\[1\]\[0\]{place}: value 90 rad: .*radians\(90\)"
         with pytest.warns(st.UnusualSize, match=words) as caught:
             st.Reference.of_bends(tail(), [0, 0.3], bends)
         assert [each.filename for each in caught] == [__file__]
