@@ -1,15 +1,12 @@
 """A run that fails is its own error, and loses no other; what is wrong is named with its run."""
 
 import ctypes
-import signal
 import threading
-import time
 
 import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.simulation import batched_runs, parallel_runs
 from tests.support import zoo
 from tests.support.rows import row
 
@@ -106,28 +103,6 @@ def test_a_compiled_torque_that_refuses_ends_its_run():
         found = st.simulate(tail(), q, v, threads=threads, **how)
         assert [error is None for error in found.errors] == [True, False, True]
         assert "error status" in str(found.errors[1])
-
-
-@pytest.mark.parametrize("abreast", [True, False], ids=["abreast", "alone"])
-def test_ctrl_c_ends_all_threads_within_a_second(monkeypatch, abreast):
-    monkeypatch.setattr(parallel_runs, "worth_batching", lambda *_: abreast)
-    monkeypatch.setattr(batched_runs, "MAX_SHARED_STEPS", 10**12)
-    q, v = starts(tail(), 50)
-    tail().batch_library.rollouts.function("m2_n2_side_by_side_flights")  # compiled before
-    before, asked = threading.active_count(), []
-
-    def ask():
-        asked.append(time.monotonic())
-        signal.raise_signal(signal.SIGINT)
-
-    timer = threading.Timer(0.5, ask)
-    timer.start()
-    how = {"t_span": 20, "step": 1e-5, "method": "rk4", "output_step": 20, "threads": 2}
-    with pytest.raises(KeyboardInterrupt):
-        st.simulate(tail(), q, v, **how)
-    assert time.monotonic() - asked[0] < 1
-    timer.join()
-    assert threading.active_count() == before
 
 
 def row_with(array, where, value):
