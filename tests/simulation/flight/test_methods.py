@@ -124,12 +124,10 @@ def test_the_error_falls_with_the_order(method):
     errors = [apart(flight, reference) for flight in flights]
     orders = np.log2(np.divide(errors[:-1], errors[1:]))
     assert (orders > order - 0.3).all() and (orders < order + 1.3).all(), (errors, orders)
-
-
-def test_tsit5_has_order_five_at_the_ends_of_steps():
-    flights = [fly(output_step=0.2, **steps_of("tsit5", h)) for h in (4e-3, 2e-3, 1e-3)]
-    errors = [np.abs(flight.q[-1] - exact().q[-1]).max() for flight in flights]
-    assert (np.log2(np.divide(errors[:-1], errors[1:])) > 4.6).all(), errors
+    if method == "tsit5":
+        flights = [fly(output_step=0.2, **steps_of(method, h)) for h in (4e-3, 2e-3, 1e-3)]
+        errors = [np.abs(flight.q[-1] - reference.q[-1]).max() for flight in flights]
+        assert (np.log2(np.divide(errors[:-1], errors[1:])) > 4.6).all(), errors
 
 
 def test_methods_agree_and_errors_follow_the_tolerance():
@@ -164,16 +162,16 @@ def test_the_last_two_steps_are_equal():
         assert np.abs(np.array(times) - 0.7 * h).min() < 1e-12
 
 
-@pytest.mark.parametrize("name", ["m2_n2", "arcs2"])
-def test_stiff_damping_chooses_the_implicit_method(name):
+def test_stiff_damping_chooses_the_implicit_method():
     stiff = {"controller": st.Damping(2e-2)}
-    chosen, model = fly(zoo.model(name), **stiff), zoo.model(name)
-    mild = fly(model, controller=st.Damping(1e-5))
-    assert (chosen.info["method"], mild.info["method"]) == ("ros34pw2", "tsit5")
-    assert "stiff" in chosen.info["reason"] and chosen.info["steps"] < 1000
-    explicit = fly(model, method="tsit5", **stiff)
-    assert explicit.info["steps"] > 5 * chosen.info["steps"]
-    assert apart(chosen, explicit) < 3e-3
+    for name in ("m2_n2", "arcs2"):
+        model = zoo.model(name)
+        chosen, mild = fly(model, **stiff), fly(model, controller=st.Damping(1e-5))
+        assert (chosen.info["method"], mild.info["method"]) == ("ros34pw2", "tsit5")
+        assert "stiff" in chosen.info["reason"] and chosen.info["steps"] < 1000
+        explicit = fly(model, method="tsit5", **stiff)
+        assert explicit.info["steps"] > 5 * chosen.info["steps"]
+        assert apart(chosen, explicit) < 3e-3
 
 
 def test_torques_of_a_long_tail_spoil_no_factors():
