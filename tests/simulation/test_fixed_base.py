@@ -1,4 +1,4 @@
-"""Runs of tails on a base that never moves, and without weight: integration, books, tracking."""
+"""Runs of tails on a base that never moves: integration, books, tracking."""
 
 import numpy as np
 import pytest
@@ -50,10 +50,11 @@ def test_runs_are_those_of_another_integrator_and_derivation(peer):
     how = {"rtol": 1e-10, "atol": 1e-12, "method": "DOP853"}
     expected = solve_ivp(x_dot, (0, 0.15), np.concatenate(START), **how).y[:, -1]
     settings = {"tsit5": {"rtol": 1e-10}, "rk4": {}, "ros34pw2": {"rtol": 1e-8}, "dop853": {}}
-    for method, own in (settings | {"lsoda": {}}).items():
+    settings |= {"lsoda": {}, "implicit_euler": {"step": 1e-5}}
+    for method, own in settings.items():
         run = swing(controller=torque, t_span=0.15, method=method, **own)
         found = np.concatenate([run.q[-1], run.v[-1]])
-        limit = 1e-4 if method == "ros34pw2" else 1e-7
+        limit = {"ros34pw2": 1e-4, "implicit_euler": 1e-3}.get(method, 1e-7)
         with row(method):
             assert np.abs(found - expected).max() <= limit * np.abs(expected).max()
             assert run.info["imbalance"]["relative"] < limit
@@ -70,15 +71,6 @@ def test_momentum_is_that_of_the_tail(peer):
     R = -H[:3, 3:6]  # skew of the first moment about B
     arm = np.array([R[2, 1], R[0, 2], R[1, 0]]) / MASS
     np.testing.assert_allclose(angular, H[3:6] @ whole - np.cross(arm, linear), rtol=1e-9)
-
-
-def test_implicit_euler_comes_to_the_same():
-    how = {"controller": st.Damping(1e-4), "t_span": 0.02}
-    rows = [("rk4", 2e-5), ("implicit_euler", 2e-5), ("implicit_euler", 1e-5)]
-    ends = [swing(method=name, step=step, **how).q[-1] for name, step in rows]
-    coarse, fine = (np.abs(end - ends[0]).max() for end in ends[1:])
-    assert fine < 1e-3
-    assert coarse / fine == pytest.approx(2, rel=0.1)  # order 1
 
 
 def test_tracking_is_exact_and_errors_decay():
@@ -125,8 +117,6 @@ def test_motions_have_a_tail_alone(tmp_path):
     told = summary(chain(), run)
     assert [told[name] for name in ("apex_m", "pitch_at_end_rad", "tilt_end_deg")] == [None] * 3
     assert told["body_weight_N"] == pytest.approx(9.8 * MASS) and "on a fixed base" in repr(run)
-    text = run.view(tmp_path / "run.html").read_text()
-    assert "joint torques" in text and "height of the torso" not in text
     assert contents(run).labels["coordinate"] == ["alpha_1", "beta_1", "alpha_2", "beta_2"]
     drawn = frames(chain(), run, [0], 0.0)[0]
     assert not drawn.body.marked

@@ -4,30 +4,11 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.simulation.pfl import KD, KP
-from tests.references.parameters import random_states
 from tests.support import zoo
 from tests.support.rows import row
 from tests.support.tumbling import planned, rat, start
 
 STILL = ([0.0, 1.0], np.zeros((2, 2)))
-
-
-def test_tail_accelerations_are_those_commanded():
-    """Eqs. 44 to 46: e_ddot + Kd e_dot + Kp e = 0, through forward dynamics; also of a model that
-    lacks the function, and makes it of others.
-    """
-    times, lacking = np.linspace(0, 1, 30), st.load(zoo.folder("m2_n2"))
-    del lacking.kernels["pfl"]
-    models = [zoo.model(name) for name in ("m1_n3", "m2_n2", "arcs2")]
-    for model in (*models, lacking):
-        reference = 0.3 * np.sin(times[:, None] * np.arange(1, model.nv - 5))
-        law = st.Pfl(model, (times, reference))
-        for q, v, _, _ in zip(*random_states(model.segments, 3, 5, "random"), strict=True):
-            v_dot = model.forward_dynamics(q, v, law(0.37, q, v))
-            angles, rates, accelerations = law.reference(0.37)
-            expected = accelerations + KD * (rates - v[6:]) + KP * (angles - q[7:])
-            np.testing.assert_allclose(v_dot[6:], expected, rtol=1e-8, err_msg=model.name)
 
 
 def test_functions_that_the_model_lacks_are_named_at_once_or_made_of_others():
@@ -77,21 +58,6 @@ def test_tracking_a_plan_takes_the_planned_torques():
     assert (3 * by_plan[[0, -1]] < by_rates[[0, -1]]).all()
 
 
-def test_a_plan_is_tracked_from_where_its_phase_begins():
-    """What stands at the start of a plan after 0.2 s in which nothing happens goes as planned."""
-    (q, v), model = start(rat()), rat()
-    free = st.Pfl(model, ([0.0, 1.0], np.stack([q[7:], q[7:]])), kp=0, kd=0)
-    in_phase = st.Phases([(0.0, free), (0.2, st.Pfl(model, plan()))])
-    end = plan().duration
-    for method in ("tsit5", "dop853"):
-        how = {"method": method, "output_step": 1e-3}
-        before = st.simulate(model, q, v, controller=free, t_span=0.2, **how)
-        state = before.q[-1], before.v[-1]
-        early = st.simulate(model, *state, controller=st.Pfl(model, plan()), t_span=end, **how)
-        late = st.simulate(model, q, v, controller=in_phase, t_span=0.2 + end, **how)
-        np.testing.assert_allclose(late.q[-1, 3:], early.q[-1, 3:], atol=1e-6, err_msg=method)
-
-
 @pytest.mark.parametrize("method", ["tsit5", "dop853"])
 def test_torques_keep_their_limit(method):
     """A far reference asks for more than there is; a limit that is never met changes nothing."""
@@ -105,11 +71,6 @@ def test_torques_keep_their_limit(method):
     assert np.abs(tight.tau).max(axis=0) == pytest.approx([1e-3, 2e-3])
     wanted = [laws[2](*state) for state in zip(tight.t, tight.q, tight.v, strict=True)]
     np.testing.assert_allclose(tight.tau[1:-1], wanted[1:-1], rtol=1e-9, atol=1e-12)
-
-
-def test_a_limit_may_be_a_text_with_a_unit():
-    for text, wanted in (("1 mN m", [1e-3, 1e-3]), (["1 mN m", "0.2 N mm"], [1e-3, 2e-4])):
-        assert st.Pfl(rat(), STILL, torque=text).torque.tolist() == wanted
 
 
 WRONG = [
@@ -126,7 +87,9 @@ WRONG = [
 ]
 
 
-def test_wrong_references_gains_and_limits_are_named():
+def test_wrong_references_gains_and_limits_are_named_and_units_are_read():
     for reference, gains, words in WRONG:
         with row(words), pytest.raises(st.SimulationError, match=words):
             st.Pfl(rat(), reference, **gains)
+    for text, wanted in (("1 mN m", [1e-3, 1e-3]), (["1 mN m", "0.2 N mm"], [1e-3, 2e-4])):
+        assert st.Pfl(rat(), STILL, torque=text).torque.tolist() == wanted

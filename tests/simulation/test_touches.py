@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.motion.summary import summary
 from serpentail.simulation.ground import Ground
 from serpentail.simulation.piecewise import Piecewise
 from tests.support import zoo
@@ -140,7 +139,6 @@ def test_methods_that_look_for_no_events_say_so():
         run = flown(animal(), q, v, method=method, rtol=1e-6, atol=1e-6)
         with pytest.raises(ValueError, match=f"events: {method}"):
             _ = run.events
-        assert summary(animal(), run)["take_off_s"] is None
 
 
 def test_a_step_that_turns_too_far_is_taken_shorter_or_refused():

@@ -158,17 +158,21 @@ def test_a_law_of_a_phase_is_that_law_later():
         fly(controller=rounding, t_span=0.01)
 
 
-def test_a_function_of_c_has_the_clock_of_its_phase():
+def test_a_function_of_c_has_the_clock_of_its_phase_and_ends_its_run_if_it_refuses():
     times, real = [], ctypes.POINTER(ctypes.c_double)
 
     @ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_double, real, real, real)
-    def torque(_context, t, _q, _v, tau):
+    def torque(_context, t, q, _v, tau):
         times.append(t)
         tau[0] = tau[1] = 0.0
-        return 0
+        return int(q[0] > 40 and t > 0.005)
 
-    controller = st.Phases([(0.0, None), (0.06, st.NativeTorque(torque))])
-    st.simulate(small(), *start(), t_span=0.1, controller=controller)
+    controller, (q, v) = st.Phases([(0.0, None), (0.06, st.NativeTorque(torque))]), start()
+    q = np.array([q, q + 50 * np.eye(1, len(q))[0], q])
+    for threads in (1, 2):
+        found = st.simulate(small(), q, v, t_span=0.1, controller=controller, threads=threads)
+        assert [error is None for error in found.errors] == [True, False, True]
+        assert "error status" in str(found.errors[1])
     assert -1e-12 < min(times) < 1e-3 and max(times) == pytest.approx(0.04)
 
 
