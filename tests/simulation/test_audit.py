@@ -1,5 +1,7 @@
 """Every run's books balance, and are right: work and impulses against integrals of its samples."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from scipy.integrate import simpson
@@ -49,13 +51,13 @@ def test_work_and_impulses_are_the_integrals_of_the_samples():
     how = {"t_span": 0.02, "method": "tsit5", "rtol": 1e-9, "output_step": 4e-6}
     for law in (st.Damping(damping), st.TorqueTable([0.0, 1.0], np.tile(torque, (2, 1)))):
         run = st.simulate(model, q, v, controller=law, legs=legs, **how)
-        work, rates = run.info["work_J"], run.v[:, 6:]
+        work, rates, integral = run.info["work_J"], run.v[:, 6:], partial(simpson, x=run.t, axis=0)
         for group, impulse in run.info["impulse_N_s"].items():
-            expected = simpson(x=run.t, axis=0, y=run.contact.of(group).forces.sum(axis=1))
+            expected = integral(run.contact.of(group).forces.sum(axis=1))
             assert impulse == pytest.approx(expected, abs=8e-6), group
         lost, done = (
-            simpson(x=run.t, axis=0, y=-(rates**2) @ damping),
-            simpson(x=run.t, axis=0, y=rates @ torque),
+            integral(-(rates**2) @ damping),
+            integral(rates @ torque),
         )
         lost, done = (lost, 0.0) if isinstance(law, st.Damping) else (0.0, done)
         assert work["damping"] == pytest.approx(lost, abs=1e-9 + 1e-5 * abs(lost))
@@ -65,8 +67,8 @@ def test_work_and_impulses_are_the_integrals_of_the_samples():
         speeds = model.contact_points(run.q, run.v, angles)[1]
         still = model.contact_points(run.q, run.v, angles * (np.arange(8) < 4))[1]
         forces = run.contact.forces
-        ground = simpson(x=run.t, axis=0, y=(forces * speeds).sum(axis=(1, 2)))
-        drives = simpson(x=run.t, axis=0, y=(forces * (still - speeds)).sum(axis=(1, 2)))
+        ground = integral((forces * speeds).sum(axis=(1, 2)))
+        drives = integral((forces * (still - speeds)).sum(axis=(1, 2)))
         assert work["ground"] == pytest.approx(ground, rel=1e-3)
         assert work["legs"] == pytest.approx(drives, rel=1e-3) and drives > 1e-4
         assert run.info["warnings"] == []

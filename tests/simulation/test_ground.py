@@ -19,6 +19,7 @@ DEGREES = np.pi / 180
 GAMMA, CROUCH, STRETCH = np.radians([210.0, -15.0, -75.0])
 KICK = st.Legs.ramp(GAMMA, (CROUCH, STRETCH), at=0.4, rate=-70)
 PASSIVE = st.Damping(1e-3)
+FIXED = st.Legs.fixed(GAMMA, CROUCH)
 
 
 def rat():
@@ -29,9 +30,8 @@ def rat():
 @cache
 def crouched():
     """Settled in a crouch: q, v, bristles; the paper's start of the kick."""
-    q, legs = np.zeros(9), st.Legs.fixed(GAMMA, CROUCH)
-    q[2:5] = 0.0178, np.cos(0.11), np.sin(0.11)
-    acting = {"controller": PASSIVE, "legs": legs}
+    q = np.array([0, 0, 0.0178, np.cos(0.11), np.sin(0.11), 0, 0, 0, 0])
+    acting = {"controller": PASSIVE, "legs": FIXED}
     return st.simulate(rat(), q, np.zeros(8), t_span=1.5, rtol=1e-6, **acting)
 
 
@@ -92,7 +92,7 @@ def test_fixed_steps_never_blow_up():
 def test_a_model_in_single_precision_lands_too():
     q, v = np.zeros(9), np.zeros(8)
     q[2:5], v[:4] = (0.13, np.cos(0.2), np.sin(0.2)), (0.3, 0.2, 0, 1)
-    how = {"legs": st.Legs.fixed(GAMMA, CROUCH), "controller": PASSIVE, "t_span": 0.25}
+    how = {"legs": FIXED, "controller": PASSIVE, "t_span": 0.25}
     runs = [st.simulate(zoo.model(n), q, v, **how) for n in ("ground", "single_ground")]
     assert 0 < np.abs(runs[1].q - runs[0].q).max() < 0.01
     first, other = (run.events[0] for run in runs)
@@ -142,13 +142,13 @@ def test_a_run_that_is_paused_after_each_few_steps_gives_the_same_bits(monkeypat
 def test_a_step_may_be_so_short_that_its_square_is_zero():
     """A phase that begins after next to no time: the first step ends there."""
     q, v = np.eye(1, 9, 3)[0], np.full(8, 0.1)
-    q[2], law = 0.3, st.Damping(1e-3)
+    q[2] = 0.3
     for method in ("tsit5", "ros34pw2", "rk4"):
-        how = {"t_span": 2e-3, "legs": st.Legs.fixed(3.6, -0.3), "method": method}
+        how = {"t_span": 2e-3, "legs": FIXED, "method": method}
         plain = st.simulate(rat(), q, v, **how)
         for begin in (1e-160, 1e-180, 1e-300, 5e-324):
             with row(method, begin):
-                phases = st.Phases([(0.0, law), (begin, None)])
+                phases = st.Phases([(0.0, PASSIVE), (begin, None)])
                 found = st.simulate(rat(), q, v, controller=phases, **how)
                 assert found.events == [] and found.info["steps"] < 300
                 np.testing.assert_allclose(found.q, plain.q, rtol=0, atol=1e-12)
@@ -170,7 +170,6 @@ def test_contact_is_what_the_model_says_also_from_a_file(tmp_path):
         np.testing.assert_array_equal(getattr(again.contact, name), getattr(flight.contact, name))
     assert again.contact.groups == {"feet": 6} and again.events == flight.events
     assert again.resample([0.1, 0.2]).contact.points.shape == (2, 6, 3)
-    assert flight.info["seconds"] > 0 and flight.info["cpu_seconds"] >= 0
 
 
 WRONG = [
@@ -215,9 +214,9 @@ def test_each_leg_has_its_own_angles():
     assert KICK.curve.kinks(2) == pytest.approx([0.4, 0.4 + (CROUCH - STRETCH) / 70])
 
 
-LIFTED = st.Legs.fixed(np.pi / 2, np.pi / 2)  # feet above the torso
-FIXED = st.Legs.fixed(GAMMA, CROUCH)
 G, MU, STOP = 9.8, 0.5, 1 / (2 * 0.5 * 9.8)  # m/s^2, and 102 mm from 1 m/s
+
+
 LAWS = {"cone": "ground", "box": "box", "smooth": "smooth", "paper": "paper"}
 
 
@@ -230,14 +229,15 @@ def slide(friction, heading):
     q, v = np.zeros(9), np.zeros(8)
     q[2:4] = model.parameters["torso_semi_axes"][2] - depth, 1
     v[:2] = np.cos(heading), np.sin(heading)
-    how = {"legs": LIFTED, "controller": st.Damping(1e-9), "rtol": 1e-7, "output_step": 1e-3}
+    lifted = st.Legs.fixed(np.pi / 2, np.pi / 2)  # feet above the torso
+    how = {"legs": lifted, "controller": st.Damping(1e-9), "rtol": 1e-7, "output_step": 1e-3}
     return st.simulate(model, q, v, t_span=0.6, **how)
 
 
 @pytest.mark.filterwarnings("ignore::serpentail.errors.UnusualSize")
 @pytest.mark.filterwarnings("ignore::serpentail.errors.UnlikeBodies")
 def test_sliders_stop_where_coulomb_says():
-    """At any heading; a box is stronger on diagonals, and a smooth law creeps."""
+    """At any heading; a box is stronger on diagonals, a smooth law creeps, the paper's pulls back."""
     for heading in np.radians([0, 30, 45, 117, 200, 315]):
         way = slide("cone", heading).q[-1, :2]
         with row(heading):
@@ -249,14 +249,7 @@ def test_sliders_stop_where_coulomb_says():
     way = slide("smooth", 0.7).q[-1, :2]
     assert STOP < np.linalg.norm(way) < 1.1 * STOP
     assert np.arctan2(way[1], way[0]) == pytest.approx(0.7, abs=1e-6)
-
-
-@pytest.mark.filterwarnings("ignore::serpentail.errors.UnusualSize")
-@pytest.mark.filterwarnings("ignore::serpentail.errors.UnlikeBodies")
-def test_a_slider_of_the_papers_law_is_pulled_back():
-    """A spring holds MU * 0.98 N, and gives back no more speed than that at its own frequency: 63
-    mm/s.
-    """
+    # a spring holds MU * 0.98 N, and gives back no more than 63 mm/s, but by the paper's law
     spring = MU * 0.1 * G / np.sqrt(0.1 * 600)
     assert slide("cone", 0.0).v[:, 0].min() > -spring > 5 * slide("paper", 0.0).v[:, 0].min()
 
@@ -270,7 +263,7 @@ def test_external_forces_alone_move_the_centre_of_mass(name, height):
     q, v = np.zeros(model.nq), np.zeros(model.nv)
     q[2:5], q[7:] = (height, np.cos(0.2), np.sin(0.2)), 0.05
     v[:5] = 0.3, 0.2, 10 * (0.13 - height), 1, 0.5
-    how = {"legs": FIXED, "controller": st.Damping(1e-3), "rtol": 1e-8, "output_step": 2e-5}
+    how = {"legs": FIXED, "controller": PASSIVE, "rtol": 1e-8, "output_step": 2e-5}
     flight = st.simulate(model, q, v, t_span=0.22, **how)
     forces, points, t = flight.contact.forces, flight.contact.points, flight.t
     mass = model.parameters["torso_mass"] + model.parameters["tail_mass"]
@@ -297,7 +290,7 @@ def test_other_tails_land_with_books_that_balance_better_with_the_tolerance(name
     q, v = np.zeros(model.nq), np.zeros(model.nv)
     q[2:5], v[:6] = (0.12, np.cos(0.3), np.sin(0.3)), (0.3, 0.2, 0.0, 1.0, 0.5, 0.2)
     q[7:9] = -0.4, 0.2
-    how = {"t_span": 0.35, "legs": FIXED, "controller": st.Damping(1e-3)}
+    how = {"t_span": 0.35, "legs": FIXED, "controller": PASSIVE}
     for rtol in (1e-4, 1e-6):
         run = st.simulate(model, q, v, rtol=rtol, **how)
         left.append(run.info["imbalance"]["relative"])
