@@ -237,7 +237,7 @@ def slide(friction, heading):
 @pytest.mark.filterwarnings("ignore::serpentail.errors.UnusualSize")
 @pytest.mark.filterwarnings("ignore::serpentail.errors.UnlikeBodies")
 def test_sliders_stop_where_coulomb_says():
-    """At any heading; a box is stronger on diagonals, a smooth law creeps, the paper's pulls back."""
+    """At any heading; a box is stronger on diagonals, smooth laws creep, the paper's pulls back."""
     for heading in np.radians([0, 30, 45, 117, 200, 315]):
         way = slide("cone", heading).q[-1, :2]
         with row(heading):

@@ -151,20 +151,6 @@ def test_a_step_that_turns_too_far_is_taken_shorter_or_refused():
         flown(animal(), q, v, method="implicit_euler", step=0.02, output_step=0.06)
 
 
-def test_a_step_that_fails_on_a_touch_ends_there():
-    """Else it is shortened again and again, as those after it are: 0.46 and 0.23 were in vain."""
-    q, v = np.zeros((5, 11)), np.zeros((5, 10))
-    for k in range(5):  # animals that fall on feet, tail and torso
-        rng = np.random.default_rng(k)
-        q[k] = 0, 0, 0.1, 1, *(0.1 * rng.normal(size=3)), *(0.2 * rng.normal(size=4))
-        v[k, 3:6] = rng.normal(size=3)
-    for method, rtol, most in (("ros34pw2", 1e-4, 0.4), ("tsit5", 1e-6, 0.16)):
-        runs = flown(animal(), q, v, t_span=0.2, method=method, rtol=rtol)
-        infos = [run.info for run in runs]
-        rejected, steps = (sum(info[name] for info in infos) for name in ("rejected", "steps"))
-        assert rejected < most * steps, method
-
-
 def test_a_touch_in_a_long_step_is_told_to_rounding():
     """A slow fall for 8 s, late on the clock, in one step, on ground that does not press."""
     model = animal().with_parameters(gravity=5e-3, K_n=1e-18)
