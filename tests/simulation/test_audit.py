@@ -11,6 +11,8 @@ from serpentail.simulation import audit
 from tests.support import zoo
 from tests.support.rows import row
 
+from .runs import tail
+
 GAMMA, DELTA = np.radians(210), np.radians(-40)
 FIXED = {"controller": st.Damping(1e-3), "legs": st.Legs.fixed(GAMMA, DELTA)}
 METHODS = {
@@ -23,10 +25,6 @@ METHODS = {
 
 def grounded():
     return zoo.model("ground_m2_n2")
-
-
-def flying():
-    return zoo.model("m2_n2")
 
 
 def dropped(model, count, first=0):
@@ -87,12 +85,12 @@ def test_the_books_of_drops_balance(method):
 
 def inner_energy(run):
     """Energy of a flight about its centre of mass, J."""
-    mass = sum(flying().parameters[name] for name in ("torso_mass", "tail_mass"))
+    mass = sum(tail().parameters[name] for name in ("torso_mass", "tail_mass"))
     return run.kinetic - np.sum(run.linear_momentum**2, axis=1) / (2 * mass)
 
 
 def test_the_energy_of_a_fall_hides_no_loss():
-    model = flying()
+    model = tail()
     q, v = np.zeros(model.nq), np.zeros(model.nv)
     q[3], q[7:], v[1], v[3] = 1, (0.5, 0, 0.3, 0), 10, 20  # in one plane: a motion without chaos
     how = {"t_span": 1.0, "method": "implicit_euler", "step": 2e-3, "output_step": 0.1}
@@ -104,8 +102,6 @@ def test_the_energy_of_a_fall_hides_no_loss():
         assert run.info["imbalance"]["relative"] == pytest.approx(change, rel=0.1)
         assert "not accounted for" in run.info["warnings"][0]
     assert [len(each) for each in many.warnings] == [1, 1]
-    fine = st.simulate(model, q, v, t_span=1.0, method="tsit5", rtol=1e-8, atol=1e-8)
-    assert fine.info["warnings"] == [] and fine.info["imbalance"]["relative"] < 1e-6
     # a fall that does not turn has nothing inside to lose: roundings are no loss
     still = st.simulate(model, np.eye(1, model.nq, 3)[0], 0 * v, t_span=20.0)
     assert still.info["warnings"] == [] and still.info["imbalance"]["relative"] < 1e-9
@@ -113,7 +109,7 @@ def test_the_energy_of_a_fall_hides_no_loss():
 
 def swings(rtol, runs):
     """Flights whose tail goes 0, 90, -60, 0 degrees, from rest to rest: single, or of rollouts."""
-    model, pitch = flying(), np.radians([0, 90, -60, 0])
+    model, pitch = tail(), np.radians([0, 90, -60, 0])
     times, bends = np.linspace(0, 0.45, 4), np.tile(pitch[:, None], (1, 2))
     law = st.Pfl(model, st.Reference.of_bends(model, times, bends))
     q, v = np.eye(1, model.nq, 3)[0], np.zeros(model.nv)
@@ -161,10 +157,3 @@ def test_rollouts_audit_each_run_up_to_where_it_stopped():
         assert books["work_J"]["ground"] == pytest.approx(runs.audit.work["ground"][k])
         assert runs.warnings[k] == books["warnings"] == []
     assert runs.audit.work["ground"][2] == 0 and runs.ends[2] == 0.5 > runs.ends[0]
-
-
-def test_single_precision_balances_by_its_own_roundings():
-    model = zoo.model("single_ground")
-    q, v = dropped(model, 1, first=3)
-    run = st.simulate(model, q[0], v[0], **FIXED, t_span=0.6, method="ros34pw2")
-    assert run.info["warnings"] == [] and run.info["imbalance"]["relative"] < 0.1

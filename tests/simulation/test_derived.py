@@ -175,26 +175,29 @@ def test_on_the_ground_contacts_come_too_and_a_stop_is_the_last_sample():
 def test_a_run_that_ends_early_is_told_up_to_there():
     """By an error of its controller or of what watches it, or by Ctrl-C."""
 
-    def ends(error, begin=0.0):
-        def raised(t, *_):
-            if getattr(t, "t", [t])[-1] > begin:
-                raise error
-            return np.zeros(4)
+    def tired(t, q, v):
+        if t > 0.1:
+            raise st.SimulationError("it is tired")
+        return np.zeros(4)
 
-        return raised
+    def refuse(part):
+        raise ArithmeticError("no more")
+
+    def stop(part):
+        if part.t[-1] > 0.05:
+            raise KeyboardInterrupt
 
     for method in ("tsit5", "dop853"):
-        parts, tired = [], ends(st.SimulationError("it is tired"), 0.1)
+        parts = []
         with pytest.raises(st.SimulationError, match="it is tired") as caught:
             fly(controller=tired, method=method, watch=parts.append)
         assert joined(parts, "t").tolist() == caught.value.trajectory.t.tolist()
         assert not any("failure" in part.info for part in parts)
     for method in ("rk4", "dop853"):
         with row(method), pytest.raises(ArithmeticError, match="no more"):
-            fly(method=method, watch=ends(ArithmeticError("no more")))
+            fly(method=method, watch=refuse)
     with pytest.raises(KeyboardInterrupt) as caught:
-        how = {"t_span": 50.0, "method": "rk4", "output_step": 0.01}
-        fly(watch=ends(KeyboardInterrupt, 0.05), **how)
+        fly(t_span=50.0, method="rk4", watch=stop, output_step=0.01)
     assert 0.05 < caught.value.motion.t[-1] < 50
 
 

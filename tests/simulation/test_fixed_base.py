@@ -35,12 +35,10 @@ def peer():
     return MujocoChain(TABLE_1, 2, 2)
 
 
-def torque(t, q, v):
-    """Torques that push and damp."""
-    return 1e-4 * np.sin(20 * t + np.arange(4)) - 2e-6 * v
-
-
 def test_runs_are_those_of_another_integrator_and_derivation(peer):
+    def torque(t, q, v):
+        return 1e-4 * np.sin(20 * t + np.arange(4)) - 2e-6 * v
+
     def x_dot(t, x):
         q, v = x[:4], x[4:]
         there = np.concatenate([REST, q]), np.concatenate([np.zeros(6), v])

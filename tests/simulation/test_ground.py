@@ -95,6 +95,7 @@ def test_a_model_in_single_precision_lands_too():
     how = {"legs": FIXED, "controller": PASSIVE, "t_span": 0.25}
     runs = [st.simulate(zoo.model(n), q, v, **how) for n in ("ground", "single_ground")]
     assert 0 < np.abs(runs[1].q - runs[0].q).max() < 0.01
+    assert runs[1].info["warnings"] == [] and runs[1].info["imbalance"]["relative"] < 0.1
     first, other = (run.events[0] for run in runs)
     assert first["group"] == other["group"]
     assert other["time"] == pytest.approx(first["time"], abs=1e-3)
@@ -297,5 +298,3 @@ def test_other_tails_land_with_books_that_balance_better_with_the_tolerance(name
         assert run.info["work_J"]["ground"] < 0 and run.info["work_J"]["damping"] < 0
         assert {event["group"] for event in run.events} >= {"tail", "feet"}
     assert left[1] < 1e-4 and left[1] < 0.2 * left[0]
-    other = st.simulate(model, q, v, method="tsit5", rtol=1e-9, **how)
-    assert np.abs(other.q - run.q).max() < 1e-3

@@ -111,7 +111,6 @@ COARSE = {"step": 0.05, "output_step": 0.05}
 DIVERGING = {
     "table": (V0, {"controller": PUSH} | COARSE),
     "function": (V0, {"controller": lambda t, q, v: [1e6] * NT} | COARSE),
-    "feedback": (V0, {"controller": lambda t, q, v: 1e3 * v[6:]} | COARSE),
     "dop853": (V0, {"controller": st.TorqueTable([0], [[1e300] * NT]), "method": "dop853"}),
     "dop853 at once": (V0 * 1e160, {"method": "dop853"}),
     "auto at once": (V0 * 1e160, {}),
