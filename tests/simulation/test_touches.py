@@ -157,7 +157,7 @@ def test_a_touch_in_a_long_step_is_told_to_rounding():
 
 
 def test_a_foot_that_dips_within_a_step_is_seen():
-    """Shanks swing by 0.01 rad there and back, on a parabola, in one step of a body at rest. Steps of
+    """Shanks swing there and back, on a parabola, in one step of a body at rest. Steps of
     a fixed length are not cut: the result says so.
     """
     model, T = animal().with_parameters(gravity=0), 0.05
