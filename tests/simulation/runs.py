@@ -78,6 +78,16 @@ def both(model, q, v, controller=None, each=None, compare=same, **settings):
     return found, flights
 
 
+def centre_of_mass(model, flight):
+    """By the middles of equal links (K, 3); of another tail by the model's own function."""
+    if model.kind != "articulated":
+        return model.center_of_mass(flight.q, flight.v)[0]
+    points = model.tail_points(flight.q)
+    torso, own = model.parameters["torso_mass"], model.parameters["tail_mass"]
+    middles = (points[:, 1:] + points[:, :-1]) / 2
+    return (torso * flight.q[:, :3] + own * middles.mean(axis=1)) / (torso + own)
+
+
 def summed(values, t):
     """Trapezoidal integral from the start, (K, n)."""
     steps = (values[1:] + values[:-1]) / 2 * np.diff(t)[:, None]

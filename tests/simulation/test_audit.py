@@ -1,13 +1,17 @@
 """Every run's books balance, and are right: work and impulses against integrals of its samples."""
 
+from functools import partial
+
 import numpy as np
 import pytest
+from scipy.integrate import simpson
 
 import serpentail as st
-from serpentail.motion.summary import summary
 from serpentail.simulation import audit
 from tests.support import zoo
 from tests.support.rows import row
+
+from .runs import tail
 
 GAMMA, DELTA = np.radians(210), np.radians(-40)
 FIXED = {"controller": st.Damping(1e-3), "legs": st.Legs.fixed(GAMMA, DELTA)}
@@ -23,10 +27,6 @@ def grounded():
     return zoo.model("ground_m2_n2")
 
 
-def flying():
-    return zoo.model("m2_n2")
-
-
 def dropped(model, count, first=0):
     """Tumbling starts (count, nq), (count, nv) above the ground."""
     q, v = np.zeros((count, model.nq)), np.zeros((count, model.nv))
@@ -39,13 +39,6 @@ def dropped(model, count, first=0):
     return q, v
 
 
-def integral(t, rates):
-    """Simpson's rule over equal samples (an odd number of them)."""
-    weights = np.ones(len(t))
-    weights[1:-1:2], weights[2:-1:2] = 4, 2
-    return np.tensordot(weights, rates, 1) * (t[1] - t[0]) / 3
-
-
 def test_work_and_impulses_are_the_integrals_of_the_samples():
     """Against Simpson's rule over samples 4 us apart: forces, powers of torques and damping."""
     model, legs = grounded(), st.Legs.ramp(GAMMA, (DELTA, -1.0), at=0.005, rate=-40)
@@ -56,11 +49,14 @@ def test_work_and_impulses_are_the_integrals_of_the_samples():
     how = {"t_span": 0.02, "method": "tsit5", "rtol": 1e-9, "output_step": 4e-6}
     for law in (st.Damping(damping), st.TorqueTable([0.0, 1.0], np.tile(torque, (2, 1)))):
         run = st.simulate(model, q, v, controller=law, legs=legs, **how)
-        work, rates = run.info["work_J"], run.v[:, 6:]
+        work, rates, integral = run.info["work_J"], run.v[:, 6:], partial(simpson, x=run.t, axis=0)
         for group, impulse in run.info["impulse_N_s"].items():
-            expected = integral(run.t, run.contact.of(group).forces.sum(axis=1))
+            expected = integral(run.contact.of(group).forces.sum(axis=1))
             assert impulse == pytest.approx(expected, abs=8e-6), group
-        lost, done = integral(run.t, -(rates**2) @ damping), integral(run.t, rates @ torque)
+        lost, done = (
+            integral(-(rates**2) @ damping),
+            integral(rates @ torque),
+        )
         lost, done = (lost, 0.0) if isinstance(law, st.Damping) else (0.0, done)
         assert work["damping"] == pytest.approx(lost, abs=1e-9 + 1e-5 * abs(lost))
         assert work["torques"] == pytest.approx(done, abs=1e-9 + 1e-5 * abs(done))
@@ -69,8 +65,8 @@ def test_work_and_impulses_are_the_integrals_of_the_samples():
         speeds = model.contact_points(run.q, run.v, angles)[1]
         still = model.contact_points(run.q, run.v, angles * (np.arange(8) < 4))[1]
         forces = run.contact.forces
-        ground = integral(run.t, (forces * speeds).sum(axis=(1, 2)))
-        drives = integral(run.t, (forces * (still - speeds)).sum(axis=(1, 2)))
+        ground = integral((forces * speeds).sum(axis=(1, 2)))
+        drives = integral((forces * (still - speeds)).sum(axis=(1, 2)))
         assert work["ground"] == pytest.approx(ground, rel=1e-3)
         assert work["legs"] == pytest.approx(drives, rel=1e-3) and drives > 1e-4
         assert run.info["warnings"] == []
@@ -78,20 +74,10 @@ def test_work_and_impulses_are_the_integrals_of_the_samples():
 
 @pytest.mark.parametrize("method", METHODS)
 def test_the_books_of_drops_balance(method):
-    check_drops(method, 4)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("method", ["ros34pw2", "tsit5"])
-def test_the_books_of_many_drops_balance(method):
-    check_drops(method, 300)
-
-
-def check_drops(method, count):
     model = grounded()
     for rtol in METHODS[method]:
         how = {"t_span": 0.6, "method": method, "rtol": rtol, "atol": rtol}
-        runs = st.simulate(model, *dropped(model, count), **FIXED, **how)
+        runs = st.simulate(model, *dropped(model, 4), **FIXED, **how)
         with row(rtol):
             assert not any(runs.warnings)
             assert runs.audit.relative.max() < 100 * rtol
@@ -99,12 +85,12 @@ def check_drops(method, count):
 
 def inner_energy(run):
     """Energy of a flight about its centre of mass, J."""
-    mass = sum(flying().parameters[name] for name in ("torso_mass", "tail_mass"))
+    mass = sum(tail().parameters[name] for name in ("torso_mass", "tail_mass"))
     return run.kinetic - np.sum(run.linear_momentum**2, axis=1) / (2 * mass)
 
 
 def test_the_energy_of_a_fall_hides_no_loss():
-    model = flying()
+    model = tail()
     q, v = np.zeros(model.nq), np.zeros(model.nv)
     q[3], q[7:], v[1], v[3] = 1, (0.5, 0, 0.3, 0), 10, 20  # in one plane: a motion without chaos
     how = {"t_span": 1.0, "method": "implicit_euler", "step": 2e-3, "output_step": 0.1}
@@ -116,8 +102,6 @@ def test_the_energy_of_a_fall_hides_no_loss():
         assert run.info["imbalance"]["relative"] == pytest.approx(change, rel=0.1)
         assert "not accounted for" in run.info["warnings"][0]
     assert [len(each) for each in many.warnings] == [1, 1]
-    fine = st.simulate(model, q, v, t_span=1.0, method="tsit5", rtol=1e-8, atol=1e-8)
-    assert fine.info["warnings"] == [] and fine.info["imbalance"]["relative"] < 1e-6
     # a fall that does not turn has nothing inside to lose: roundings are no loss
     still = st.simulate(model, np.eye(1, model.nq, 3)[0], 0 * v, t_span=20.0)
     assert still.info["warnings"] == [] and still.info["imbalance"]["relative"] < 1e-9
@@ -125,7 +109,7 @@ def test_the_energy_of_a_fall_hides_no_loss():
 
 def swings(rtol, runs):
     """Flights whose tail goes 0, 90, -60, 0 degrees, from rest to rest: single, or of rollouts."""
-    model, pitch = flying(), np.radians([0, 90, -60, 0])
+    model, pitch = tail(), np.radians([0, 90, -60, 0])
     times, bends = np.linspace(0, 0.45, 4), np.tile(pitch[:, None], (1, 2))
     law = st.Pfl(model, st.Reference.of_bends(model, times, bends))
     q, v = np.eye(1, model.nq, 3)[0], np.zeros(model.nv)
@@ -135,21 +119,18 @@ def swings(rtol, runs):
     return list(st.simulate(model, np.tile(q, (runs, 1)), v, **how))
 
 
-def test_a_swing_from_rest_to_rest_balances():
-    """Both ends and the net work are about zero; what was moved is the energy in between."""
-    for rtol, runs in ((1e-6, 1), (1e-6, 3), (1e-8, 1), (1e-8, 3), (1e-10, 1), (1e-10, 3)):
+def test_a_swing_from_rest_to_rest_balances_and_a_fault_in_it_is_found(monkeypatch):
+    """Both ends and the net work are about zero; what was moved is the energy in between. Work that
+    is wrong by twice the allowed share of it is told, by half of it not.
+    """
+    named = audit.named
+    for rtol, runs in ((rtol, runs) for rtol in (1e-6, 1e-8, 1e-10) for runs in (1, 3)):
         for run in swings(rtol, runs):
             lost = abs(run.info["imbalance"]["energy_J"]) / inner_energy(run).max()
             with row(rtol, runs):
                 assert run.info["warnings"] == [] and lost < 10 * rtol
                 assert run.info["imbalance"]["relative"] == pytest.approx(lost, rel=0.1)
-
-
-@pytest.mark.parametrize("runs", [1, 3])
-def test_a_fault_in_a_swing_from_rest_to_rest_is_found(runs, monkeypatch):
-    """Work that is wrong by twice and by half the allowed share of the swing's energy."""
-    named = audit.named
-    for share, warnings in ((2.0, 1), (0.5, 0)):
+    for runs, share in ((1, 2.0), (1, 0.5), (3, 2.0), (3, 0.5)):
         found = swings(1e-8, runs)
         wrong = share * 100 * 1e-8 * inner_energy(found[0]).max()
 
@@ -159,7 +140,7 @@ def test_a_fault_in_a_swing_from_rest_to_rest_is_found(runs, monkeypatch):
 
         monkeypatch.setattr(audit, "named", worked)
         for run in found:
-            assert len(run.info["warnings"]) == warnings
+            assert len(run.info["warnings"]) == (share > 1)
             assert run.info["imbalance"]["energy_J"] == pytest.approx(-wrong, rel=0.1)
         monkeypatch.undo()
 
@@ -176,20 +157,3 @@ def test_rollouts_audit_each_run_up_to_where_it_stopped():
         assert books["work_J"]["ground"] == pytest.approx(runs.audit.work["ground"][k])
         assert runs.warnings[k] == books["warnings"] == []
     assert runs.audit.work["ground"][2] == 0 and runs.ends[2] == 0.5 > runs.ends[0]
-
-
-def test_what_does_not_balance_is_reported():
-    """Steps of a fixed length that are too long for the ground's blow gain energy."""
-    model = grounded()
-    q, v = dropped(model, 1, first=1)
-    run = st.simulate(model, q[0], v[0], **FIXED, t_span=0.6, method="rk4", step=8e-4)
-    assert run.info["imbalance"]["relative"] > 0.05
-    assert "not accounted for" in run.warnings[0] and "shorter step" in run.warnings[0]
-    assert summary(model, run)["warnings"] == run.warnings
-
-
-def test_single_precision_balances_by_its_own_roundings():
-    model = zoo.model("single_ground")
-    q, v = dropped(model, 1, first=3)
-    run = st.simulate(model, q[0], v[0], **FIXED, t_span=0.6, method="ros34pw2")
-    assert run.info["warnings"] == [] and run.info["imbalance"]["relative"] < 0.1

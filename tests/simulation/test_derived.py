@@ -5,6 +5,7 @@ import dataclasses
 import pickle
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -16,18 +17,7 @@ from serpentail.simulation import compiled_run, watched
 from tests.support import zoo
 from tests.support.rows import row
 
-from .runs import ARRAYS, fly, rat, starts, tail
-
-Q0 = np.array([0, 0, 1.0, 1, 0, 0, 0, 0.3, -0.2])
-V0 = np.array([0.1, 0, 0, 1, 0.5, -0.2, 0, 2.0])
-
-
-def model():
-    return zoo.model("m1_n3")
-
-
-def flight(**options):
-    return st.simulate(model(), Q0, V0, t_span=0.3, controller=st.Damping(1e-4), **options)
+from .runs import ARRAYS, DAMPING, LEGS, Q0, V0, fly, rat, tail
 
 
 def held(motion):
@@ -35,8 +25,8 @@ def held(motion):
     return {name for name in DERIVED if name in vars(motion)}
 
 
-def test_nothing_is_derived_before_it_is_asked_for():
-    motion = flight()
+def test_nothing_is_derived_before_it_is_asked_for_and_samples_are_one_s_own():
+    motion, other = fly(), fly()
     motion.q, motion.t, motion.attitude, motion.tail, motion.segments  # noqa: B018
     assert held(motion) == set()
     assert motion.kinetic is motion.kinetic and held(motion) == {"kinetic", "potential"}
@@ -44,86 +34,56 @@ def test_nothing_is_derived_before_it_is_asked_for():
     assert motion.info is motion.info
     with pytest.raises(AttributeError):
         motion.nothing  # noqa: B018
-
-
-def test_derived_fields_are_those_of_the_model():
-    motion = flight()
-    kinetic, potential = model().energy(motion.q, motion.v)
-    linear, angular = model().momentum(motion.q, motion.v)
-    expected = {"kinetic": kinetic, "potential": potential}
-    expected |= {"linear_momentum": linear, "angular_momentum": angular}
-    for name, array in expected.items():
-        np.testing.assert_array_equal(getattr(motion, name), array, err_msg=name)
-    lost = motion.energy[0] - motion.energy[-1]
-    assert lost > 0 and motion.info["work_J"]["damping"] == pytest.approx(-lost, rel=1e-5)
+    for name in ("t", "q", "v", "tau", "kinetic", "linear_momentum"):
+        array = getattr(motion, name)
+        assert not array.flags.writeable and array.dtype == np.float64
+        assert not np.shares_memory(array, getattr(other, name))
 
 
 def timeless(info):
     return {k: v for k, v in info.items() if not k.endswith("seconds")}
 
 
-def test_whatever_is_asked_for_first(tmp_path):
-    whole = dataclasses.replace(flight())
-    assert held(whole) == {*DERIVED} and LATER not in vars(whole)
-    uses = {
-        name: lambda motion, name=name: getattr(motion, name) for name in (*DERIVED, "warnings")
-    }
-    uses |= {
-        "save": lambda motion: motion.save(tmp_path / "motion"),
-        "replace": dataclasses.replace,
-        "resample": lambda motion: motion.resample(motion.t[::2]),
-        "summary": lambda motion: st.summary(model(), motion),
-    }
-    for first, use in uses.items():
-        motion = flight()
-        use(motion)
-        with row(first):
-            assert timeless(motion.info) == timeless(whole.info)
-            for name in DERIVED[:4]:
-                np.testing.assert_array_equal(getattr(motion, name), getattr(whole, name))
-
-
-def test_copies_have_all_fields(tmp_path):
-    ways = {
+def test_whatever_is_asked_for_first_and_copies_have_all_fields(tmp_path):
+    copies = {
         "file": lambda motion: st.Trajectory.load(motion.save(tmp_path / "motion")),
         "pickle": lambda motion: pickle.loads(pickle.dumps(motion)),
         "copy": copy.copy,
         "deepcopy": copy.deepcopy,
         "replace": dataclasses.replace,
     }
-    for name, way in ways.items():
-        motion = flight()
-        twin = way(motion)
-        with row(name):
-            assert held(twin) == {*DERIVED} and LATER not in vars(twin)
-            for entry in dataclasses.fields(st.Trajectory):
-                one, other = getattr(twin, entry.name), getattr(motion, entry.name)
-                if isinstance(one, np.ndarray):
+    uses = copies | {
+        "resample": lambda motion: motion.resample(motion.t[::2]),
+        "summary": lambda motion: st.summary(tail(), motion),
+    }
+    for name in (*DERIVED, "warnings"):
+        uses[name] = lambda motion, name=name: getattr(motion, name)
+    whole = dataclasses.replace(fly())
+    for first, use in uses.items():
+        motion = fly()
+        twin = use(motion)
+        with row(first):
+            assert timeless(motion.info) == timeless(whole.info)
+            for name in DERIVED[:4]:
+                np.testing.assert_array_equal(getattr(motion, name), getattr(whole, name))
+            if first in copies:
+                assert held(twin) == {*DERIVED} and LATER not in vars(twin)
+                assert twin.info == motion.info and twin.contact is None
+                for name in ARRAYS:
+                    one, other = getattr(twin, name), getattr(motion, name)
                     assert (one.dtype, one.tobytes()) == (other.dtype, other.tobytes())
-            assert twin.info == motion.info and twin.contact is None
 
 
 def test_threads_that_ask_at_once_get_one_array():
-    motion, found, together = flight(), [], threading.Barrier(8)
+    motion, together = fly(), threading.Barrier(8)
 
-    def ask():
+    def ask(_):
         together.wait()
-        found.append((motion.kinetic, motion.info))
+        return motion.kinetic, motion.info
 
-    threads = [threading.Thread(target=ask) for _ in range(8)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    with ThreadPoolExecutor(8) as pool:
+        found = list(pool.map(ask, range(8)))
     assert all(kinetic is motion.kinetic and info is motion.info for kinetic, info in found)
-
-
-def test_samples_are_read_only_and_one_s_own():
-    one, other = flight(), flight()
-    for name in ("t", "q", "v", "tau", "kinetic", "linear_momentum"):
-        array = getattr(one, name)
-        assert not array.flags.writeable and array.dtype == np.float64
-        assert not np.shares_memory(array, getattr(other, name))
 
 
 @pytest.mark.parametrize(("name", "fast"), [("m2_n2", 1e160), ("single", 1e25)])
@@ -132,9 +92,8 @@ def test_what_no_number_may_hold_is_told_at_once(name, fast):
     one, how = zoo.model(name), {"t_span": 1e-3, "method": "rk4"}
     q0, v0 = np.eye(1, one.nq, 3)[0], np.zeros(one.nv)
     v0[0] = fast
-    with pytest.raises(
-        st.SimulationError, match=r"^from t = 0 s to 0\.001 s, by sample: energy: .*state 0"
-    ):
+    words = r"^from t = 0 s to 0\.001 s, by sample: energy: .*state 0"
+    with pytest.raises(st.SimulationError, match=words):
         st.simulate(one, q0, v0, **how)
     v0[0] = fast**0.3  # held, but not beyond doubt
     motion = st.simulate(one, q0, v0, **how)
@@ -170,7 +129,6 @@ def test_many_runs_are_measured_when_somebody_asks(name):
 
 
 METHODS = ["tsit5", "ros34pw2", "rk4", "implicit_euler", "dop853", "lsoda"]
-LEGS = st.Legs.fixed(3.6, -0.3)
 
 
 @pytest.fixture(autouse=True)
@@ -184,9 +142,12 @@ def joined(parts, name):
 
 
 def test_each_sample_comes_once_and_nothing_changes():
+    parts = []
+    st.Scenario(tail(), Q0, V0, 0.1).simulate(watch=parts.append)
+    assert parts[-1].t[-1] == 0.1
     for method in METHODS:
         parts = []
-        how = {"controller": st.Damping(1e-6), "t_span": 1.0, "output_step": 0.01}
+        how = {"controller": DAMPING, "t_span": 1.0, "output_step": 0.01}
         motion = fly(method=method, watch=parts.append, **how)
         unwatched = fly(method=method, **how)
         for name in ARRAYS:
@@ -197,39 +158,28 @@ def test_each_sample_comes_once_and_nothing_changes():
         assert all("imbalance" not in part.info for part in parts) and "imbalance" in motion.info
 
 
-def test_on_the_ground_contacts_come_too():
-    q = [0, 0, 0.05, 1, 0, 0, 0, 0.1, 0]
-    for controller in (None, lambda t, q, v: [0.0, 0.0]):
-        parts, how = [], {"legs": LEGS, "t_span": 0.2, "rtol": 1e-6, "controller": controller}
+def test_on_the_ground_contacts_come_too_and_a_stop_is_the_last_sample():
+    q = [0, 0, 0.06, 1, 0, 0, 0, 0.1, 0]
+    law, stop = (lambda t, q, v: [0.0, 0.0]), [("touch_down", "feet")]
+    for own in ({}, {"controller": law}, {"stop_at": stop, "output_step": 0.01}):
+        parts, how = [], {"legs": LEGS, "t_span": 0.2, "rtol": 1e-6} | own
         motion = st.simulate(rat(), q, np.zeros(8), watch=parts.append, **how)
+        assert joined(parts, "t").tolist() == motion.t.tolist()
+        assert (motion.t[-1] < 0.2) == ("stop_at" in own)
         for name in ("points", "forces", "bristles", "legs"):
             told = np.concatenate([getattr(part.contact, name) for part in parts])
             assert np.array_equal(told, getattr(motion.contact, name)), name
         assert len(parts) > 1
 
 
-def test_a_stop_at_an_event_is_the_last_sample():
-    parts, q = [], [0, 0, 0.06, 1, 0, 0, 0, 0.1, 0]
-    how = {"legs": LEGS, "stop_at": [("touch_down", "feet")], "output_step": 0.01}
-    motion = st.simulate(rat(), q, np.zeros(8), watch=parts.append, **how)
-    assert motion.t[-1] < 1 and joined(parts, "t").tolist() == motion.t.tolist()
+def test_a_run_that_ends_early_is_told_up_to_there():
+    """By an error of its controller or of what watches it, or by Ctrl-C."""
 
-
-def test_a_run_that_fails_is_told_up_to_there():
     def tired(t, q, v):
         if t > 0.1:
             raise st.SimulationError("it is tired")
         return np.zeros(4)
 
-    for method in ("tsit5", "dop853"):
-        parts = []
-        with pytest.raises(st.SimulationError, match="it is tired") as caught:
-            fly(controller=tired, method=method, watch=parts.append)
-        assert joined(parts, "t").tolist() == caught.value.trajectory.t.tolist()
-        assert not any("failure" in part.info for part in parts)
-
-
-def test_what_it_raises_ends_the_run_and_ctrl_c_keeps_the_motion():
     def refuse(part):
         raise ArithmeticError("no more")
 
@@ -237,6 +187,12 @@ def test_what_it_raises_ends_the_run_and_ctrl_c_keeps_the_motion():
         if part.t[-1] > 0.05:
             raise KeyboardInterrupt
 
+    for method in ("tsit5", "dop853"):
+        parts = []
+        with pytest.raises(st.SimulationError, match="it is tired") as caught:
+            fly(controller=tired, method=method, watch=parts.append)
+        assert joined(parts, "t").tolist() == caught.value.trajectory.t.tolist()
+        assert not any("failure" in part.info for part in parts)
     for method in ("rk4", "dop853"):
         with row(method), pytest.raises(ArithmeticError, match="no more"):
             fly(method=method, watch=refuse)
@@ -252,17 +208,3 @@ def test_it_is_called_after_a_pause_at_the_least(monkeypatch):
     fly(watch=lambda part: calls.append(time.perf_counter()), **how)
     between = np.diff(calls[:-1])  # the last is at the end
     assert len(calls) > 2 and between.min() >= 0.02
-
-
-def test_what_cannot_watch_or_be_watched_is_refused():
-    for watch in (3, "print"):
-        with row(watch), pytest.raises(st.SimulationError, match=r"watch: value "):
-            fly(watch=watch)
-    with pytest.raises(st.SimulationError, match="watch: many starts"):
-        st.simulate(tail(), *starts(tail(), 2), watch=print)
-
-
-def test_a_scenes_motion_can_be_watched():
-    parts = []
-    st.Scenario(model(), Q0, V0, 0.1).simulate(watch=parts.append)
-    assert parts[-1].t[-1] == 0.1

@@ -1,13 +1,18 @@
-"""Elastic tails in simulations: books of long runs, stops, methods, tracking, the ground."""
+"""Elastic tails in simulations: books of long runs, stops, methods, tracking, the ground; small
+oscillations are those of linear mechanics, of cantilevers and of arcs.
+"""
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 
 import serpentail as st
 from serpentail.motion.numbers import com_rise
-from tests.references.metrics import block_error
+from tests.references.exact_continuum import ExactContinuum
+from tests.references.parameters import TABLE_1
 from tests.references.passive import PassiveTail
 from tests.support import zoo
+from tests.support.models import model_folder
 from tests.support.rows import row
 from tests.support.zoo import ELASTIC
 
@@ -25,7 +30,7 @@ def elastic(name="elastic", **changes):
 
 def bent(angles):
     """A start at rest with an upright torso."""
-    return np.concatenate([[0, 0, 0, 1, 0, 0, 0], np.broadcast_to(angles, 4)]), np.zeros(10)
+    return np.append([0, 0, 0, 1.0, 0, 0, 0], np.broadcast_to(angles, 4)), np.zeros(10)
 
 
 @pytest.mark.parametrize("name", TAILS)
@@ -64,13 +69,6 @@ def test_damping_of_the_tail_and_of_a_controller_add_up():
     found, expected = (run.info["work_J"]["damping"] for run in (both, alone))
     assert found == pytest.approx(expected, rel=1e-7)
     assert not alone.tau.any() and both.tau.any()
-
-
-def test_work_of_the_tails_damping_is_the_integral_of_its_power():
-    for name in TAILS:
-        run = st.simulate(elastic(name), *bent([0.3, -0.2, 0.2, 0.1]), t_span=0.2, **FINE)
-        power = -(run.v[:, 6:] ** 2) @ ELASTIC["tail_damping"]
-        assert run.info["work_J"]["damping"] == pytest.approx(np.trapezoid(power, run.t), rel=1e-4)
 
 
 def test_a_rise_is_that_of_the_centre_of_mass_whatever_a_tail_stores():
@@ -135,13 +133,6 @@ def test_stiff_springs_get_a_method_for_them():
     assert tracked.info["method"] == "tsit5" and tracked.info["steps"] < 50
 
 
-def test_implicit_steps_are_stable_far_beyond_a_stiff_tail():
-    """Explicit steps would have to be below 1e-5 s; a damped tail comes to rest by 1 ms."""
-    model = elastic(tail_stiffness=300.0, tail_damping=1.0)
-    run = st.simulate(model, *bent(0.16), t_span=0.5, method="implicit_euler", step=1e-3)
-    np.testing.assert_allclose(run.tail[-1], ELASTIC["tail_rest"], atol=1e-3)
-
-
 def test_a_passive_tail_is_tracked_as_one_without():
     model, bare, own = elastic(), zoo.model("m2_n2"), PassiveTail(ELASTIC, 4)
     (q, v), times = bent(0.0), np.linspace(0, 0.5, 11)
@@ -158,41 +149,105 @@ def test_a_passive_tail_is_tracked_as_one_without():
         np.testing.assert_allclose(run.tau, torques, atol=1e-6, err_msg=method)
 
 
-def landing():
-    """A start above the ground, tilted, its tail bent."""
-    q, v = np.zeros(11), np.zeros(10)
-    q[2:7] = 0.12, np.cos(0.2), np.sin(0.2), 0.1, 0
-    q[7:] = 0.3, 0.1, -0.2, 0.1
-    v[1:6] = 0.3, -0.5, 2.0, 1.0, 0.0
-    return q, v
-
-
-def test_the_ground_acts_beside_what_the_tail_asks_for():
-    """Against the same tail without passive parts, whose torques are less by the reference's."""
-    model, bare = zoo.model("elastic_ground"), zoo.model("ground_m2_n2")
-    own, rng = PassiveTail(ELASTIC, 4), np.random.default_rng(3)
-    legs, (q, v) = np.array([3.6, -0.4, 3.7, -0.6, 5, -20, -8, 10.0]), landing()
-    q[2] = 0.03
-    for _ in range(5):
-        q[7:], v[6:] = rng.uniform(-1, 1, 4), rng.uniform(-5, 5, 4)
-        tau = rng.uniform(-1e-3, 1e-3, 4)
-        bristles = 1e-4 * rng.normal(size=2 * sum(model.contacts.values()))
-        found = model.contact_dynamics(q, v, tau, bristles, legs)
-        left = tau - own.force(q[7:], v[6:])
-        expected = bare.contact_dynamics(q, v, left, bristles, legs)
-        assert np.abs(expected[2]).max() > 0
-        assert block_error(found[0], expected[0]) < 1e-10
-        np.testing.assert_array_equal(found[2], expected[2])
-
-
 @pytest.mark.parametrize("stiffness", [0.004, 1.0])
 def test_an_elastic_tail_lands_with_books_that_balance(stiffness):
     """By implicit steps, which take about as many for a stiff tail; better with the tolerance."""
     model, left = elastic("elastic_ground", tail_stiffness=stiffness, tail_damping=1e-3), []
+    q = [0, 0, 0.12, np.cos(0.2), np.sin(0.2), 0.1, 0, 0.3, 0.1, -0.2, 0.1]
+    v = [0, 0.3, -0.5, 2, 1, 0, 0, 0, 0, 0]
     legs = st.Legs.fixed(np.radians(210), np.radians(-40))
     for rtol in (1e-4, 1e-6):
-        run = st.simulate(model, *landing(), t_span=0.4, legs=legs, rtol=rtol)
+        run = st.simulate(model, q, v, t_span=0.4, legs=legs, rtol=rtol)
         assert run.info["method"] == "ros34pw2" and run.info["warnings"] == []
         assert run.info["work_J"]["damping"] < 0 and run.info["events"]
         left.append(run.info["imbalance"]["relative"])
     assert left[1] < 1e-4 and left[1] < 0.4 * left[0]
+
+
+LENGTH, DENSITY = TABLE_1["tail_length"], TABLE_1["tail_mass"] / TABLE_1["tail_length"]
+# beta L of the first two modes of a cantilever: roots of cos x cosh x = -1
+CANTILEVER = np.array([1.8751040687119611, 4.694091132974175])
+BENDING = 1e-4  # N m^2, EI
+HEAVY = {"torso_mass": 1e6 * TABLE_1["torso_mass"]}
+HEAVY |= {"torso_inertia": tuple(1e6 * each for each in TABLE_1["torso_inertia"])}
+STIFFNESS = np.array([2e-3, 3e-3, 1e-3, 4e-3])
+REST = np.array([0.2, -0.1, 0.3, 0.0])
+RESTING = bent(REST)[0]
+
+
+def check_modes(model, begin, M, rest, damping):
+    """Started in a mode at 1e-4 rad a tail keeps it: K x + damping K x' + M x'' = 0; the runs."""
+    runs, (squares, shapes) = [], eigh(np.diag(STIFFNESS), M)
+    for square, shape in zip(squares, shapes.T, strict=True):
+        start = 1e-4 * shape / np.abs(shape).max()
+        how = {"t_span": 6 * np.pi / np.sqrt(square), "method": "tsit5", "rtol": 1e-10}
+        run = st.simulate(model, *begin(rest + start), **how)
+        # x'' + damping w^2 x' + w^2 x = 0 from x = 1, x' = 0
+        roots = np.roots([1, damping * square, square])
+        parts = np.linalg.solve([[1, 1], roots], [1, 0])
+        x = np.real(np.exp(np.outer(run.t, roots)) @ parts)
+        assert np.abs(run.tail - rest - np.outer(x, start)).max() < 2e-7
+        runs.append(run)
+    return runs
+
+
+def springs(damping):
+    """Parameters of springs, and of damping that is ``damping`` times as much."""
+    given = {"tail_rest": REST, "tail_stiffness": STIFFNESS, "tail_damping": damping * STIFFNESS}
+    return {name: each.tolist() for name, each in given.items()}
+
+
+def chain_inertia():
+    """Of the tail of links at REST, by MuJoCo."""
+    pytest.importorskip("mujoco")
+    from tests.references.mujoco_chain import MujocoChain
+
+    return MujocoChain(TABLE_1, 2, 2).mass_matrix(RESTING)
+
+
+@pytest.mark.parametrize("name", TAILS)
+def test_small_oscillations_are_those_of_the_linear_tail(name):
+    """Of the tail's inertia on a torso that is free, by another derivation of the same tail."""
+    H = chain_inertia() if name == "elastic" else ExactContinuum(TABLE_1, 2).mass_matrix(RESTING)
+    far = {"tail_stop_lower": -3, "tail_stop_upper": 3, "gravity": 0}
+    for damping in (0.0, 2e-3):
+        model = zoo.model(name).with_parameters(**far, **springs(damping))
+        with row(damping):
+            check_modes(model, bent, np.linalg.inv(np.linalg.inv(H)[6:, 6:]), REST, damping)
+
+
+def test_small_oscillations_on_a_fixed_base_are_those_of_a_held_tail():
+    """The model is of its own: no other has springs on a base that never moves."""
+    H = chain_inertia()[6:, 6:]
+    own = {"functions": ["energy", "momentum", "rollout"], "parameters": springs(2e-3)}
+    model = st.load(model_folder(2, 2, base="fixed", weightless=True, **own))
+    runs = check_modes(model, lambda angles: (angles, np.zeros(4)), H, REST, 2e-3)
+    assert max(run.info["imbalance"]["relative"] for run in runs) < 1e-5
+
+
+def clamped(model, stiffness):
+    """Frequencies of a straight tail on a torso that is a million times as heavy, over a
+    cantilever's first.
+    """
+    q = np.eye(1, model.nq, 3)[0]
+    M = np.linalg.inv(np.linalg.inv(model.with_parameters(**HEAVY).mass_matrix(q))[6:, 6:])
+    squares = eigh(stiffness * np.eye(len(M)), M, eigvals_only=True)
+    first = CANTILEVER[0] ** 2 * np.sqrt(BENDING / (DENSITY * LENGTH**4))
+    return np.sqrt(squares) / first
+
+
+@pytest.mark.filterwarnings("ignore::serpentail.errors.UnusualSize")
+def test_arcs_converge_to_the_euler_bernoulli_cantilever():
+    """Arcs of stiffness EI / L_arc; a single one has sqrt(20 EI / (rho L^4)), and the error falls
+    as the square of their number.
+    """
+    ratio, first, second = (CANTILEVER[1] / CANTILEVER[0]) ** 2, [], []
+    for arcs in (1, 2, 3):
+        found = clamped(zoo.model(f"arcs{arcs}"), BENDING / (LENGTH / arcs))
+        first.append(found[0] - 1)
+        second += [found[2] / ratio - 1] if arcs > 1 else []
+        assert found[1] == pytest.approx(found[0], rel=1e-6)  # both planes
+    assert first[0] + 1 == pytest.approx(np.sqrt(20) / CANTILEVER[0] ** 2, rel=1e-5)
+    for errors in (first, second):
+        assert (np.diff(errors) < 0).all() and min(errors) > 0
+    assert first[1] / first[2] == pytest.approx((3 / 2) ** 2, rel=0.1)

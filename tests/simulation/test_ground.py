@@ -1,5 +1,6 @@
 """Motion on the ground: the paper's jump comes out, methods agree, touch-downs and take-offs are
-found, and runs that are stopped or paused are what they are whole.
+found, and runs that are stopped or paused are what they are whole. Sliders stop where Coulomb says,
+forces move the centre of mass, and books balance.
 """
 
 from functools import cache
@@ -12,10 +13,13 @@ from serpentail.simulation import compiled_run
 from tests.support import zoo
 from tests.support.rows import row
 
+from .runs import centre_of_mass, summed
+
 DEGREES = np.pi / 180
-GAMMA, CROUCH, STRETCH = 210 * DEGREES, -15 * DEGREES, -75 * DEGREES
+GAMMA, CROUCH, STRETCH = np.radians([210.0, -15.0, -75.0])
 KICK = st.Legs.ramp(GAMMA, (CROUCH, STRETCH), at=0.4, rate=-70)
 PASSIVE = st.Damping(1e-3)
+FIXED = st.Legs.fixed(GAMMA, CROUCH)
 
 
 def rat():
@@ -26,9 +30,8 @@ def rat():
 @cache
 def crouched():
     """Settled in a crouch: q, v, bristles; the paper's start of the kick."""
-    q, legs = np.zeros(9), st.Legs.fixed(GAMMA, CROUCH)
-    q[2:5] = 0.0178, np.cos(0.11), np.sin(0.11)
-    acting = {"controller": PASSIVE, "legs": legs}
+    q = np.array([0, 0, 0.0178, np.cos(0.11), np.sin(0.11), 0, 0, 0, 0])
+    acting = {"controller": PASSIVE, "legs": FIXED}
     return st.simulate(rat(), q, np.zeros(8), t_span=1.5, rtol=1e-6, **acting)
 
 
@@ -52,10 +55,7 @@ def test_the_kick_is_the_papers():
     """Sect. 4: take-off, about 0.6 m, and landing at 1.08 s or so (Eq. 48)."""
     flight = kick(rtol=1e-6, output_step=0.01)
     off, down = flight.events
-    assert [(e["kind"], e["group"]) for e in (off, down)] == [
-        ("take_off", "feet"),
-        ("touch_down", "feet"),
-    ]
+    assert (off["kind"], down["kind"]) == ("take_off", "touch_down")
     assert off["time"] == pytest.approx(0.404, abs=1e-3)
     assert down["time"] == pytest.approx(1.095, abs=2e-3)
     assert flight.q[:, 2].max() == pytest.approx(0.632, abs=2e-3)
@@ -92,9 +92,10 @@ def test_fixed_steps_never_blow_up():
 def test_a_model_in_single_precision_lands_too():
     q, v = np.zeros(9), np.zeros(8)
     q[2:5], v[:4] = (0.13, np.cos(0.2), np.sin(0.2)), (0.3, 0.2, 0, 1)
-    how = {"legs": st.Legs.fixed(GAMMA, CROUCH), "controller": PASSIVE, "t_span": 0.25}
+    how = {"legs": FIXED, "controller": PASSIVE, "t_span": 0.25}
     runs = [st.simulate(zoo.model(n), q, v, **how) for n in ("ground", "single_ground")]
     assert 0 < np.abs(runs[1].q - runs[0].q).max() < 0.01
+    assert runs[1].info["warnings"] == [] and runs[1].info["imbalance"]["relative"] < 0.1
     first, other = (run.events[0] for run in runs)
     assert first["group"] == other["group"]
     assert other["time"] == pytest.approx(first["time"], abs=1e-3)
@@ -142,13 +143,13 @@ def test_a_run_that_is_paused_after_each_few_steps_gives_the_same_bits(monkeypat
 def test_a_step_may_be_so_short_that_its_square_is_zero():
     """A phase that begins after next to no time: the first step ends there."""
     q, v = np.eye(1, 9, 3)[0], np.full(8, 0.1)
-    q[2], law = 0.3, st.Damping(1e-3)
+    q[2] = 0.3
     for method in ("tsit5", "ros34pw2", "rk4"):
-        how = {"t_span": 2e-3, "legs": st.Legs.fixed(3.6, -0.3), "method": method}
+        how = {"t_span": 2e-3, "legs": FIXED, "method": method}
         plain = st.simulate(rat(), q, v, **how)
         for begin in (1e-160, 1e-180, 1e-300, 5e-324):
             with row(method, begin):
-                phases = st.Phases([(0.0, law), (begin, None)])
+                phases = st.Phases([(0.0, PASSIVE), (begin, None)])
                 found = st.simulate(rat(), q, v, controller=phases, **how)
                 assert found.events == [] and found.info["steps"] < 300
                 np.testing.assert_allclose(found.q, plain.q, rtol=0, atol=1e-12)
@@ -170,7 +171,6 @@ def test_contact_is_what_the_model_says_also_from_a_file(tmp_path):
         np.testing.assert_array_equal(getattr(again.contact, name), getattr(flight.contact, name))
     assert again.contact.groups == {"feet": 6} and again.events == flight.events
     assert again.resample([0.1, 0.2]).contact.points.shape == (2, 6, 3)
-    assert flight.info["seconds"] > 0 and flight.info["cpu_seconds"] >= 0
 
 
 WRONG = [
@@ -207,17 +207,94 @@ def test_wrong_settings_and_legs_are_named():
             st.Legs.moves(3.6, -0.3, [move])
 
 
-def test_a_start_in_the_ground_is_refused_with_its_depth():
-    q = crouched().q[-1].copy()
-    q[2] -= 0.05
-    words = r"^q0: point \d \(feet\) is 5\d(\.\d)? mm deep .*q0\[2\] by 0\.05"
-    with pytest.raises(st.SimulationError, match=words):
-        st.simulate(rat(), q, np.zeros(8), legs=KICK)
-
-
 def test_each_leg_has_its_own_angles():
     curve = st.Legs([0, 1], 3.5, [[-0.2, -0.4], [-0.6, -0.4]]).curve
     values, rates, _ = curve.at(0.25)
     np.testing.assert_allclose(values, [3.5, -0.3, 3.5, -0.4])
     np.testing.assert_allclose(rates, [0, -0.4, 0, 0])
     assert KICK.curve.kinks(2) == pytest.approx([0.4, 0.4 + (CROUCH - STRETCH) / 70])
+
+
+G, MU, STOP = 9.8, 0.5, 1 / (2 * 0.5 * 9.8)  # m/s^2, and 102 mm from 1 m/s
+
+
+LAWS = {"cone": "ground", "box": "box", "smooth": "smooth", "paper": "paper"}
+
+
+def slide(friction, heading):
+    """The motion of a torso of 0.1 kg that cannot turn, and whose tail and feet hang in the air."""
+    model = zoo.model(LAWS[friction]).with_parameters(
+        torso_mass=0.1, tail_mass=1e-9, torso_inertia=(1e3,) * 3, mu=MU, tail_mount=(0, 0, 0.3)
+    )
+    depth = (0.1 * G / model.parameters["K_n"]) ** (2 / 3)
+    q, v = np.zeros(9), np.zeros(8)
+    q[2:4] = model.parameters["torso_semi_axes"][2] - depth, 1
+    v[:2] = np.cos(heading), np.sin(heading)
+    lifted = st.Legs.fixed(np.pi / 2, np.pi / 2)  # feet above the torso
+    how = {"legs": lifted, "controller": st.Damping(1e-9), "rtol": 1e-7, "output_step": 1e-3}
+    return st.simulate(model, q, v, t_span=0.6, **how)
+
+
+@pytest.mark.filterwarnings("ignore::serpentail.errors.UnusualSize")
+@pytest.mark.filterwarnings("ignore::serpentail.errors.UnlikeBodies")
+def test_sliders_stop_where_coulomb_says():
+    """At any heading; a box is stronger on diagonals, smooth laws creep, the paper's pulls back."""
+    for heading in np.radians([0, 30, 45, 117, 200, 315]):
+        way = slide("cone", heading).q[-1, :2]
+        with row(heading):
+            assert np.linalg.norm(way) == pytest.approx(STOP, rel=0.01)
+            assert way @ [np.sin(heading), -np.cos(heading)] == pytest.approx(0, abs=1e-6)
+    along, across = (np.linalg.norm(slide("box", h).q[-1, :2]) for h in (np.pi / 2, np.pi / 4))
+    assert along == pytest.approx(STOP, rel=0.01)
+    assert across == pytest.approx(STOP / np.sqrt(2), rel=0.02)
+    way = slide("smooth", 0.7).q[-1, :2]
+    assert STOP < np.linalg.norm(way) < 1.1 * STOP
+    assert np.arctan2(way[1], way[0]) == pytest.approx(0.7, abs=1e-6)
+    # a spring holds MU * 0.98 N, and gives back no more than 63 mm/s, but by the paper's law
+    spring = MU * 0.1 * G / np.sqrt(0.1 * 600)
+    assert slide("cone", 0.0).v[:, 0].min() > -spring > 5 * slide("paper", 0.0).v[:, 0].min()
+
+
+@pytest.mark.parametrize(("name", "height"), [("ground", 0.13), ("ground_mixed", 0.3)])
+def test_external_forces_alone_move_the_centre_of_mass(name, height):
+    """Momentum is the impulse of weight and ground; angular momentum about the centre that of the
+    ground's moments. The first touch is where the lowest point reaches the ground.
+    """
+    model = zoo.model(name)
+    q, v = np.zeros(model.nq), np.zeros(model.nv)
+    q[2:5], q[7:] = (height, np.cos(0.2), np.sin(0.2)), 0.05
+    v[:5] = 0.3, 0.2, 10 * (0.13 - height), 1, 0.5
+    how = {"legs": FIXED, "controller": PASSIVE, "rtol": 1e-8, "output_step": 2e-5}
+    flight = st.simulate(model, q, v, t_span=0.22, **how)
+    forces, points, t = flight.contact.forces, flight.contact.points, flight.t
+    mass = model.parameters["torso_mass"] + model.parameters["tail_mass"]
+    impulse = summed(forces.sum(axis=1) - [0, 0, mass * G], t)
+    momentum = flight.linear_momentum
+    assert np.ptp(impulse[:, 2]) > 0.05  # it landed
+    np.testing.assert_allclose(momentum - momentum[0], impulse, atol=2e-4 * np.abs(momentum).max())
+    centre = centre_of_mass(model, flight)
+    np.testing.assert_allclose(centre - centre[0], summed(momentum / mass, t), atol=1e-7)
+    moments = np.cross(points - centre[:, None], forces).sum(axis=1)
+    angular = flight.angular_momentum
+    most = 1e-3 * np.abs(angular).max()
+    np.testing.assert_allclose(angular - angular[0], summed(moments, t), atol=most)
+    lowest = points[..., 2].min(axis=1)
+    k = int(np.argmax(lowest < 0))
+    share = lowest[k - 1] / (lowest[k - 1] - lowest[k])
+    assert flight.events[0]["kind"] == "touch_down"
+    assert flight.events[0]["time"] == pytest.approx(t[k - 1] + share * 2e-5, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["ground_mixed", "ground_arcs"])
+def test_other_tails_land_with_books_that_balance_better_with_the_tolerance(name):
+    model, left = zoo.model(name), []
+    q, v = np.zeros(model.nq), np.zeros(model.nv)
+    q[2:5], v[:6] = (0.12, np.cos(0.3), np.sin(0.3)), (0.3, 0.2, 0.0, 1.0, 0.5, 0.2)
+    q[7:9] = -0.4, 0.2
+    how = {"t_span": 0.35, "legs": FIXED, "controller": PASSIVE}
+    for rtol in (1e-4, 1e-6):
+        run = st.simulate(model, q, v, rtol=rtol, **how)
+        left.append(run.info["imbalance"]["relative"])
+        assert run.info["work_J"]["ground"] < 0 and run.info["work_J"]["damping"] < 0
+        assert {event["group"] for event in run.events} >= {"tail", "feet"}
+    assert left[1] < 1e-4 and left[1] < 0.2 * left[0]

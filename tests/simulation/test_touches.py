@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.motion.summary import summary
 from serpentail.simulation.ground import Ground
 from serpentail.simulation.piecewise import Piecewise
 from tests.support import zoo
@@ -25,7 +24,7 @@ METHODS = [
 ]
 NAMES = ["-".join(map(str, how.values())) for how in METHODS]
 TAILS = {"links": "ground_m2_n2", "arcs": "ground_arcs"}
-QUICK, MANY = 20, 200
+QUICK = 20
 
 
 def animal(tail="links"):
@@ -85,19 +84,12 @@ def missed(tail, count, how):
     return misses
 
 
+@pytest.mark.parametrize("count", [QUICK, pytest.param(200, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("how", METHODS, ids=NAMES)
-def test_no_grazing_touch_is_missed(how):
+def test_no_grazing_touch_is_missed(how, count):
     for tail in TAILS:
         with row(tail):
-            assert missed(tail, QUICK, how) == []
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("how", METHODS, ids=NAMES)
-def test_none_of_many_is_missed(how):
-    for tail in TAILS:
-        with row(tail):
-            assert missed(tail, MANY, how) == []
+            assert missed(tail, count, how) == []
 
 
 def test_a_tail_that_dips_in_between_stages_is_felt():
@@ -120,16 +112,6 @@ def test_a_tail_that_dips_in_between_stages_is_felt():
             assert run.warnings == [] and run.info["rejected"] <= most
 
 
-def test_a_touch_that_fixed_steps_jump_over_is_told():
-    """Steps of a fixed length are not cut; the touch is an event, and the result says so."""
-    q, v = (each[0] for each in grazes("links", QUICK)[:2])
-    run = flown(animal(), q, v, method="implicit_euler", step=0.005, output_step=SPAN)
-    if run.info["unfelt"] == 0:  # another path: what it met must then have been felt
-        assert sum(abs(each[2]) for each in run.info["impulse_N_s"].values()) > 0
-    else:
-        assert "shorter than a step" in " ".join(run.warnings)
-
-
 def test_a_force_that_comes_again_in_the_ground_is_no_new_touch():
     """A group takes off where its force ceases for the last time before it is out of the ground."""
     ground = Ground({"feet": 6, "tail": 3})
@@ -147,7 +129,6 @@ def test_methods_that_look_for_no_events_say_so():
         run = flown(animal(), q, v, method=method, rtol=1e-6, atol=1e-6)
         with pytest.raises(ValueError, match=f"events: {method}"):
             _ = run.events
-        assert summary(animal(), run)["take_off_s"] is None
 
 
 def test_a_step_that_turns_too_far_is_taken_shorter_or_refused():
@@ -158,24 +139,6 @@ def test_a_step_that_turns_too_far_is_taken_shorter_or_refused():
     assert run.info["steps"] * 2 > 300 * SPAN
     with pytest.raises(st.SimulationError, match="turns the torso too far"):
         flown(animal(), q, v, method="implicit_euler", step=0.02, output_step=0.06)
-
-
-def test_a_step_that_fails_on_a_touch_ends_there():
-    """Else it is shortened again and again, as those after it are: 0.46 and 0.23 were in vain."""
-    q, v = np.zeros((5, 11)), np.zeros((5, 10))
-    for k in range(5):  # animals that fall on feet, tail and torso
-        rng = np.random.default_rng(k)
-        q[k, 2:4], q[k, 4:7], q[k, 7:] = (
-            (0.1, 1),
-            0.1 * rng.normal(size=3),
-            0.2 * rng.normal(size=4),
-        )
-        v[k, 3:6] = rng.normal(size=3)
-    for method, rtol, most in (("ros34pw2", 1e-4, 0.4), ("tsit5", 1e-6, 0.16)):
-        runs = flown(animal(), q, v, t_span=0.2, method=method, rtol=rtol)
-        infos = [run.info for run in runs]
-        rejected, steps = (sum(info[name] for info in infos) for name in ("rejected", "steps"))
-        assert rejected < most * steps, method
 
 
 def test_a_touch_in_a_long_step_is_told_to_rounding():
@@ -194,7 +157,9 @@ def test_a_touch_in_a_long_step_is_told_to_rounding():
 
 
 def test_a_foot_that_dips_within_a_step_is_seen():
-    """Shanks swing by 0.01 rad there and back, on a parabola, in one step of a body at rest."""
+    """Shanks swing there and back, on a parabola, in one step of a body at rest. Steps of
+    a fixed length are not cut: the result says so.
+    """
     model, T = animal().with_parameters(gravity=0), 0.05
     swing = np.zeros((1, 4, 3))
     swing[0, :, 0] = np.radians([210, -50, 210, -50])
@@ -211,6 +176,7 @@ def test_a_foot_that_dips_within_a_step_is_seen():
     once = {"step": T, "t_span": T, "output_step": T}
     run = st.simulate(model, q, v, legs=legs, method="implicit_euler", **once)
     assert run.info["steps"] == 1
+    assert run.info["unfelt"] == 1 and "shorter than a step" in run.warnings[0]
     under, (down, off) = times[feet < feet[0] - dip / 2], run.events
     assert (down["kind"], off["kind"]) == ("touch_down", "take_off")
     assert down["time"] == pytest.approx(under[0], abs=1e-4)

@@ -2,8 +2,8 @@
 
 import gc
 import multiprocessing
-import threading
 import weakref
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -39,6 +39,10 @@ def waits(model):
 def assert_same(one, other):
     for name in FIELDS:
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
+    if one.contact is not None:
+        for name in ("bristles", "forces"):
+            arrays = (getattr(motion.contact, name) for motion in (one, other))
+            np.testing.assert_array_equal(*arrays, err_msg=name)
     infos = ({k: v for k, v in each.info.items() if k not in TIMES} for each in (one, other))
     assert next(infos) == next(infos)
 
@@ -52,41 +56,40 @@ HOW = [
 ]
 
 
-@pytest.mark.parametrize(("name", "nq"), [("m1_n3", 9), ("single", 11)])
-def test_bit_for_bit_what_it_is_the_first_time(name, nq):
-    each = tuple(np.linspace(1e-3, 2e-3, nq - 7).tolist())
-    for controller in (None, st.Damping(1e-3), st.Damping(each)):
-        for how in HOW:
-            model, asked = loaded(name), {"controller": controller, "t_span": (0.1, 0.3)} | how
-            found = [st.simulate(model, *start(k, nq), **asked) for k in range(3)]
-            assert len(waits(model)) == 1
-            for k, motion in enumerate(found):
-                with row(controller, how, k):
-                    assert_same(motion, first_of(start(k, nq), name, **asked))
-
-
-LEGS = st.Legs.fixed(np.radians(210), np.radians(-15))
-
-
 def above_ground(k):
     rng, q = np.random.default_rng(k), np.array([0, 0, 0.05, 1.0, 0, 0, 0, 0, 0])
     q[4:] = 0.1 * rng.normal(size=5)
     return q, 0.3 * rng.normal(size=8)
 
 
+def check_first(name, starts, **how):
+    """What starts give one after another is what each gives of a model for which no run waits."""
+    model = loaded(name)
+    found = [st.simulate(model, *each, **how) for each in starts]
+    assert len(waits(model)) == 1 and not np.shares_memory(found[0].q, found[1].q)
+    for each, motion in zip(starts, found, strict=True):  # after all have run
+        with row(how, each):
+            assert_same(motion, first_of(each, name, **how))
+    return found
+
+
+@pytest.mark.parametrize(("name", "nq"), [("m1_n3", 9), ("single", 11)])
+def test_bit_for_bit_what_it_is_the_first_time(name, nq):
+    each = tuple(np.linspace(1e-3, 2e-3, nq - 7).tolist())
+    for controller in (None, st.Damping(1e-3), st.Damping(each)):
+        for how in HOW:
+            acting = {"controller": controller, "t_span": (0.1, 0.3)} | how
+            check_first(name, [start(k, nq) for k in range(3)], **acting)
+
+
+LEGS = st.Legs.fixed(np.radians(210), np.radians(-15))
+
+
 def test_the_same_on_the_ground():
     acting = {"legs": LEGS, "controller": st.Damping(1e-3), "t_span": 0.2}
     for how in ({}, {"method": "tsit5", "rtol": 1e-4}, {"step": 1e-3}):
-        model, asked = loaded("feet_tail"), acting | how
-        found = [st.simulate(model, *above_ground(k), **asked) for k in range(3)]
-        assert len(waits(model)) == 1 and any(motion.events for motion in found)
-        for k, motion in enumerate(found):
-            first = first_of(above_ground(k), "feet_tail", **asked)
-            with row(how, k):
-                assert_same(motion, first)
-                for name in ("bristles", "forces"):
-                    one, other = (getattr(each.contact, name) for each in (motion, first))
-                    np.testing.assert_array_equal(one, other)
+        found = check_first("feet_tail", [above_ground(k) for k in range(3)], **acting | how)
+        assert any(motion.events for motion in found)
 
 
 def test_on_the_ground_what_differs_is_made_anew():
@@ -119,24 +122,9 @@ def test_auto_chooses_for_each_start():
     # just stiff for one of the starts
     rates = [float(words.split()[-2]) for words in decays]
     law = st.Damping(1e-3 * 5e3 / np.sqrt(np.prod(rates)))
-    runs = [
-        st.simulate(model, q, np.zeros(8), t_span=0.001, controller=law)
-        for q in (stretched, bent, stretched)
-    ]
-    found = [run.info["method"] for run in runs]
+    how, each = {"t_span": 1e-3, "controller": law}, (stretched, bent, stretched)
+    found = [st.simulate(model, q, np.zeros(8), **how).info["method"] for q in each]
     assert sorted({*found}) == ["ros34pw2", "tsit5"] and found[0] == found[2]
-
-
-def test_what_was_found_before_stays():
-    model = loaded()
-    first = st.simulate(model, *start(0), t_span=0.1)
-    before = {name: getattr(first, name).copy() for name in ("t", "q", "v", "tau")}
-    second = st.simulate(model, *start(1), t_span=0.1)
-    for name, array in before.items():
-        np.testing.assert_array_equal(getattr(first, name), array)
-        assert not np.shares_memory(getattr(first, name), getattr(second, name))
-    # books that are asked for late
-    assert first.info["imbalance"] == first_of(start(0), t_span=0.1).info["imbalance"]
 
 
 WRONG = [
@@ -206,21 +194,18 @@ def test_few_wait_and_none_keeps_its_model_alive():
 
 
 def test_threads_share_no_run():
-    model, wrong = loaded(), []
+    model = loaded()
     alone = [first_of(start(k), t_span=0.2) for k in range(4)]
 
     def fly(k):
         for _ in range(30):
             motion = st.simulate(model, *start(k), t_span=0.2)
-            if not (np.array_equal(motion.q, alone[k].q) and np.array_equal(motion.v, alone[k].v)):
-                wrong.append(k)
+            np.testing.assert_array_equal(motion.q, alone[k].q)
+            np.testing.assert_array_equal(motion.v, alone[k].v)
 
-    threads = [threading.Thread(target=fly, args=(k,)) for k in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert not wrong and len(waits(model)) == 1
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(fly, range(4)))
+    assert len(waits(model)) == 1
 
 
 @pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="needs fork")

@@ -1,44 +1,19 @@
-"""Free flight: samples are where they shall be, what mechanics conserves stays, and torques and
-damping change energy by their work.
+"""Flights: samples are where they shall be, what mechanics conserves stays, steps end at kinks,
+and what ends a run early is told.
 """
+
+import re
 
 import numpy as np
 import pytest
-from scipy.integrate import simpson
 
 import serpentail as st
 from tests.support import zoo
 from tests.support.rows import row
 
-from ..runs import NT, Q0, V0, fly, tail
+from ..runs import NT, Q0, V0, centre_of_mass, fly, tail
 
 TIGHT = {"method": "dop853", "rtol": 1e-13, "atol": 1e-15}
-DAMPING = np.array([2e-6, 1e-6, 3e-6, 4e-6])  # N m s, small enough for a tail that swings
-
-
-def total_mass():
-    return tail().parameters["torso_mass"] + tail().parameters["tail_mass"]
-
-
-def centre_of_mass(flight):
-    """Centre of mass (K, 3) from the positions of torso and links."""
-    points = tail().tail_points(flight.q)
-    links = (points[:, 1:] + points[:, :-1]) / 2
-    torso, own = tail().parameters["torso_mass"], tail().parameters["tail_mass"]
-    return (torso * flight.q[:, :3] + own * links.mean(axis=1)) / (torso + own)
-
-
-def test_velocities_are_the_rates_of_positions_and_quaternions_stay_units():
-    for method in ("rk4", "tsit5", "dop853"):
-        with row(method):
-            flight = fly(t_span=0.05, output_step=1e-4, method=method)
-            rates = (flight.q[2:] - flight.q[:-2]) / 2e-4
-            assert np.abs(rates[:, :3] - flight.v[1:-1, :3]).max() < 1e-3
-            assert np.abs(rates[:, 7:] - flight.v[1:-1, 6:]).max() < 1e-2
-            w, turn, spin = flight.q[1:-1, 3:4], flight.q[1:-1, 4:7], rates[:, 4:7]
-            omega = 2 * (w * spin - rates[:, 3:4] * turn - np.cross(turn, spin))
-            assert np.abs(omega - flight.v[1:-1, 3:6]).max() < 1e-2
-            assert np.abs(np.linalg.norm(flight.attitude, axis=1) - 1).max() < 1e-15
 
 
 def test_a_flight_does_not_depend_on_samples_or_on_the_norm_of_its_quaternion():
@@ -51,58 +26,24 @@ def test_a_flight_does_not_depend_on_samples_or_on_the_norm_of_its_quaternion():
     np.testing.assert_array_equal([*q0, *v0], [*given, *V0])
 
 
-def test_free_flight_conserves():
+def test_free_flight_conserves_and_the_centre_of_mass_flies_a_parabola():
+    mass = sum(tail().parameters[name] for name in ("torso_mass", "tail_mass"))
     for settings, drift in (({}, 1e-8), ({"method": "rk4"}, 1e-8), (TIGHT, 1e-12)):
-        with row(settings):
-            flight = fly(t_span=0.25, **settings)
-            assert not flight.tau.any()
-            assert np.abs(flight.energy - flight.energy[0]).max() < drift * flight.kinetic.max()
-            angular, linear = flight.angular_momentum, flight.linear_momentum
-            assert np.abs(angular - angular[0]).max() < drift * np.linalg.norm(angular[0])
-            fallen = linear + np.outer(flight.t, [0, 0, total_mass() * 9.8])
-            assert np.abs(fallen - linear[0]).max() < drift * np.linalg.norm(linear[0])
-            assert np.ptp(flight.kinetic) > 1e-3 * flight.kinetic.max()
-
-
-def test_energy_of_a_long_flight_drifts_by_rounding():
-    model = tail().with_parameters(gravity=0)
-    q, v = np.eye(1, model.nq, 3)[0], np.zeros(model.nv)
-    q[7:], v[3:6] = 0.1, [3, 2, 1]
-    flight = st.simulate(model, q, v, t_span=10, rtol=1e-8)
-    assert flight.info["method"] == "tsit5"
-    assert np.abs(flight.energy - flight.energy[0]).max() < 1e-8 * flight.energy[0]
-
-
-def test_the_centre_of_mass_flies_a_parabola():
-    for gravity in (0.0, 9.8):
-        with row(gravity):
-            flight = fly(tail().with_parameters(gravity=gravity), t_span=0.25, **TIGHT)
-            centres, t = centre_of_mass(flight), flight.t[:, None]
-            speed = flight.linear_momentum[0] / total_mass()
-            parabola = centres[0] + speed * t - gravity * t**2 / 2 * [0, 0, 1]
-            np.testing.assert_allclose(centres, parabola, atol=1e-13)
-            assert np.abs(flight.q[:, :3] - centres).max() > 1e-3
-
-
-def test_damping_takes_energy_by_its_power():
-    fine = {"t_span": 0.25, "output_step": 1.25e-4, "method": "tsit5", "rtol": 1e-10}
-    for law in (st.Damping(tuple(DAMPING)), lambda t, q, v: -DAMPING * v[6:]):
-        flight = fly(controller=law, **fine)
-        lost = flight.energy[0] - flight.energy[-1]
-        assert lost > 1e-3 * flight.kinetic[0]
-        assert lost == pytest.approx(simpson(flight.v[:, 6:] ** 2 @ DAMPING, x=flight.t), rel=1e-8)
-        angular = flight.angular_momentum
-        assert np.abs(angular - angular[0]).max() < 1e-8 * np.linalg.norm(angular[0])
-
-
-def test_torques_change_energy_by_their_work():
-    def law(t, q, v):
-        return 1e-5 * np.cos(9 * t + np.arange(NT))
-
-    flight = fly(t_span=0.25, controller=law, output_step=1.25e-4)
-    work = simpson((flight.tau * flight.v[:, 6:]).sum(axis=1), x=flight.t)
-    assert abs(work) > 1e-6
-    assert flight.energy[-1] - flight.energy[0] == pytest.approx(work, rel=1e-6)
+        for gravity in (0.0, 9.8):
+            model = tail().with_parameters(gravity=gravity)
+            flight = fly(model, t_span=0.25, **settings)
+            angular, linear, t = flight.angular_momentum, flight.linear_momentum, flight.t[:, None]
+            with row(settings, gravity):
+                assert not flight.tau.any()
+                assert np.abs(np.linalg.norm(flight.attitude, axis=1) - 1).max() < 1e-15
+                assert np.abs(flight.energy - flight.energy[0]).max() < drift * flight.kinetic.max()
+                assert np.abs(angular - angular[0]).max() < drift * np.linalg.norm(angular[0])
+                fallen = linear + mass * gravity * t * [0, 0, 1]
+                assert np.abs(fallen - linear[0]).max() < drift * np.linalg.norm(linear[0])
+                centres = centre_of_mass(model, flight)
+                parabola = centres[0] + linear[0] / mass * t - gravity * t**2 / 2 * [0, 0, 1]
+                np.testing.assert_allclose(centres, parabola, atol=0.1 * drift)
+                assert np.abs(flight.q[:, :3] - centres).max() > 1e-3
 
 
 METHODS = {"rk4": {"step": 1e-3}, "tsit5": {"rtol": 1e-6}, "dop853": {"rtol": 1e-6}}
@@ -132,18 +73,94 @@ def test_steps_divide_the_samples_and_looser_tolerances_cost_less():
         assert costs == sorted(set(costs)), method
 
 
-def test_results_hold_parameters():
-    own = tail().with_parameters(tail_mass=0.01)
-    told = fly(own, t_span=0.01).info["parameters"]
-    assert told["tail_mass"] == 0.01
-    assert told["link_inertia"] == list(own.parameters["link_inertia"])
-
-
 def test_a_model_in_single_precision_flies():
-    laws = st.Damping(tuple(DAMPING)), lambda t, q, v: -DAMPING * v[6:]
-    reference = fly(t_span=0.1, controller=laws[0])
-    for law in laws:
-        for method in METHODS:
-            flight = fly(zoo.model("single"), t_span=0.1, controller=law, method=method)
-            assert 0 < np.abs(flight.q - reference.q).max() < 1e-3, method
-            assert flight.info["evaluations"] < 10_000 and flight.q.dtype == np.float64
+    how = {"t_span": 0.1, "controller": st.Damping((2e-6, 1e-6, 3e-6, 4e-6))}
+    reference = fly(**how)
+    for method in METHODS:
+        flight = fly(zoo.model("single"), method=method, **how)
+        assert 0 < np.abs(flight.q - reference.q).max() < 1e-3, method
+        assert flight.info["evaluations"] < 10_000 and flight.q.dtype == np.float64
+
+
+def test_what_does_not_suffice_is_told():
+    """Steps, and the reason why they are many: a torque that is far too large."""
+    with pytest.raises(st.SimulationError, match="most_steps") as caught:
+        fly(most_steps=5, output_step=1e-4)
+    assert caught.value.trajectory.t[-1] < 0.2
+    with pytest.raises(st.SimulationError, match="too short"):
+        fly(rtol=1e-10, least_step=0.01)
+    words = r"not enough.* 5 N m, and a joint (\S+) rad/s"
+    with pytest.raises(st.SimulationError, match=words) as caught:
+        fly(controller=lambda t, q, v: [5.0, 0, 0, 0], most_steps=2000)
+    assert float(re.search(words, str(caught.value))[1]) > 1000
+
+
+def test_quintic_blends_rest_at_nodes():
+    curve = st.Reference([0.0, 0.5, 0.7, 1.0], [[0.0], [1.0], [1.0], [-2.0]]).curve
+    values, rates, accelerations = curve.at(np.array([-1.0, 0.0, 0.5, 0.6, 0.7, 1.0, 3.0]))
+    np.testing.assert_allclose(values[:, 0], [0, 0, 1, 1, 1, -2, -2], atol=1e-14)
+    np.testing.assert_allclose([rates, accelerations], 0, atol=1e-12)
+    s = 0.3
+    value, rate, acceleration = (x[0] for x in curve.at(0.5 * s))
+    assert value == pytest.approx(10 * s**3 - 15 * s**4 + 6 * s**5)
+    assert rate == pytest.approx((30 * s**2 - 60 * s**3 + 30 * s**4) / 0.5)
+    assert acceleration == pytest.approx((60 * s - 180 * s**2 + 120 * s**3) / 0.25)
+    assert curve.kinks(3).size == 0
+
+
+def test_only_jumps_and_kinks_are_stops_in_any_unit():
+    rise = np.array([[0.0], [1.0], [2.0], [0.0]])
+    for size in (1e-12, 1.0, 1e12):
+        assert st.TorqueTable([0, 1, 2, 3], size * rise).parts(1).kinks() == [0, 2, 3], size
+        rounding = size * np.array([[[1.0, 0]], [[1.0 + 1e-12, 0]]])
+        assert st.Piecewise(np.array([0.0, 1, 2]), rounding).kinks(1).size == 0, size
+    assert st.Reference([0, 1, 2], rise[:3] % 2, "spline").curve.kinks(2).tolist() == [0, 2]
+    jump = st.Piecewise(np.array([0.0, 1, 2]), np.array([[[0.0, 0]], [[1.0, 0]]]))
+    assert jump.kinks(1).tolist() == [1]
+
+
+def test_phases_act_one_after_another():
+    law = st.Phases([(0.0, None), (0.05, st.Damping(3e-5)), (0.15, None)])
+    flight = fly(controller=law, output_step=1e-3)
+    t, acts = flight.t, np.abs(flight.tau).max(axis=1) > 0
+    inside = (t > 0.0505) & (t < 0.1495)
+    assert not acts[(t < 0.0495) | (t > 0.1505)].any() and acts[inside].all()
+    np.testing.assert_allclose(flight.tau[acts], -3e-5 * flight.v[acts, 6:], rtol=1e-12)
+
+
+KINKS = st.TorqueTable(
+    [0.031, 0.057, 0.093], np.array([[1, -2, 0, 3], [-3, 1, 2, -1], [2, 2, -1, 0]]) * 1e-4
+)
+
+
+def test_kinks_cost_no_accuracy():
+    """Steps end at kinks: a table is as accurate as a smooth motion, and so are phases."""
+
+    def between(t, q, v):
+        """The same torques, without a word about kinks."""
+        return np.array([np.interp(t, KINKS.times, column) for column in KINKS.torques.T])
+
+    def error(law, exact):
+        reference = fly(controller=exact, **TIGHT)
+        return np.abs(fly(controller=law, rtol=1e-9).q - reference.q).max()
+
+    least, blind = error(KINKS, KINKS), error(between, KINKS)
+    assert least < 3e-8 < blind * 1e3 and least < blind * 3
+    phases = st.Phases([(0.0, None), (0.05, st.Damping(2e-5)), (0.1, KINKS)])
+    assert error(phases, phases) < 3e-8
+
+
+@pytest.mark.parametrize("method", ["rk4", "implicit_euler"])
+def test_a_kink_beside_a_sample_takes_no_step_of_its_own(method):
+    """What lies between a sample and a kink that rounding sets apart is no full step: the momentum
+    of a free fall is M g t, whatever the torques.
+    """
+    weight = 9.8 * sum(tail().parameters[name] for name in ("torso_mass", "tail_mass"))
+    for side in (-1, 1):
+        kinks = np.nextafter(np.linspace(0, 0.2, 201)[1:-1], side * np.inf)
+        torques = 1e-5 * (-1.0) ** np.arange(len(kinks))[:, None] * np.ones(NT)
+        table = st.TorqueTable(kinks, torques)
+        flight = fly(controller=table, output_step=1e-3, step=1e-4, method=method)
+        assert flight.info["steps"] <= 2000 + len(kinks)
+        fallen = flight.linear_momentum[0, 2] - flight.linear_momentum[:, 2]
+        np.testing.assert_allclose(fallen, weight * flight.t, rtol=0, atol=1e-5 * weight)

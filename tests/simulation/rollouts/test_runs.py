@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.simulation import parallel_runs
 from tests.support import zoo
 from tests.support.rows import row
 
@@ -48,10 +47,10 @@ def test_each_run_is_what_it_is_alone():
                 assert own_info(found[k].info) == own_info(flight.info)
                 assert found.ends[k] == flight.t[-1]
                 np.testing.assert_array_equal(found[k].q, flight.q)
-    for model in (tail(), zoo.model("single")):
-        law = st.Pfl(model, st.Reference([0.0, 0.05], [[0.0] * NT, [0.3] * NT]))
-        found, _ = both(model, q, v, law, t_span=0.05, method="tsit5")
-        assert found.q.dtype == found.kinetic.dtype == np.float64
+    single = zoo.model("single")
+    law = st.Pfl(single, st.Reference([0.0, 0.05], [[0.0] * NT, [0.3] * NT]))
+    found, _ = both(single, q, v, law, t_span=0.05, method="tsit5")
+    assert found.q.dtype == found.kinetic.dtype == np.float64
 
 
 def test_on_the_ground():
@@ -88,10 +87,15 @@ def test_runs_that_stop_at_events():
 def test_each_run_has_its_own_parameters():
     """Of the body, and of the ground."""
     rng = np.random.default_rng(1)
-    own = {"tail_mass": rng.uniform(0.002, 0.005, 4), "tail_mount": 0.02 * rng.normal(size=(4, 3))}
+    mass, inertias = rng.uniform(0.002, 0.005, 4), rng.uniform(1e-7, 1.5e-7, (4, 3))
+    flies = [
+        {"tail_mass": mass, "tail_mount": 0.02 * rng.normal(size=(4, 3)), "link_inertia": inertias},
+        {"tail_length": [0.1, 0.2, 0.3, 0.4], "link_radius": 0.001 * np.arange(1, 5)},
+    ]
+    how = {"t_span": 0.05, "controller": st.Damping(1e-3)}
+    rows = [(tail(), each | {"gravity": [0, 1, 9.8, 2]}, how) for each in flies]
     ground = {"mu": [0.0, 0.5, 1.0, 0.2], "K_n": [500.0, 1000.0, 2000.0, 700.0]}
-    flies = {"t_span": 0.05, "controller": st.Damping(1e-3)}
-    for model, given, how in ((tail(), own, flies), (rat(), ground, {"legs": LEGS, "t_span": 0.2})):
+    for model, given, how in (*rows, (rat(), ground, {"legs": LEGS, "t_span": 0.2})):
         q, v = starts(model, 4)
         found = st.simulate(model, q, v, parameters=given, **how)
         for k in range(4):
@@ -103,25 +107,14 @@ def test_each_run_has_its_own_parameters():
         assert len(np.unique(found.kinetic[:, -1])) == 4
 
 
-def test_parameters_of_runs_are_those_of_models():
-    inertias = [[1e-7, 1e-8, 2e-7], [3e-7, 1e-8, 2e-7], [1e-7, 2e-8, 2e-7]]
-    lengths = {"tail_length": [0.1, 0.2, 0.3], "tail_mass": [0.002, 0.003, 0.004]}
-    rows = [{"link_radius": [0.001, 0.002, 0.003]}, {"link_inertia": inertias}]
-    for own in (*rows, lengths | {"gravity": [0, 1, 9.8]}):
-        each = [{name: values[k] for name, values in own.items()} for k in range(3)]
-        models = [tail().with_parameters(**changes) for changes in each]
-        vectors = tail().parameters_of_runs(own, 3).vectors
-        np.testing.assert_array_equal(vectors, [model.parameter_vector for model in models])
-
-
 def test_the_stiffest_run_chooses_the_method():
     """By its parameters, or by its controller."""
     q, v = starts(tail(), 3)
     settings = {"controller": st.Damping(1e-2), "t_span": 0.01}
     rows = [([0.1], "tsit5"), ([0.001], "ros34pw2"), ([0.1, 0.1], "tsit5")]
     for masses, method in (*rows, ([0.1, 0.1, 0.001], "ros34pw2")):
-        own, k = {"parameters": {"tail_mass": masses}}, len(masses)
-        found = st.simulate(tail(), q[:k], v[:k], **own, **settings)
+        own, k = {"tail_mass": masses}, len(masses)
+        found = st.simulate(tail(), q[:k], v[:k], parameters=own, **settings)
         assert found.info["method"] == method, masses
     mild, stiff = st.Damping(1e-9), st.Damping(1e-2)
     for law, method in ((mild, "tsit5"), ([mild, stiff, mild], "ros34pw2")):
@@ -132,17 +125,13 @@ def test_runs_do_not_depend_on_their_order_or_on_threads():
     q, v = starts(tail(), 40)
     mass = np.random.default_rng(2).uniform(0.002, 0.005, 40)
     order, found = np.random.default_rng(3).permutation(40), []
-    for threads in (1, 7):
+    for threads, rows in ((1, slice(None)), (7, order)):
         how = {"t_span": 0.02, "controller": DAMPING, "method": "tsit5", "threads": threads}
-        for rows in (slice(None), order):
-            own = {"tail_mass": mass[rows]}
-            found.append(st.simulate(tail(), q[rows], v[rows], parameters=own, **how))
-            assert found[-1].info["threads"] == threads
+        own = {"tail_mass": mass[rows]}
+        found.append(st.simulate(tail(), q[rows], v[rows], parameters=own, **how))
+        assert found[-1].info["threads"] == threads
     for name in PER_RUN:
-        first = getattr(found[0], name)
-        np.testing.assert_array_equal(getattr(found[2], name), first)
-        for other in found[1::2]:
-            np.testing.assert_array_equal(getattr(other, name), first[order])
+        np.testing.assert_array_equal(getattr(found[1], name), getattr(found[0], name)[order])
 
 
 def test_a_single_state_is_repeated_and_one_row_is_one_of_many():
@@ -175,26 +164,22 @@ TIMES = [0.0, 0.0123, 0.031]
 SPAN = {"t_span": 0.05, "output_step": 5e-3}
 
 
-def table(k):
-    """A table of torques of run k, whose kinks are its own."""
-    return st.TorqueTable([0.0, 0.01 + 1e-3 * k], 1e-5 * (k + 1) * np.eye(2, NT), 1e-6)
-
-
 def test_a_list_has_a_controller_of_any_kind_for_each_run():
     reference = st.Reference([0.0, 0.05], [[0.0] * NT, [0.3] * NT])
     ramp = st.TorqueCurve(st.Piecewise(np.array([0.01, 0.02]), np.full((1, NT, 2), 1e-5)))
     tracking = [st.Pfl(tail(), reference, kp=3e4), st.Pfl(tail(), reference, kd=300.0)]
     phases = st.Phases([(0.0, None), (0.02, DAMPING)])
-    given = [None, DAMPING, table(2), ramp, *tracking, phases]
+    table = st.TorqueTable([0.0, 0.012], 3e-5 * np.eye(2, NT), 1e-6)
+    given = [None, DAMPING, table, ramp, *tracking, phases]
     functions = [lambda t, q, v: -1e-6 * v[6:], DAMPING, lambda t, q, v: [1e-5] * NT]
     q, v = starts(tail(), len(given))
     for method in ({"method": "tsit5"}, {"method": "rk4", "step": 1e-3}, {"method": "ros34pw2"}):
+        flights = alone(tail(), q, v, given, **method, **SPAN)
         for threads in (1, 3):
             with row(method, threads):
                 how = {"threads": threads} | method | SPAN
-                found = st.simulate(tail(), q, v, controller=given, **how)
-                same(found, alone(tail(), q, v, given, **method, **SPAN))
-                assert len(np.unique(found.q[:, -1, -1])) == len(given)
+                same(st.simulate(tail(), q, v, controller=given, **how), flights)
+        assert len({flight.q[-1, -1] for flight in flights}) == len(given)
     for method in ("tsit5", "dop853"):
         both(tail(), q[:3], v[:3], functions, method=method, **SPAN)
     given = (st.Damping(1e-3), st.TorqueTable([0.0], [[1e-4, -1e-4]], 1e-3), st.Damping(2e-3))
@@ -215,14 +200,6 @@ def test_tables_and_damping_may_have_an_axis_of_the_runs():
         both(tail(), *starts(tail(), 3), law, each, method="tsit5", **SPAN)
 
 
-def test_equal_controllers_are_read_once(monkeypatch):
-    made, law = [], parallel_runs.Acting._of
-    monkeypatch.setattr(parallel_runs.Acting, "_of", lambda *a: made.append(a) or law(*a))
-    given = [DAMPING, table(1), DAMPING, None]
-    st.simulate(tail(), *starts(tail(), 4), controller=given, method="tsit5", **SPAN)
-    assert len(made) == 3
-
-
 WRONG = [
     ([None, None], "2 controllers for 3 runs"),
     ([], "0 controllers for 3 runs"),
@@ -240,5 +217,7 @@ def test_what_is_wrong_is_told_with_its_run():
         with row(words), pytest.raises(st.SimulationError, match=words):
             st.simulate(tail(), *starts(tail(), 3), controller=given, t_span=0.01)
     q, v = starts(tail(), 1)
+    with pytest.raises(st.SimulationError, match="watch: many starts"):
+        st.simulate(tail(), q, v, watch=print)
     with pytest.raises(st.SimulationError, match="a list of 1, one start"):
         st.simulate(tail(), q[0], v[0], controller=[DAMPING], t_span=0.01)
