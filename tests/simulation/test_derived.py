@@ -5,6 +5,7 @@ import dataclasses
 import pickle
 import threading
 import time
+import time
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -72,6 +73,14 @@ def test_whatever_is_asked_for_first_and_copies_have_all_fields(tmp_path):
                 for name in ARRAYS:
                     one, other = getattr(twin, name), getattr(motion, name)
                     assert (one.dtype, one.tobytes()) == (other.dtype, other.tobytes())
+
+
+def test_a_run_tells_how_long_it_took():
+    begun = time.perf_counter(), time.process_time()
+    info = fly().info
+    whole = time.perf_counter() - begun[0], time.process_time() - begun[1]
+    for name, most in zip(("seconds", "cpu_seconds"), whole, strict=True):
+        assert 0 < info[name] <= most, name
 
 
 def test_threads_that_ask_at_once_get_one_array():
