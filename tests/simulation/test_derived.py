@@ -5,7 +5,6 @@ import dataclasses
 import pickle
 import threading
 import time
-import time
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
