@@ -19,7 +19,6 @@ from .emitted import (
     bits,
     compiled,
     interpreted,
-    known_functions,
     library_of,
     model_of,
     needs,
@@ -94,7 +93,7 @@ def test_c_computes_what_the_program_means_bit_for_bit(models):
         expected = [x for field in fields for x in parameter_values(model)[field]]
         assert library.parameters.tolist() == [library.number(x) for x in expected], name
         first, second = states_of(model)
-        for function in known_functions(model):
+        for function in model.manifest["functions"]:
             with row(name, function):
                 assert_depends_on_its_input_alone(library, function, first, second)
                 for state in (first, second) if function in NAMES else ():
