@@ -154,7 +154,8 @@ class Library:
     def call(self, name, arguments, dirt=np.nan, status=0, spare=True):
         """Call a function with all that it may write filled with dirt; return its outputs.
 
-        The workspace begins between two vectors. Without ``spare``, what the header allows to be null is null.
+        The workspace begins within a vector. Without ``spare``, what the header allows to be null
+        is null.
         """
         entry = self.model.manifest["functions"][name]
         inputs = [np.array(arguments[a["name"]], self.number) for a in entry["inputs"]]
