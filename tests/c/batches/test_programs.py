@@ -21,16 +21,6 @@ from tests.support.rows import row
 from .tails import GROUND
 
 TAILS = {"articulated": Tail(2, 2), "continuum": Tail(2, 4, "continuum")}
-every_tail = pytest.mark.parametrize(
-    "tail", ["articulated", pytest.param("continuum", marks=pytest.mark.slow)]
-)
-
-
-def programs(kind):
-    """Yield the functions that have batches, with contacts for those of the ground."""
-    for name in BATCHED:
-        contacts = ("feet", "tail", "torso") if name in GROUND else ()
-        yield name, assemble(CATALOGUE[name], replace(TAILS[kind], contacts=contacts))
 
 
 def numbers(program, rng):
@@ -43,40 +33,41 @@ def numbers(program, rng):
     }
 
 
-@every_tail
-def test_a_program_of_many_states_means_each_of_them(tail):
-    for name, single in programs(tail):
-        rng = np.random.default_rng(1)
-        states = [numbers(single, rng) for _ in range(3)]
-        for state in states[1:]:
-            state.update({a.name: states[0][a.name] for a in single.of_role("parameters")})
-        many = dict(states[0])
-        for a in single.of_role("input"):
-            many[a.name] = list(np.array([state[a.name] for state in states]).T)
-        found = Run(widened(directions_in_turn(single), 3), Numbers(np), many).values
-        for k, state in enumerate(states):
-            alone = Run(single, Numbers(np), state).values
-            for a in single.of_role("output"):
-                with row(name, a.name):
-                    assert [np.broadcast_to(x, 3)[k] for x in found[a.name]] == alone[a.name]
+def assert_means_each_of_many_states(single, rng):
+    states = [numbers(single, rng) for _ in range(3)]
+    for state in states[1:]:
+        state.update({a.name: states[0][a.name] for a in single.of_role("parameters")})
+    many = dict(states[0])
+    for a in single.of_role("input"):
+        many[a.name] = list(np.array([state[a.name] for state in states]).T)
+    found = Run(widened(directions_in_turn(single), 3), Numbers(np), many).values
+    for k, state in enumerate(states):
+        alone = Run(single, Numbers(np), state).values
+        for a in single.of_role("output"):
+            assert [np.broadcast_to(x, 3)[k] for x in found[a.name]] == alone[a.name], a.name
 
 
-@every_tail
-def test_a_program_written_out_means_the_same_and_guards_the_same(tail):
-    for name, single in programs(tail):
-        values = numbers(single, np.random.default_rng(2))
-        line = unrolled_step(directions_in_turn(single) if places_lanes(single) else single)
-        expected, found = (Run(p, Numbers(np), values) for p in (single, line))
-        guards = [
-            sorted((status, float(x)) for status, x in run.guards) for run in (expected, found)
-        ]
+def assert_means_the_same_written_out(single, rng):
+    """And guards the same."""
+    values = numbers(single, rng)
+    line = unrolled_step(directions_in_turn(single) if places_lanes(single) else single)
+    found, expected = (Run(program, Numbers(np), values) for program in (line, single))
+    for a in single.of_role("output"):
+        pair = (np.float64(run.values[a.name]) for run in (found, expected))
+        np.testing.assert_allclose(*pair, rtol=1e-12, err_msg=a.name)
+    guards = [sorted((status, float(x)) for status, x in run.guards) for run in (found, expected)]
+    assert [status for status, _ in guards[0]] == [status for status, _ in guards[1]]
+    np.testing.assert_allclose(*([x for _, x in some] for some in guards), rtol=1e-9)
+
+
+@pytest.mark.parametrize("tail", ["articulated", pytest.param("continuum", marks=pytest.mark.slow)])
+def test_programs_of_lanes_mean_the_same(tail):
+    for name in BATCHED:
+        contacts = ("feet", "tail", "torso") if name in GROUND else ()
+        single = assemble(CATALOGUE[name], replace(TAILS[tail], contacts=contacts))
         with row(name):
-            for a in single.of_role("output"):
-                pair = (np.float64(run.values[a.name]) for run in (found, expected))
-                np.testing.assert_allclose(*pair, rtol=1e-12)
-            statuses, sizes = ([[guard[k] for guard in some] for some in guards] for k in (0, 1))
-            assert statuses[0] == statuses[1]
-            np.testing.assert_allclose(*sizes, rtol=1e-9)
+            assert_means_each_of_many_states(single, np.random.default_rng(1))
+            assert_means_the_same_written_out(single, np.random.default_rng(2))
 
 
 def test_what_depends_on_parameters_alone_stays_narrow():
