@@ -18,37 +18,34 @@ FAULTS = {
 }
 
 
-@pytest.fixture
-def sanitized():
-    """Return a compiler and what a program runs under."""
+def tool(name):
+    """A compiler, and what its programs run under; skip, or fail in CI, where it is missing."""
+    if name == "watched":
+        toolchains.valgrind()
+        return memory.PLAIN, memory.WATCHED
+    if name == "followed":  # reads of what was never written
+        toolchains.clang()
+        return memory.FOLLOWED, ()
     return memory.SANITIZED, ()
 
 
-@pytest.fixture
-def watched():
-    """Return a compiler and what a program runs under; skip, or fail in CI, without valgrind."""
-    toolchains.valgrind()
-    return memory.PLAIN, memory.WATCHED
-
-
-@pytest.fixture
-def followed():
-    """Return a compiler that follows what was never written; skip, or fail in CI, without it."""
-    toolchains.clang()
-    return memory.FOLLOWED, ()
+def report_of(folder, tmp_path, name, cases):
+    """Run a model's cases under a tool; return them, the answers and what the tool says."""
+    of, (compiler, under) = st.load(folder, compiled=False), tool(name)
+    found = memory.every(of, 1)[cases]
+    return found, *memory.answers(memory.built(of, tmp_path, *compiler), found, *under)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("tool", "name"),
-    [(tool, "small") for tool in ("sanitized", "watched", "followed")]
-    + [("watched", "ground_m1_n1")],
+    ("name", "of"),
+    [
+        *(("sanitized", "small"), ("watched", "small"), ("followed", "small")),
+        *(("sanitized", "ground_m1_n1"), ("watched", "ground_m1_n1")),
+    ],
 )
-def test_nothing_is_found(tmp_path, request, tool, name):
-    compiler, under = request.getfixturevalue(tool)
-    of = st.load(zoo.folder(name), compiled=False)
-    found = memory.every(of, 1)
-    told, report = memory.answers(memory.built(of, tmp_path, *compiler), found, *under)
+def test_nothing_is_found(tmp_path, name, of):
+    found, told, report = report_of(zoo.folder(of), tmp_path, name, slice(None))
     assert report == "" and memory.insane(found, told) == []
     # answered, refused, and runs that ended early
     assert len({answer.status for answer in told}) >= 4
@@ -56,7 +53,7 @@ def test_nothing_is_found(tmp_path, request, tool, name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("tool", "fault", "words"),
+    ("name", "fault", "words"),
     [
         ("sanitized", "cast", "is outside the range of representable values of type 'int'"),
         ("sanitized", "bounds", "heap-buffer-overflow"),
@@ -65,15 +62,12 @@ def test_nothing_is_found(tmp_path, request, tool, name):
         ("followed", "unwritten", "use-of-uninitialized-value"),
     ],
 )
-def test_what_is_put_in_is_found(tmp_path, request, tool, fault, words):
+def test_what_is_put_in_is_found(tmp_path, name, fault, words):
     folder = shutil.copytree(zoo.folder("small"), tmp_path / "copy" / "small")
-    of, source = st.load(folder, compiled=False), folder / "src" / "small.c"
-    head, put = r"(int small_mass_matrix\([^)]*\)\n{\n)", FAULTS[fault]
-    text, count = re.subn(head, rf"\1  {put}\n", source.read_text())
+    source, head = folder / "src" / "small.c", r"(int small_mass_matrix\([^)]*\)\n{\n)"
+    text, count = re.subn(head, rf"\1  {FAULTS[fault]}\n", source.read_text())
     source.write_text(text)
-    (compiler, under), found = request.getfixturevalue(tool), memory.every(of, 1)
-    _, report = memory.answers(memory.built(of, tmp_path, *compiler), found[:200], *under)
-    assert count == 1 and words in report
+    assert count == 1 and words in report_of(folder, tmp_path, name, slice(200))[2]
 
 
 def test_answers_that_are_not_sane_are_told():

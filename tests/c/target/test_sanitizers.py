@@ -73,56 +73,6 @@ static int external(int (*f)(const real **, real **, long long *, real *, int),
   return status;
 }
 """
-ROLLOUT = """  for (int method = @@_RK4; method <= @@_TSIT5; ++method) {
-    enum { NQ = @@_NQ, NV = @@_NV, NT = @@_NT, SAMPLES = 3 };
-    @_parameters parameters;
-    @_default_parameters(&parameters);
-    real *q = heap(NQ, 1), *v = heap(NV, 1);
-    real *q_out = heap(SAMPLES * NQ, 0), *v_out = heap(SAMPLES * NV, 0);
-    real *tau_out = heap(SAMPLES * NT, 0), *times = heap(SAMPLES, 0);
-    real *stop = heap(1, 0), *damping = heap(NT, 0);
-    real *table_times = heap(2, 0), *coefficients = heap(2 * NT, 1);
-    real *work = heap(@@_WORK_ROLLOUT, 1);
-    times[1] = (real)0.0003;
-    times[2] = (real)0.001;
-    stop[0] = table_times[1] = (real)0.0005;
-    @_piecewise table = { 1, NT, 1, table_times, coefficients };
-    @_controller controller = { 0 };
-    controller.damping = damping;
-    controller.torques = &table;
-    real *begins = heap(1, 0);
-    @_drive drive = { 1, begins, &controller, 1, stop };
-    @_run run = { 0 };
-    run.parameters = &parameters;
-    run.drive = &drive;
-    run.q = q;
-    run.v = v;
-    run.method = method;
-    run.rtol = run.atol = (real)0.001;
-    run.step = (real)0.0001;
-    run.most_step = 1;
-    run.most_steps = run.pause = 1000;
-    run.samples = SAMPLES;
-    run.times = times;
-    run.q_out = q_out;
-    run.v_out = v_out;
-    run.tau_out = tau_out;
-    run.work = work;
-    //ground
-    bad += @_rollout(&run) != 0 || run.done != SAMPLES || run.steps < 2;
-  }
-"""
-GROUND = """q[2] = 0;
-    real *legs = heap(4, 1), *event_times = heap(3, 0);
-    int *event_kinds = malloc(3 * sizeof *event_kinds);
-    @_piecewise stance = { 1, 4, 0, table_times, legs };
-    drive.legs = &stance;
-    run.bristles = heap(2 * @@_CONTACTS, 0);
-    run.bristles_out = heap(SAMPLES * 2 * @@_CONTACTS, 0);
-    run.event_times = event_times;
-    run.event_kinds = event_kinds;
-    run.most_events = 3;
-"""
 STEPS = """  {
     enum { COUNT = 11, SIZE = sizeof(@_parameters) / sizeof(real) };
     @_parameters parameters;
@@ -153,7 +103,7 @@ STEPS = """  {
 
 def driver(model):
     """C text that calls every function of a model on exact-sized heap blocks."""
-    calls = ""
+    text, calls = DRIVER, ""
     for name, entry in model.manifest["functions"].items():
         lengths = [int(np.prod(a["shape"])) for a in (*entry["inputs"], *entry["outputs"])]
         counts = f"{len(entry['inputs'])}, {len(entry['outputs'])}"
@@ -163,16 +113,13 @@ def driver(model):
     for c in re.findall(r"^int (\w+)\(const real \*\*arg.*;$", model.host.read_text(), re.M):
         calls += f"  bad += {unless_random(c)}(external({c}, {c}_work, {c}_sparsity_in, "
         calls += f"{c}_name_in, {c}_sparsity_out) != 0);\n"
-    double, rollout = model.scene.real == "double", "rollout" in model.scene.functions
-    text = '#include "@_simulation.h"\n' * rollout + DRIVER + CASADI_DRIVER * double
-    text += f"\nint main(void)\n{{\n  int bad = 0;\n{calls}{ROLLOUT * rollout}"
-    text += STEPS if model.scene.contacts else ""
-    text += '  printf("%d bad\\n", bad);\n  return bad;\n}\n'
-    text = text.replace("//ground", GROUND if model.scene.contacts else "")
+    if model.scene.real == "double":
+        text += CASADI_DRIVER
     if model.scene.contacts:
-        text = '#include "@_ground.c"\n#include <string.h>\n' + text
-        text = text.replace("@WORK", str(model.manifest["ground"]["work"]))
-        text = text.replace("method <= @@_TSIT5", "method <= @@_IMPLICIT_EULER")
+        text = f'#include "@_ground.c"\n#include <string.h>\n{text}'
+        calls += STEPS.replace("@WORK", str(model.manifest["ground"]["work"]))
+    text += f"\nint main(void)\n{{\n  int bad = 0;\n{calls}"
+    text += '  printf("%d bad\\n", bad);\n  return bad;\n}\n'
     return text.replace("@@", model.name.upper()).replace("@", model.name)
 
 
@@ -184,14 +131,11 @@ def unless_random(name):
 def built(model, tmp_path, text):
     """Return the program of a driver's text, for one model alone."""
     main, program = tmp_path / "main.c", tmp_path / "main"
-    places = ("-I", model.include, "-I", model.host.parent)
     main.write_text(text)
-    objects = [
-        compile_once(f"{source.stem}.o", ("gcc", *SANITIZED, "-c"), [source], model.include)
-        for source in (model.source, model.simulation)
-        if source.is_file()
-    ]
-    run("gcc", *SANITIZED, *places, main, *objects, "-o", program, "-lm")
+    command = ("gcc", *SANITIZED, "-c")
+    made = compile_once(f"{model.name}.o", command, [model.source], model.include)
+    places = ("-I", model.include, "-I", model.host.parent)
+    run("gcc", *SANITIZED, *places, main, made, "-o", program, "-lm")
     return program
 
 
@@ -201,6 +145,7 @@ def built(model, tmp_path, text):
     + [pytest.param(n, marks=pytest.mark.slow) for n in ("m1_n1", "ground_m1_n1", "polar")],
 )
 def test_sanitizers_find_nothing(tmp_path, name):
+    """Of runs, which other tests of memory simulate, only steps side by side are here."""
     model = model_of(name)
     program = built(model, tmp_path, driver(model))
     # what is emitted never allocates: the blocks are the driver's
@@ -212,7 +157,6 @@ def test_sanitizers_would_find_a_short_workspace(tmp_path):
     needed = "BARE_WORK_FORWARD_DYNAMICS"
     # less a vector: that much of the last row of a matrix to factor is room
     text = driver(model).replace(f"{needed})", f"{needed} - 8)")
-    done = subprocess.run(
-        [built(model, tmp_path, text)], capture_output=True, text=True, check=False
-    )
+    program = built(model, tmp_path, text)
+    done = subprocess.run([program], capture_output=True, text=True, check=False)
     assert done.returncode != 0 and "heap-buffer-overflow" in done.stderr
