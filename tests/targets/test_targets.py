@@ -148,36 +148,24 @@ SCENES = {
 }
 
 
-def emitted(scene, root):
-    """The manifest of a scene's model in NumPy alone, and the names that its module defines."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(pipeline.TARGETS, "numpy", TARGET)
-        pipeline.generate(replace(scene, targets=("numpy",)), root)
-    folder, names = root / scene.name, {}
-    exec((folder / f"{scene.name}_numpy.py").read_text(), names)
-    return json.loads((folder / "manifest.json").read_text()), names
-
-
-def arguments_of(scene, function, tail):
-    """A random state; positive numbers for all other arguments."""
-    q, v, v_dot, tau = (rows[0] for rows in random_states(scene.segments, 5, 1, "random"))
-    known, rng = {"q": q, "v": v, "v_dot": v_dot, "tau": tau}, np.random.default_rng(7)
-    return {
-        a.name: known[a.name] if a.name in known else rng.uniform(0.1, 0.3, a.length(tail))
-        for a in function.inputs
-    }
-
-
 @pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
-def test_emitted_module_computes_what_the_programs_mean(scene, tmp_path):
-    manifest, names = emitted(scene, tmp_path)
+def test_emitted_module_computes_what_the_programs_mean(scene, tmp_path, monkeypatch):
+    monkeypatch.setitem(pipeline.TARGETS, "numpy", TARGET)
+    pipeline.generate(replace(scene, targets=("numpy",)), tmp_path)
+    folder, names, rng = tmp_path / scene.name, {}, np.random.default_rng(7)
+    exec((folder / f"{scene.name}_numpy.py").read_text(), names)
+    manifest = json.loads((folder / "manifest.json").read_text())
     assert names["__doc__"].endswith(f"derivation {manifest['content_hash']}.")
     assert manifest["scene"]["targets"] == ["numpy"] and "work" not in manifest
     tail = pipeline.tail_of(scene)
+    states = (rows[0] for rows in random_states(scene.segments, 5, 1, "random"))
+    known = dict(zip(("q", "v", "v_dot", "tau"), states, strict=True))
     parameters = {key: np.ravel(value).tolist() for key, value in scene.parameters.items()}
     for name in manifest["functions"]:
         function = CATALOGUE[name].of(tail)
-        program, arguments = assemble(function, tail), arguments_of(scene, function, tail)
+        program = assemble(function, tail)
+        positive = {a.name: rng.uniform(0.1, 0.3, a.length(tail)) for a in function.inputs}
+        arguments = {key: known.get(key, value) for key, value in positive.items()}
         arrays = (*program.of_role("parameters"), *program.of_role("input"))
         given = {a.name: (parameters | arguments)[a.name] for a in arrays}
         expected = Run(program, Numbers(), given).values

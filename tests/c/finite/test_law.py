@@ -9,11 +9,9 @@ from itertools import product
 import pytest
 
 from tests.support import zoo
-from tests.support.models import folder_of
 from tests.support.rows import row
 from tests.support.toolchains import clang
 
-from ..target.emitted import C99, run
 from .hostile import NOT_FINITE, NOT_POSITIVE_DEFINITE, OK, OUT_OF_RANGE, attacked
 
 FAST = ("-O2", "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math", "-march=native")
@@ -67,37 +65,3 @@ def test_every_file_that_computes_refuses_fast_mathematics():
                 refused = f"{name} checks for NaN and infinity" in done.stderr
                 assert refused == (done.returncode != 0) == (flag != "")
                 assert refused or done.stderr == ""
-
-
-MAIN = """#include "@_unchecked.h"
-#include <math.h>
-#include <string.h>
-
-int main(void)
-{
-  @_real q[@@_NQ] = { 0 }, v[@@_NV] = { 0 }, tau[@@_NT] = { 0 }, one[@@_NV], other[@@_NV];
-  @_real work[@@_WORK_FORWARD_DYNAMICS + 1];
-  @_parameters p;
-  @_default_parameters(&p);
-  q[3] = 1;
-  q[7] = v[4] = (@_real)0.5;
-  int wrong = @_forward_dynamics(&p, q, v, tau, one, work) != @@_OK;
-  wrong += @_unchecked_forward_dynamics(&p, q, v, tau, other, work) != @@_OK;
-  wrong += memcmp(one, other, sizeof one) != 0;
-  tau[0] = (@_real)NAN;
-  wrong += @_forward_dynamics(&p, q, v, tau, one, work) != @@_NOT_FINITE;
-  wrong += @_unchecked_forward_dynamics(&p, q, v, tau, other, work) != @@_OK;
-  return wrong;
-}
-"""
-
-
-def test_unchecked_functions_compute_the_same_and_promise_nothing(tmp_path):
-    main, program = tmp_path / "main.c", tmp_path / "main"
-    main.write_text(MAIN.replace("@@", "BARE").replace("@", "bare"))
-    for emission in ("straight", "loops"):
-        with row(emission):
-            folder = folder_of(zoo.scene("bare", emission=emission))
-            source, include = folder / "src" / "bare.c", folder / "include"
-            run("gcc", *C99, "-I", include, main, source, "-o", program, "-lm")
-            run(program)
