@@ -34,10 +34,9 @@ def tool(name):
     return memory.SANITIZED, ()
 
 
-def report_of(folder, tmp_path, name, cases):
+def report_of(of, tmp_path, name, cases):
     """Run a model's cases under a tool; return them, the answers and what the tool says."""
-    of, (compiler, under) = st.load(folder, compiled=False), tool(name)
-    found = memory.every(of, 1)[cases]
+    (compiler, under), found = tool(name), memory.every(of, 1)[cases]
     return found, *memory.answers(memory.built(of, tmp_path, *compiler), found, *under)
 
 
@@ -50,7 +49,8 @@ def report_of(folder, tmp_path, name, cases):
     ],
 )
 def test_nothing_is_found(tmp_path, name, of):
-    found, told, report = report_of(zoo.folder(of), tmp_path, name, slice(None))
+    model = st.load(zoo.folder(of), compiled=False)
+    found, told, report = report_of(model, tmp_path, name, slice(None))
     assert report == "" and memory.insane(found, told) == []
     # answered, refused, and runs that ended early
     assert len({answer.status for answer in told}) >= 4
@@ -69,10 +69,11 @@ def test_nothing_is_found(tmp_path, name, of):
 )
 def test_what_is_put_in_is_found(tmp_path, name, fault, words):
     folder = shutil.copytree(zoo.folder("small"), tmp_path / "copy" / "small")
-    source, head = folder / "src" / "small.c", r"(int small_mass_matrix\([^)]*\)\n{\n)"
+    of, source = st.load(folder, compiled=False), folder / "src" / "small.c"
+    head = r"(int small_mass_matrix\([^)]*\)\n{\n)"
     text, count = re.subn(head, rf"\1  {FAULTS[fault]}\n", source.read_text())
     source.write_text(text)
-    assert count == 1 and words in report_of(folder, tmp_path, name, slice(200))[2]
+    assert count == 1 and words in report_of(of, tmp_path, name, slice(200))[2]
 
 
 def test_answers_that_are_not_sane_are_told():
