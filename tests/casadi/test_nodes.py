@@ -23,21 +23,14 @@ def arguments(rat: st.Model, name: str, count: int) -> list[np.ndarray]:
     return [q, v, last, random.normal(size=(rat.nv, count))]
 
 
-def symbolic(rat: st.Model, name: str) -> list[casadi.Function]:
-    """CasADi's own derivatives of SX operations at one node: value, Jacobian, Hessian."""
-    f = rat.casadi.symbolic(name)
-    inputs = [casadi.SX.sym(key, f.size1_in(key)) for key in f.name_in()[:3]]
-    x, mu = casadi.veccat(*inputs), casadi.SX.sym("mu", rat.nv)
-    y = f(*inputs, casadi.SX(rat.casadi.parameter_vector))
-    results = [y, casadi.jacobian(y, x), casadi.hessian(casadi.dot(mu, y), x)[0]]
-    return [casadi.Function("f", [*inputs, mu], [result]) for result in results]
-
-
-def at_nodes(f: casadi.Function, count: int) -> list[casadi.Function]:
-    """The same of a function of many nodes: its unknowns are those of node after node."""
-    inputs = [casadi.MX.sym(f.name_in(k), *f.size_in(k)) for k in range(3)]
-    x, mu = casadi.veccat(*inputs), casadi.MX.sym("mu", *f.size_out(0))
-    y = f(*inputs)
+def results(f: casadi.Function, count: int, *parameters) -> list[casadi.Function]:
+    """Value, Jacobian and Hessian of a function of many nodes, with the unknowns of node after
+    node.
+    """
+    kind = casadi.SX if parameters else casadi.MX
+    inputs = [kind.sym(f.name_in(k), *f.size_in(k)) for k in range(3)]
+    x, mu = casadi.veccat(*inputs), kind.sym("mu", *f.size_out(0))
+    y = f(*inputs, *parameters)
     sizes = [f.size1_in(k) for k in range(3)]
     starts = np.cumsum([0, *(size * count for size in sizes)])
     by_node = [
@@ -51,6 +44,11 @@ def at_nodes(f: casadi.Function, count: int) -> list[casadi.Function]:
     return [casadi.Function("f", [*inputs, mu], [result]) for result in (y, J, H)]
 
 
+def symbolic(rat: st.Model, name: str) -> list[casadi.Function]:
+    """CasADi's own derivatives of SX operations at one node."""
+    return results(rat.casadi.symbolic(name), 1, casadi.SX(rat.casadi.parameter_vector))
+
+
 @pytest.mark.parametrize("tail", ["m1_n1", pytest.param("arcs1", marks=pytest.mark.slow)])
 def test_values_and_derivatives_are_those_of_the_symbolic_function(tail):
     rat = zoo.model(tail)
@@ -58,7 +56,7 @@ def test_values_and_derivatives_are_those_of_the_symbolic_function(tail):
         own = symbolic(rat, name)
         for count in COUNTS:
             given = arguments(rat, name, count)
-            compiled = at_nodes(rat.casadi.nodes(name, count, folded=True), count)
+            compiled = results(rat.casadi.nodes(name, count, folded=True), count)
             for order, (f, g) in enumerate(zip(compiled, own, strict=True)):
                 found = f(*given)
                 blocks = [g(*(part[:, node] for part in given)) for node in range(count)]
@@ -73,8 +71,8 @@ def test_blocks_are_those_of_the_compiled_function():
     """Exact sparsity: the Jacobian's and the Hessian's are those of ``external``, node by node."""
     rat = zoo.model("m1_n1")
     for name in LAST:
-        single = at_nodes(rat.casadi.external(name, derivatives=2, folded=True), 1)
-        several = at_nodes(rat.casadi.nodes(name, 3, folded=True), 3)
+        single = results(rat.casadi.external(name, derivatives=2, folded=True), 1)
+        several = results(rat.casadi.nodes(name, 3, folded=True), 3)
         for one, three in zip(single[1:], several[1:], strict=True):
             pattern = one.sparsity_out(0)
             with row(name):
@@ -93,40 +91,13 @@ def test_parameters_are_one_vector_for_all_nodes():
             np.testing.assert_allclose(f(q, v, last, other), wanted, rtol=1e-10, atol=1e-12)
 
 
-def test_ipopt_takes_the_derivatives():
-    """The optimum, in as many iterations, of the mapped SX function."""
-    rat, count = zoo.model("m1_n1"), 5
-    wanted = np.linspace(-40, 60, count)
-    found = []
-    for f in (
-        rat.casadi.nodes("forward_dynamics", count, folded=True),
-        rat.casadi.forward_dynamics.map(count),
-    ):
-        bend, tau = (casadi.MX.sym(key, 2, count) for key in ("bend", "tau"))
-        pose = casadi.repmat(casadi.DM([0, 0, 0, 1, 0, 0, 0]), 1, count)
-        v = casadi.repmat(casadi.DM([0, 0, 0, 1, 2, 3, 4, 5]), 1, count)
-        v_dot = f(casadi.vertcat(pose, bend), v, 1e-3 * tau)
-        nlp = {
-            "x": casadi.veccat(bend, tau),
-            "f": casadi.sumsqr(tau) + casadi.sumsqr(bend),
-            "g": v_dot[3, :].T,
-        }
-        quiet = {"ipopt.print_level": 0, "print_time": False, "ipopt.tol": 1e-10}
-        solver = casadi.nlpsol("solver", "ipopt", nlp, quiet)
-        end = solver(x0=0.1, lbg=wanted, ubg=wanted)
-        assert solver.stats()["success"]
-        found.append((end["x"].full(), solver.stats()["iter_count"]))
-    np.testing.assert_allclose(found[0][0], found[1][0], atol=1e-7)
-    assert found[0][1] == found[1][1]
-
-
 def test_results_do_not_depend_on_the_number_of_threads(monkeypatch):
     rat, count, name = zoo.model("m1_n1"), 303, "forward_dynamics"
     given, found = arguments(rat, name, count), []
     for most in (1, 3):
         monkeypatch.setattr(rat.batch_library, "threads", most)
         assert _record(rat, name, count, 2).kinds[3].threads == most
-        hessian = at_nodes(rat.casadi.nodes(name, count, folded=True), count)[2]
+        hessian = results(rat.casadi.nodes(name, count, folded=True), count)[2]
         found.append(hessian(*given).nonzeros())
     assert found[0] == found[1]
 

@@ -36,23 +36,13 @@ def test_every_printer_has_a_method_for_each_statement_and_for_nothing_else():
         assert set(kinds) - {object} == set(ir.STATEMENTS), target.name
 
 
-class Rotate:
-    """A statement that no target knows."""
-
-
-def test_an_unknown_statement_is_refused():
-    program = Builder("empty", "Empty.").finish()
-    for printer in (PythonPrinter(program), LoopPrinter(program, "double", "x")):
-        with pytest.raises(UnprintableStatement, match=f"{type(printer).__name__} .*Rotate"):
-            printer.statement(Rotate())
-
-
-# What CasADi's lists cannot hold.
-
-
 def arrays(b, x=4, y=4):
     """An input and an output of so many scalars."""
     return b.array("x", x, role="input"), b.array("y", y, role="output")
+
+
+class Rotate:
+    """A statement that no target knows."""
 
 
 def branch(b, x, y):
@@ -60,19 +50,35 @@ def branch(b, x, y):
         b.fill(y[0], 0)
 
 
-def test_casadi_refuses_what_it_cannot_express():
-    rows = {
-        "When": branch,
-        "Guard": lambda b, x, y: b.guard(x[0], "TOO_SMALL", y[0]),
-        "FactorPair": lambda b, x, y: b.factor_pair(y, 2),
-        "SolvePair": lambda b, x, y: b.solve_pair(y, x.part(0, 2)),
-        "wide has lanes": lambda b, x, y: b.fill(b.wide("wide", 1, 8)[0], 0),
-    }
-    for words, build in rows.items():
+def test_what_cannot_be_printed_is_refused():
+    empty = Builder("empty", "Empty.").finish()
+    for printer in (PythonPrinter(empty), LoopPrinter(empty, "double", "x")):
+        with pytest.raises(UnprintableStatement, match=f"{type(printer).__name__} .*Rotate"):
+            printer.statement(Rotate())
+
+    def casadi(program):
+        return PythonPrinter(program).lines()
+
+    def c(program):
+        return in_loops(program, "double", "x")
+
+    rows = [
+        ("When", branch, casadi),
+        ("Guard", lambda b, x, y: b.guard(x[0], "TOO_SMALL", y[0]), casadi),
+        ("FactorPair", lambda b, x, y: b.factor_pair(y, 2), casadi),
+        ("SolvePair", lambda b, x, y: b.solve_pair(y, x.part(0, 2)), casadi),
+        ("wide has lanes", lambda b, x, y: b.fill(b.wide("wide", 1, 8)[0], 0), casadi),
+        (
+            "cannot be added to the lanes of wide",
+            lambda b, x, y: b.copy(b.wide("wide", 1, 8)[0], x.part(0, 1), adds=True),
+            c,
+        ),
+    ]
+    for words, build, printed in rows:
         b = Builder("refused", "Refused.")
         build(b, *arrays(b))
         with row(words), pytest.raises(UnprintableStatement, match=words):
-            PythonPrinter(b.finish()).lines()
+            printed(b.finish())
 
 
 def casadi_values(program, **arguments):
@@ -98,9 +104,6 @@ def test_casadi_adds_what_a_copy_adds():
         program = b.finish()
         expected = Run(program, Numbers(), {"x": numbers}).values["y"]
         assert casadi_values(program, x=numbers) == {"y": expected}, stride
-
-
-# What C's helpers take only side by side.
 
 
 def test_c_writes_scalars_that_lie_apart_one_by_one():
@@ -131,14 +134,6 @@ def test_c_reads_and_clears_what_lies_apart():
     assert fills == [f"rat_fill_rows(8, 0.0, {place});" for place in ("x", "x + 16")]
 
 
-def test_c_refuses_to_add_numbers_to_lanes():
-    b = Builder("wide", "Wide.")
-    x, wide = b.array("x", 1, role="input"), b.wide("wide", 1, 8)
-    b.copy(wide[0], x[0], adds=True)
-    with pytest.raises(UnprintableStatement, match="cannot be added to the lanes of wide"):
-        in_loops(b.finish(), "double", "x")
-
-
 # The recipe for a target
 
 VALUES = ["mass_matrix", "forward_dynamics", "energy", "tail_points"]
@@ -153,36 +148,24 @@ SCENES = {
 }
 
 
-def emitted(scene, root):
-    """The manifest of a scene's model in NumPy alone, and the names that its module defines."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(pipeline.TARGETS, "numpy", TARGET)
-        pipeline.generate(replace(scene, targets=("numpy",)), root)
-    folder, names = root / scene.name, {}
-    exec((folder / f"{scene.name}_numpy.py").read_text(), names)
-    return json.loads((folder / "manifest.json").read_text()), names
-
-
-def arguments_of(scene, function, tail):
-    """A random state; positive numbers for all other arguments."""
-    q, v, v_dot, tau = (rows[0] for rows in random_states(scene.segments, 5, 1, "random"))
-    known, rng = {"q": q, "v": v, "v_dot": v_dot, "tau": tau}, np.random.default_rng(7)
-    return {
-        a.name: known[a.name] if a.name in known else rng.uniform(0.1, 0.3, a.length(tail))
-        for a in function.inputs
-    }
-
-
 @pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
-def test_emitted_module_computes_what_the_programs_mean(scene, tmp_path):
-    manifest, names = emitted(scene, tmp_path)
+def test_emitted_module_computes_what_the_programs_mean(scene, tmp_path, monkeypatch):
+    monkeypatch.setitem(pipeline.TARGETS, "numpy", TARGET)
+    pipeline.generate(replace(scene, targets=("numpy",)), tmp_path)
+    folder, names, rng = tmp_path / scene.name, {}, np.random.default_rng(7)
+    exec((folder / f"{scene.name}_numpy.py").read_text(), names)
+    manifest = json.loads((folder / "manifest.json").read_text())
     assert names["__doc__"].endswith(f"derivation {manifest['content_hash']}.")
     assert manifest["scene"]["targets"] == ["numpy"] and "work" not in manifest
     tail = pipeline.tail_of(scene)
+    states = (rows[0] for rows in random_states(scene.segments, 5, 1, "random"))
+    known = dict(zip(("q", "v", "v_dot", "tau"), states, strict=True))
     parameters = {key: np.ravel(value).tolist() for key, value in scene.parameters.items()}
     for name in manifest["functions"]:
         function = CATALOGUE[name].of(tail)
-        program, arguments = assemble(function, tail), arguments_of(scene, function, tail)
+        program = assemble(function, tail)
+        positive = {a.name: rng.uniform(0.1, 0.3, a.length(tail)) for a in function.inputs}
+        arguments = {key: known.get(key, value) for key, value in positive.items()}
         arrays = (*program.of_role("parameters"), *program.of_role("input"))
         given = {a.name: (parameters | arguments)[a.name] for a in arrays}
         expected = Run(program, Numbers(), given).values

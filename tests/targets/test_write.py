@@ -13,7 +13,6 @@ from pathlib import Path
 import pytest
 
 from serpentail.model.manifest import read_folder
-from serpentail_codegen.__main__ import main
 from serpentail_codegen.scene.problems import SceneError
 from serpentail_codegen.targets import exchange
 from serpentail_codegen.targets.write import write_folder
@@ -25,24 +24,22 @@ ROOT = Path(__file__).parents[2]
 OLD = {"a.txt": "old", "src/b.c": "old", "src/same.c": "same", "gone/c.c": "old"}
 NEW = {"a.txt": "new", "src/b.c": "new", "src/same.c": "same", "include/d.h": "new"}
 MINE = {"build/deep/mine.o": "mine", ".made": ""}
-THREADS = 8
-
-
-@pytest.fixture
-def folder(tmp_path):
-    """An old generation, and files of its user."""
-    return furnished(tmp_path / "root" / "folder")
 
 
 def furnished(folder):
+    """An old generation, and files of its user."""
     write_folder(folder, OLD, {"name": "old"})
     for name, text in MINE.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(text)
-    (folder / "build" / "empty").mkdir(exist_ok=True)
-    if not (folder / "build" / "link").is_symlink():
-        (folder / "build" / "link").symlink_to("deep")
+    (folder / "build" / "empty").mkdir()
+    (folder / "build" / "link").symlink_to("deep")
     return folder
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return furnished(tmp_path / "root" / "folder")
 
 
 def texts(folder):
@@ -73,16 +70,15 @@ def test_what_is_the_user_s_comes_along(folder):
     assert os.listdir(folder.parent) == ["folder"]
 
 
-def written(folder):
-    """What writing changes of all files: which they are, their times of writing, their sizes."""
-    found = {path: path.lstat() for path in folder.rglob("*")}
-    return {path: (s.st_ino, s.st_mtime_ns, s.st_ctime_ns, s.st_size) for path, s in found.items()}
-
-
 def test_nothing_is_written_where_nothing_changed(folder):
-    before = written(folder.parent)
+    def written():
+        found = {path: path.lstat() for path in folder.parent.rglob("*")}
+        keys = ("st_ino", "st_mtime_ns", "st_ctime_ns", "st_size")
+        return {path: [getattr(s, key) for key in keys] for path, s in found.items()}
+
+    before = written()
     assert write_folder(folder, OLD, {"name": "old"}) == []
-    assert written(folder.parent) == before
+    assert written() == before
     (folder / "src" / "b.c").unlink()
     assert write_folder(folder, OLD, {"name": "old"}) == ["src/b.c"]
 
@@ -195,42 +191,31 @@ def test_fault_at_any_call_is_one_line_and_leaves_a_model(tmp_path, monkeypatch)
     assert moment > 60 and refused > 20
 
 
-def test_command_line_says_it_in_one_line(tmp_path, capsys):
-    (tmp_path / "file").touch()
-    arguments = ["--tail", "articulated", "--segments", "1", "--links", "1"]
-    arguments += ["--functions", "mass_matrix", "--output", str(tmp_path / "file")]
-    assert main(arguments) == 2
-    out, err = capsys.readouterr()
-    assert out == "" and err.count("\n") == 1
-    assert err.startswith("generated folder: value '") and "cannot be written (Not a dir" in err
-
-
 # Rivals
 
 
 def in_threads(work):
     """Do some work in eight threads at once; errors are raised."""
-    together = threading.Barrier(THREADS)
+    together = threading.Barrier(8)
 
     def run(number):
         together.wait()
         for turn in range(5):
             work(number + turn)
 
-    with ThreadPoolExecutor(THREADS) as pool:
-        assert [*pool.map(run, range(THREADS))] == [None] * THREADS
+    with ThreadPoolExecutor(8) as pool:
+        assert [*pool.map(run, range(8))] == [None] * 8
 
 
 def test_eight_threads_write_one_model(folder, tmp_path, monkeypatch):
     for name in ("at once", "in steps"):
-        if name == "in steps":
-            monkeypatch.setattr(exchange, "_system_call", lambda: None)
         place = tmp_path / name / "folder"
-        with row(name):
+        with row(name), monkeypatch.context() as patches:
+            if name == "in steps":
+                patches.setattr(exchange, "_system_call", lambda: None)
             in_threads(lambda n, place=place: write_folder(place, {**OLD, "n": str(n % 4)}, {}))
             assert {*texts(place)} == {*OLD, "n", "manifest.json"}
             assert os.listdir(place.parent) == ["folder"]
-    monkeypatch.undo()
 
     # threads that write different models leave one
     models = (NEW, {"name": "new"}), (OLD, {"name": "old"})

@@ -7,26 +7,8 @@ from serpentail.model.kernel import Kernel
 from serpentail_codegen.targets.c.batch import BATCHED, PARTS
 
 GROUND = PARTS["batch_contact"]
-FREE = [name for name in BATCHED if name not in GROUND]  # of models without contacts
-
-ARGUMENTS = {
-    "mass_matrix": ("q",),
-    "bias_force": ("q", "v"),
-    "inverse_dynamics": ("q", "v", "v_dot"),
-    "forward_dynamics": ("q", "v", "tau"),
-    "inverse_dynamics_derivatives": ("q", "v", "v_dot"),
-    "forward_dynamics_derivatives": ("q", "v", "tau"),
-    "inverse_dynamics_vjp": ("q", "v", "v_dot", "multiplier"),
-    "forward_dynamics_jvp": ("q", "v", "tau", "dq", "dv", "dtau"),
-    "forward_dynamics_vjp": ("q", "v", "tau", "multiplier"),
-    "inverse_dynamics_hessian": ("q", "v", "v_dot", "multiplier"),
-    "airborne_rates": ("x", "tau", "angular"),
-    "airborne_rates_derivatives": ("x", "tau", "angular"),
-    "airborne_rates_hessian": ("x", "tau", "angular", "weights"),
-    "contact_points": ("q", "v", "legs"),
-    "leg_points": ("q", "angles"),
-    "contact_dynamics": ("q", "v", "tau", "bristles", "legs"),
-}
+UPRIGHT, LEGS = [1, 0, 0, 0], [3.66, -0.26, 3.66, -0.26, 0, 0, 0, 0]
+TOUCHING = ("all", "some", "none")
 
 
 def in_lanes(monkeypatch):
@@ -44,10 +26,31 @@ def states(model, count, seed=0):
     return {name: rng.normal(size=(count, size)) for name, size in sizes.items()}
 
 
+def on_ground(model, touching, seed=0):
+    """Random states by name, one for each word of ``touching``: how many points press there.
+
+    With "some", the height of the animal is drawn between those of its lowest and highest point.
+    """
+    rng, count = np.random.default_rng(seed), len(touching)
+    q, v = np.zeros((count, model.nq)), 0.3 * rng.normal(size=(count, model.nv))
+    v[:, 2] -= 1  # m/s: points in the ground press, for they sink
+    q[:, 3:7] = UPRIGHT + 0.2 * rng.normal(size=(count, 4))
+    q[:, 7:] = 0.3 * rng.normal(size=(count, model.nv - 6))
+    legs = LEGS + 0.1 * rng.normal(size=(count, 8))
+    values = {"q": q, "v": v, "legs": legs, "angles": legs[:, :4].copy()}
+    values["tau"] = 1e-4 * rng.normal(size=(count, model.nv - 6))
+    values["bristles"] = 1e-3 * rng.normal(size=(count, 2 * sum(model.contacts.values())))
+    for k, word in enumerate(touching):
+        points = model.kernel("contact_points")(*given(model, values, "contact_points", k))[0]
+        heights = np.sort(points[:, 2])
+        between = rng.uniform(heights[0], heights[-1])
+        q[k, 2] = -{"all": heights[-1] + 1e-3, "some": between, "none": heights[0] - 0.01}[word]
+    return values
+
+
 def given(model, values, name, *index):
-    """The arguments of one function, of all states or of some; of legs only where there are."""
-    inputs = [a["name"] for a in model.manifest["functions"][name]["inputs"]]
-    return [values[argument][index] for argument in ARGUMENTS[name] if argument in inputs]
+    """The arguments of one function, of all states or of some."""
+    return [values[a["name"]][index] for a in model.manifest["functions"][name]["inputs"]]
 
 
 def evaluated(model, name, values):

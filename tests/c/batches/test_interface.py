@@ -1,18 +1,20 @@
 """Batches share compiled lanes, threads and arrays, and name the state that is wrong."""
 
-import threading
+import ctypes
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 
 import numpy as np
 import pytest
 
 import serpentail as st
+from serpentail.model.kernel import argument_record
+from serpentail.model.library import NOT_FINITE
 from serpentail.model.snapshot import model_library
 from tests.support import zoo
 from tests.support.rows import row
 
-from . import ground
-from .tails import alone, given, states
+from .tails import TOUCHING, alone, evaluated, given, on_ground, states
 
 
 @cache
@@ -50,7 +52,6 @@ def test_parameters_count_in_batches_and_a_single_state_is_repeated():
 
 WRONG = [
     ("v", 4, np.nan, r"v\[4\] of state 13: value nan"),
-    ("q", 0, np.inf, r"q\[0\] of state 13: value inf"),
     ("q", slice(3, 7), 0, r"quaternion q\[3:7\] of state 13"),
     ("v", slice(None), 1e200, "state 13 is not finite"),
     *(("q", k, np.inf, rf"q\[{k}\] of state 13: value inf") for k in range(9)),
@@ -71,26 +72,23 @@ def test_the_state_that_is_wrong_is_named():
     with pytest.raises(st.StateError, match="segment 2 of state 17 is bent by 7"):
         model_of("arcs2").mass_matrix(bent)
     touching = model_of("ground")
-    values = ground.states(touching, ground.TOUCHING * 4)
+    values = on_ground(touching, TOUCHING * 4)
     values["bristles"][7, 3] = np.nan
     with pytest.raises(st.StateError, match=r"bristles\[3\] of state 7: value nan"):
-        touching.contact_dynamics(*given(touching, values, "contact_dynamics"))
+        evaluated(touching, "contact_dynamics", given(touching, values, "contact_dynamics"))
 
 
 def test_threads_share_a_model():
     found, name = model_of("m1_n1"), "forward_dynamics"
     batches = [given(found, states(found, 600, seed), name) for seed in range(6)]
-    expected, results = [found.forward_dynamics(*batch) for batch in batches], [None] * 6
+    expected = [found.forward_dynamics(*batch) for batch in batches]
 
     def work(k):
-        results[k] = [found.forward_dynamics(*batches[k]) for _ in range(20)]
+        results = [found.forward_dynamics(*batches[k]) for _ in range(20)]
+        return all(np.array_equal(one, expected[k]) for one in results)
 
-    threads = [threading.Thread(target=work, args=(k,)) for k in range(6)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert all(np.array_equal(one, expected[k]) for k, many in enumerate(results) for one in many)
+    with ThreadPoolExecutor(6) as pool:
+        assert all(pool.map(work, range(6)))
 
 
 def test_what_a_batch_returns_begins_at_a_cache_line():
@@ -99,3 +97,29 @@ def test_what_a_batch_returns_begins_at_a_cache_line():
     for output in getattr(found, name)(*given(found, values, name)):
         assert output.ctypes.data % 64 == 0 and output.flags.c_contiguous and output.flags.writeable
     assert found.mass_matrix(values["q"][:0]).shape == (0, found.nv, found.nv)
+
+
+@pytest.mark.parametrize("name", ["m1_n1", pytest.param("arcs2_loops", marks=pytest.mark.slow)])
+def test_states_may_lie_apart_or_be_shared(name):
+    """For kernels in C: x among other numbers, one angular momentum and one set of weights."""
+    found, function = model_of(name), "airborne_rates_hessian"
+    batches, values = found.batch_library, states(found, 21)
+    for shared in ("angular", "weights"):
+        values[shared][:] = values[shared][0]
+    expected = alone(found, function, values)
+    x, tau, *shared = given(found, values, function)
+    nodes = np.hstack([x, tau, np.full((21, 3), np.nan)])
+    outputs = [a["shape"] for a in found.manifest["functions"][function]["outputs"]]
+    results = [np.zeros((21, int(np.prod(shape)) + 1)) for shape in outputs]
+    arrays = [nodes, nodes[:, x.shape[1] :], *shared, *results]
+    apart = [nodes.shape[1]] * 2 + [0, 0] + [result.shape[1] for result in results]
+    apart, work = np.array(apart, np.uintp), np.zeros(batches.work[function])
+    address = batches.address(function)
+    called = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)(address)
+    record = argument_record(found.parameter_vector, len(nodes), work, arrays)
+    assert called(ctypes.byref(record), apart.ctypes.data) == 0
+    got = np.hstack([result[:, :-1] for result in results])
+    assert (np.abs(got - expected) <= 1e-11 * np.abs(expected).max(axis=0)).all()
+    assert not any(result[:, -1].any() for result in results)
+    nodes[13, 5] = np.nan
+    assert called(ctypes.byref(record), apart.ctypes.data) == NOT_FINITE and record.failed == 8

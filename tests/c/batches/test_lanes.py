@@ -1,11 +1,11 @@
 """States side by side give what each of them gives alone, in any number, pressing on the ground or
-not.
+not; programs over lanes of states mean the same, in loops and written out.
 """
 
-import ctypes
-from functools import cache
+import json
+from dataclasses import replace
+from functools import cache, partial
 
-import mpmath
 import numpy as np
 import pytest
 from hypothesis import given as drawn
@@ -13,20 +13,36 @@ from hypothesis import settings
 from hypothesis import strategies as st
 
 import serpentail
-from serpentail.model.compiler import compile_library
 from serpentail.model.kernel import ArgumentRecord
 from serpentail.model.library import NOT_FINITE
-from serpentail_codegen.targets.c.batch import STATES
+from serpentail_codegen.functions.catalogue import CATALOGUE
+from serpentail_codegen.functions.function import assemble
+from serpentail_codegen.functions.tail import Tail
+from serpentail_codegen.ir.interpret import Numbers, Run
+from serpentail_codegen.passes.batch import batched as widened
+from serpentail_codegen.passes.batch import unrolled_step
+from serpentail_codegen.passes.directions import directions_in_turn, places_lanes
+from serpentail_codegen.targets.c.batch import BATCHED, STATES
 from tests.support import zoo
+from tests.support.models import folder_of
 from tests.support.rows import row
 
-from . import ground
-from .tails import GROUND, alone, batched, evaluated, given, in_lanes, states
+from .tails import (
+    GROUND,
+    TOUCHING,
+    alone,
+    batched,
+    evaluated,
+    given,
+    in_lanes,
+    on_ground,
+    states,
+)
 
 FREE = ("m2_n2", "arcs1", "fixed")
 FREE_SLOW = ("straight", "loops", "segments", "single", "arcs2_loops", "arcs2", "mixed", "baked")
-TOUCHING = ("ground_m2_n2", "box", "smooth", "paper", "small")
-TOUCHING_SLOW = ("ground_arcs", "single_ground", "ground_mixed", "feet", "feet_tail")
+STANDING = ("ground_m2_n2", "box", "smooth", "paper", "small")
+STANDING_SLOW = ("ground_arcs", "single_ground", "ground_mixed", "feet", "feet_tail")
 
 
 # largest differences by rounding, in units of the last digit of each output's largest value
@@ -43,14 +59,16 @@ def values_of(model, count):
     values = states(model, count)
     if not model.contacts:
         return values
-    touching = ground.states(model, (ground.TOUCHING * count)[:count])
-    presses = [ground.pressing(model, touching, k) for k in range(6)]
-    assert presses[2] == presses[5] == 0 and presses[0] > 0
+    touching = on_ground(model, (TOUCHING * count)[:count])
+    for k in range(6):
+        arguments = given(model, touching, "contact_dynamics", k)
+        forces = model.kernel("contact_dynamics")(*arguments)[2]
+        assert TOUCHING[k % 3] == "some" or forces[:, 2].any() == (TOUCHING[k % 3] == "all")
     # what the others move with is at random, their poses are above the ground
     return values | touching
 
 
-@pytest.mark.parametrize("name", [*FREE, *slow(*FREE_SLOW), *TOUCHING, *slow(*TOUCHING_SLOW)])
+@pytest.mark.parametrize("name", [*FREE, *slow(*FREE_SLOW), *STANDING, *slow(*STANDING_SLOW)])
 def test_any_number_of_states_gives_what_each_gives_alone(name, monkeypatch):
     model = serpentail.load(zoo.folder(name))  # its own: later calls would be in lanes
     values, lanes = values_of(model, 37), STATES[model.manifest["real"]]
@@ -103,25 +121,23 @@ def test_the_reproducible_profile_gives_the_same_bits(name, monkeypatch):
             np.testing.assert_array_equal(together, alone(model, function, values))
 
 
-@cache
-def on_the_ground():
-    """A model that only this file has."""
-    return serpentail.load(zoo.folder("ground_m2_n2"))
+standing = cache(lambda: serpentail.load(zoo.folder("ground_m2_n2")))  # only this file has it
 
 
 @settings(deadline=None, max_examples=40)
 @drawn(
-    touching=st.lists(st.sampled_from(ground.TOUCHING), min_size=8, max_size=17),
+    touching=st.lists(st.sampled_from(TOUCHING), min_size=8, max_size=17),
     seed=st.integers(0, 2**32 - 1),
 )
 def test_forces_are_those_of_the_law_in_any_mixture(touching, seed):
     """Eq. 36 and Coulomb's cone, from the places and velocities of the points alone."""
-    model = on_the_ground()
-    values, p = ground.states(model, touching, seed), model.parameters
+    model = standing()
+    values, p = on_ground(model, touching, seed), model.parameters
     with pytest.MonkeyPatch.context() as patch:
         in_lanes(patch)
-        places, moves = model.contact_points(*given(model, values, "contact_points"))
-        _, rates, forces = model.contact_dynamics(*given(model, values, "contact_dynamics"))
+        places, moves = model.contact_points(values["q"], values["v"], values["legs"])
+        arguments = (values[name] for name in ("q", "v", "tau", "bristles", "legs"))
+        _, rates, forces = model.contact_dynamics(*arguments)
     depth = np.maximum(-places[..., 2], 0)
     normal = p["K_n"] * np.sqrt(depth) * np.maximum(depth - p["D_n"] * moves[..., 2], 0)
     np.testing.assert_allclose(forces[..., 2], normal, rtol=1e-9, atol=1e-12)
@@ -135,45 +151,77 @@ def test_forces_are_those_of_the_law_in_any_mixture(touching, seed):
     np.testing.assert_allclose(found_rates, relaxing, rtol=1e-7, atol=1e-12)
 
 
-ROWS = """
-int row_lanes(void);
-int row_lanes(void) { return LANES; }
-void row(const real *x, real *sine, real *cosine);
-void row(const real *x, real *sine, real *cosine) {
-  lanes a;
-  for (int k = 0; k < LANES; ++k) ((real *)&a)[k] = x[k];
-  @_sincos_row(a, (lanes *)sine, (lanes *)cosine);
-}
-"""
+# Programs over lanes of states
+
+TAILS = {"articulated": Tail(2, 2), "continuum": Tail(2, 4, "continuum")}
 
 
-@mpmath.workdps(60)
-@pytest.mark.parametrize("name", ["bare", "single"])
-def test_sine_and_cosine_of_rows_are_good_to_the_last_digit(tmp_path, name):
-    folder, file = zoo.folder(name), tmp_path / "rows.c"
-    source = (folder / "src" / f"{name}_batch.c").read_text()
-    for word in ("lanes", "LANES", "real"):
-        source = source.replace(f"#undef {word}", "")
-    file.write_text(source + ROWS.replace("@", name))
-    library = ctypes.CDLL(str(compile_library([file], folder / "include")))
-    number = np.float32 if name == "single" else np.float64
-    width, rng = library.row_lanes(), np.random.default_rng(3)
-    far, least = (number(1e4), -40) if name == "single" else (number(1e5), -300)
-    angles = [*rng.uniform(-4, 4, 320), *rng.uniform(-far, far, 320)]
-    angles += [*10.0 ** rng.uniform(least, 8, 96), *(k * np.pi / 4 for k in range(-40, 40))]
-    angles += [k * np.pi / 2 for k in rng.integers(0, int(far / 2), 160)]
-    beyond = np.nextafter(far, 2 * far)
-    angles += [0.0, far, -far, beyond, -beyond, np.inf, -np.inf]
-    angles = np.array(angles + [np.nan] * (-len(angles) % width)).astype(number).reshape(-1, width)
-    pointer = [np.zeros(width, number) for _ in range(3)]
-    for some in angles:
-        pointer[0][:] = some
-        library.row(*(ctypes.c_void_p(a.ctypes.data) for a in pointer))
-        for x, *found in zip(some, *pointer[1:], strict=True):
-            if not np.isfinite(x):
-                assert np.isnan(found).all()
-                continue
-            exact = mpmath.cos_sin(mpmath.mpf(float(x)))[::-1]
-            for y, value in zip(found, exact, strict=True):
-                most = 1.5 * float(np.spacing(number(abs(value))))
-                assert abs(mpmath.mpf(float(y)) - value) <= most, x
+def numbers(program, rng):
+    """Random arguments of a program, its parameters positive."""
+    ranges = {"parameters": partial(rng.uniform, 0.1, 1), "input": rng.normal}
+    arrays = [(a, role) for role in ranges for a in program.of_role(role)]
+    return {a.name: ranges[role](size=a.length).tolist() for a, role in arrays}
+
+
+def assert_means_each_of_many_states(single, rng):
+    several = [numbers(single, rng) for _ in range(3)]
+    for state in several[1:]:
+        state.update({a.name: several[0][a.name] for a in single.of_role("parameters")})
+    many = dict(several[0])
+    for a in single.of_role("input"):
+        many[a.name] = list(np.array([state[a.name] for state in several]).T)
+    found = Run(widened(directions_in_turn(single), 3), Numbers(np), many).values
+    for k, state in enumerate(several):
+        each = Run(single, Numbers(np), state).values
+        for a in single.of_role("output"):
+            assert [np.broadcast_to(x, 3)[k] for x in found[a.name]] == each[a.name], a.name
+
+
+def assert_means_the_same_written_out(single, rng):
+    """And guards the same."""
+    values = numbers(single, rng)
+    line = unrolled_step(directions_in_turn(single) if places_lanes(single) else single)
+    found, expected = (Run(program, Numbers(np), values) for program in (line, single))
+    for a in single.of_role("output"):
+        pair = (np.float64(run.values[a.name]) for run in (found, expected))
+        np.testing.assert_allclose(*pair, rtol=1e-12, err_msg=a.name)
+    guards = [sorted((status, float(x)) for status, x in run.guards) for run in (found, expected)]
+    assert [status for status, _ in guards[0]] == [status for status, _ in guards[1]]
+    np.testing.assert_allclose(*([x for _, x in some] for some in guards), rtol=1e-9)
+
+
+@pytest.mark.parametrize("tail", ["articulated", pytest.param("continuum", marks=pytest.mark.slow)])
+def test_programs_of_lanes_mean_the_same(tail):
+    for name in BATCHED:
+        contacts = ("feet", "tail", "torso") if name in GROUND else ()
+        single = assemble(CATALOGUE[name], replace(TAILS[tail], contacts=contacts))
+        with row(name):
+            assert_means_each_of_many_states(single, np.random.default_rng(1))
+            assert_means_the_same_written_out(single, np.random.default_rng(2))
+
+
+def test_what_depends_on_parameters_alone_stays_narrow():
+    arrays = {
+        a.name: a.lanes
+        for a in widened(assemble(CATALOGUE["inverse_dynamics"], Tail(2, 2)), 8).arrays
+    }
+    assert arrays["q"] == arrays["force"] == 8
+    assert arrays["link"] == arrays["tail_mass"] == 0
+
+
+def test_batches_stay_straight_for_longer_tails_than_single_states():
+    """Sizes are the point: batches of derivatives are straight for short tails alone."""
+    sizes = [("forward_dynamics", "batch", (3, 4), (8, 16))]
+    sizes += [("forward_dynamics_derivatives", "batch_derivatives", (1, 3), (3, 4))]
+    for name, part, *both in sizes:
+        for straight, (segments, links) in zip((True, False), both, strict=True):
+            changes = {"segments": segments, "links": links, "functions": [name]}
+            folder = folder_of(zoo.scene("bare", **changes))
+            manifest = json.loads((folder / "manifest.json").read_text())
+            source = (folder / "src" / f"bare_{part}.c").read_text()
+            with row(name, segments, links):
+                assert ("written_out" in source) == straight
+                if name == "forward_dynamics":
+                    assert manifest["functions"][name]["emission"] in ("lanes", "segments")
+                else:
+                    assert ("for (int d = 0;" in source) != straight

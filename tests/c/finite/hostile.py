@@ -3,14 +3,12 @@ time.
 """
 
 import ctypes
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
-from ...support.compile_once import compile_once
+from ..target.emitted import Library, model_of
 
 OK, NOT_POSITIVE_DEFINITE, NOT_FINITE, OUT_OF_RANGE = range(4)
 VALUES = {
@@ -49,70 +47,20 @@ class Call:
         return known and told and (self.finite or self.status != OK)
 
 
-class Victim:
-    """A model's functions, compiled by a command, with arguments that can be changed in place."""
-
-    def __init__(self, folder: Path, command: tuple[str, ...], seed: int = 0):
-        self.manifest = json.loads((folder / "manifest.json").read_text())
-        self.name, self.rng = self.manifest["prefix"], np.random.default_rng(seed)
-        self.real, self.baked = self.manifest["real"], self.manifest["scene"].get("baked", False)
-        self.dtype = np.float32 if self.real == "float" else np.float64
-        source, flags = folder / "src" / f"{self.name}.c", ("-std=c99", "-shared", "-fPIC")
-        path = compile_once("bare.so", (*command, *flags), [source], folder / "include")
-        self.library, self.factors = ctypes.CDLL(str(path)), None
-        self.parameters = self.ordinary_parameters()
-
-    def ordinary_parameters(self) -> np.ndarray:
-        """Return the scene's parameters."""
-        sizes = [p["size"] for p in self.manifest["parameters"] if p["in_struct"]]
-        parameters = np.zeros(sum(sizes), self.dtype)
-        self.library[f"{self.name}_default_parameters"](ctypes.c_void_p(parameters.ctypes.data))
-        return parameters
-
-    def ordinary(self, name: str, length: int) -> np.ndarray:
-        """Return an argument as it should be."""
-        x = self.rng.uniform(-0.5, 0.5, length).astype(self.dtype)
-        if name == "q":
-            x[3:7] += (1, 0, 0, 0)
-            x[7:] = abs(x[7:]) + self.dtype(0.1)  # polar angles are above zero
-        if name in ("damping", "gains", "weight"):
-            x = abs(x) * self.dtype(1e-3)
-        return self.factors.copy() if name == "factors" else x
-
-    def calls(self, function: str) -> Iterator[Call]:
-        """Yield calls of a function: ordinary, one value anywhere, no attitude, mixtures."""
-        one = Function(self, function)
-        yield one.call((), False)
-        arrays = one.inputs | ({} if self.baked else {"parameters": self.parameters})
-        for name, array in arrays.items():
-            for k in range(len(array)):
-                for value in VALUES[self.real]:
-                    yield one.with_put([(name, array, k, value)])
-        if "q" in one.inputs:
-            for quaternion in QUATERNIONS[self.real]:
-                put = [("q", one.inputs["q"], 3 + k, x) for k, x in enumerate(quaternion)]
-                yield one.with_put(put, refused=True)
-        places = [(name, array, k) for name, array in arrays.items() for k in range(len(array))]
-        for _ in range(MIXTURES):
-            chosen = self.rng.choice(len(places), min(len(places), self.rng.integers(2, 6)), False)
-            values = self.rng.choice(VALUES[self.real], len(chosen))
-            yield one.with_put([(*places[k], x) for k, x in zip(chosen, values, strict=True)])
-
-
 class Function:
-    """One function of a model, and the arrays that it is called with."""
+    """One function of a library, with arguments that can be changed in place."""
 
-    def __init__(self, victim: Victim, name: str):
-        entry = victim.manifest["functions"][name]
-        sizes = {a["name"]: int(np.prod(a["shape"])) for a in entry["inputs"]}
-        self.name, self.inputs = name, {n: victim.ordinary(n, size) for n, size in sizes.items()}
-        self.outputs = [np.zeros(np.prod(a["shape"]), victim.dtype) for a in entry["outputs"]]
-        self.work = np.zeros(victim.manifest["work"][name] + 1, victim.dtype)
-        arrays = (victim.parameters, *self.inputs.values(), *self.outputs, self.work)
+    def __init__(self, library: Library, name: str, inputs: dict[str, np.ndarray]):
+        manifest, number = library.model.manifest, library.number
+        self.name, self.inputs, self.parameters = name, inputs, library.parameters
+        outputs = manifest["functions"][name]["outputs"]
+        self.outputs = [np.zeros(np.prod(a["shape"], dtype=int), number) for a in outputs]
+        self.work = np.zeros(manifest["work"][name] + 1, number)
+        arrays = (self.parameters, *inputs.values(), *self.outputs, self.work)
         self.pointers = [ctypes.c_void_p(a.ctypes.data) for a in arrays]
-        self.function = victim.library[f"{victim.name}_{name}"]
+        self.function = library.library[f"{library.model.name}_{name}"]
 
-    def call(self, put: tuple, refused: bool) -> Call:
+    def call(self, put: tuple = (), refused: bool = False) -> Call:
         """Call it; what it does not write is finite no longer."""
         for array in self.outputs:
             array.fill(np.nan)
@@ -122,24 +70,54 @@ class Function:
 
     def with_put(self, changes: list[tuple], refused: bool = False) -> Call:
         """Call it with some entries changed, then change them back."""
-        before = [array[k] for _, array, k, _ in changes]
-        for _, array, k, value in changes:
-            array[k] = value
+        arrays = self.inputs | {"parameters": self.parameters}
+        before = [arrays[name][k] for name, k, _ in changes]
+        for name, k, value in changes:
+            arrays[name][k] = value
         # what solves with factors reads those of them that matter
-        checked = [x for name, _, _, x in changes if name not in ("parameters", "factors")]
+        checked = [x for name, _, x in changes if name not in ("parameters", "factors")]
         refused = refused or not np.isfinite(checked).all()
-        found = self.call(tuple((name, k, float(x)) for name, _, k, x in changes), refused)
-        for (_, array, k, _), value in reversed(list(zip(changes, before, strict=True))):
-            array[k] = value
+        found = self.call(tuple((name, k, float(x)) for name, k, x in changes), refused)
+        for (name, k, _), value in reversed(list(zip(changes, before, strict=True))):
+            arrays[name][k] = value
         return found
 
+    def calls(self, real: str, baked: bool, rng) -> Iterator[Call]:
+        """Yield calls: ordinary, one value anywhere, no attitude, mixtures."""
+        yield self.call()
+        arrays = self.inputs | ({} if baked else {"parameters": self.parameters})
+        places = [(name, k) for name, array in arrays.items() for k in range(len(array))]
+        for place in places:
+            for value in VALUES[real]:
+                yield self.with_put([(*place, value)])
+        for quaternion in QUATERNIONS[real] if "q" in arrays else ():
+            put = [("q", 3 + k, x) for k, x in enumerate(quaternion)]
+            yield self.with_put(put, refused=True)
+        for _ in range(MIXTURES):
+            chosen = rng.choice(len(places), min(len(places), rng.integers(2, 6)), False)
+            values = rng.choice(VALUES[real], len(chosen))
+            yield self.with_put([(*places[k], x) for k, x in zip(chosen, values, strict=True)])
 
-def attacked(folder: Path, command: tuple[str, ...], seed: int = 0) -> Iterator[Call]:
+
+def ordinary(name: str, length: int, rng) -> np.ndarray:
+    """Return an argument as it should be."""
+    x = rng.uniform(-0.5, 0.5, length)
+    if name == "q":
+        x[3:7] += (1, 0, 0, 0)
+        x[7:] = abs(x[7:]) + 0.1  # polar angles are above zero
+    return abs(x) * 1e-3 if name in ("damping", "gains", "weight") else x
+
+
+def attacked(name: str, compiler: str, level: tuple[str, ...]) -> Iterator[Call]:
     """Yield calls of every function of a model with hostile values."""
-    victim = Victim(folder, command, seed)
-    for name in victim.manifest["functions"]:
-        yield from victim.calls(name)
-        if name == "implicit_factor":
-            factor = Function(victim, name)
-            assert factor.call((), False).status == OK
-            victim.factors = factor.outputs[0]
+    model, rng, known = model_of(name), np.random.default_rng(0), {}
+    library = Library(model, *level, compiler=compiler)
+    for function, entry in model.manifest["functions"].items():
+        sizes = {a["name"]: np.prod(a["shape"], dtype=int) for a in entry["inputs"]}
+        drawn = {key: ordinary(key, size, rng) for key, size in sizes.items()} | known
+        inputs = {key: drawn[key].astype(library.number) for key in sizes}
+        one = Function(library, function, inputs)
+        yield from one.calls(model.scene.real, model.scene.baked, rng)
+        if function == "implicit_factor":
+            assert one.call().status == OK
+            known["factors"] = one.outputs[0]

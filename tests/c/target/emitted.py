@@ -125,17 +125,17 @@ void wrapped_sincos(const @_real *x, @_real *both)
 class Library:
     """The functions of a compiled model, called through ctypes, and its sine and cosine."""
 
-    def __init__(self, model, *flags):
+    def __init__(self, model, *flags, compiler="gcc", text=None):
         self.model, single = model, model.manifest["real"] == "float"
         self.number, self.c_type = (
             (np.float32, ctypes.c_float) if single else (np.float64, ctypes.c_double)
         )
-        text = model.source.read_text()
+        text = text or model.source.read_text()
         with TemporaryDirectory() as temporary:
             wrapper = Path(temporary) / "wrapper.c"
             own = WRAPPER.replace("@", model.name) if "_sincos(" in text else ""
-            wrapper.write_text(f'#include "{model.source}"\n{own}')
-            command = ("gcc", "-std=c99", *flags, "-fPIC", "-shared")
+            wrapper.write_text(text + own)
+            command = (compiler, "-std=c99", *flags, "-fPIC", "-shared")
             path = compile_once("model.so", command, [wrapper], model.include)
         self.library = ctypes.CDLL(str(path))
         sizes = [p["size"] for p in model.manifest["parameters"] if p["in_struct"]]
@@ -154,13 +154,14 @@ class Library:
     def call(self, name, arguments, dirt=np.nan, status=0, spare=True):
         """Call a function with all that it may write filled with dirt; return its outputs.
 
-        Without ``spare``, what the header allows to be null is null.
+        The workspace begins within a vector. Without ``spare``, what the header allows to be null
+        is null.
         """
         entry = self.model.manifest["functions"][name]
         inputs = [np.array(arguments[a["name"]], self.number) for a in entry["inputs"]]
         given = [x.copy() for x in inputs]
         outputs = [np.full(np.prod(a["shape"]), dirt, self.number) for a in entry["outputs"]]
-        work = np.full(self.model.manifest["work"][name], dirt, self.number)
+        work = np.full(self.model.manifest["work"][name] + 1, dirt, self.number)[1:]
         pointers = list(map(self._pointer, [self.parameters, *inputs, *outputs, work]))
         if not spare:
             pointers[0] = None if self.model.scene.baked else pointers[0]
@@ -177,21 +178,14 @@ def library_of(model, *flags):
 
 
 def states_of(model, count=2):
-    """Arguments by name of a few random states."""
-    total, rng = model.manifest["dimensions"]["total"], np.random.default_rng(2)
-    rows = zip(*random_states(model.scene.segments, 5, count, "random"), strict=True)
-    f_ext = rng.uniform(-1, 1, (count, 6 + 3 * (total + 1)))
+    """Every argument of every function by name, of a few random states."""
+    rng, functions = np.random.default_rng(2), model.manifest["functions"].values()
+    sizes = {a["name"]: np.prod(a["shape"], dtype=int) for f in functions for a in f["inputs"]}
     return [
-        {"q": q, "v": v, "v_dot": v_dot, "tau": tau, "f_ext": f}
-        for (q, v, v_dot, tau), f in zip(rows, f_ext, strict=True)
+        {name: rng.uniform(0.1, 1, size) for name, size in sizes.items()}
+        | dict(zip(("q", "v", "v_dot", "tau"), state, strict=True))
+        for state in zip(*random_states(model.scene.segments, 5, count, "random"), strict=True)
     ]
-
-
-def known_functions(model):
-    """Names of a model's functions that such a state has all arguments of."""
-    known = {"q", "v", "v_dot", "tau", "f_ext"}
-    entries = model.manifest["functions"].items()
-    return [name for name, e in entries if {a["name"] for a in e["inputs"]} <= known]
 
 
 def bits(outputs):

@@ -48,13 +48,6 @@ def test_compiles_without_a_warning(tmp_path, compiler, models):
             compiled(tmp_path, source, *flags, compiler=compiler)
 
 
-@pytest.mark.parametrize("name", ["bare", pytest.param("m1_n1", marks=pytest.mark.slow)])
-def test_optimiser_finds_nothing_to_warn_about(tmp_path, name):
-    model = model_of(name)
-    for source in model.sources:
-        compiled(tmp_path, source, *C99, *known(model, source, "gcc"), "-O2")
-
-
 @pytest.mark.parametrize(
     "functions", [["center_of_mass"], pytest.param(NAMES, marks=pytest.mark.slow)]
 )
@@ -94,6 +87,10 @@ def test_header_is_cpp_and_models_link_into_one_program(tmp_path):
     flags = ("-std=c++11", "-no-pie", *STRICT, *folders)
     run("g++", *flags, main, *objects, "-o", tmp_path / "main", "-lm")
     run(tmp_path / "main")
+    for model in map(model_of, ("bare", "small", "polar")):  # the source is C++, too
+        flags = ("-std=c++11", "-Wall", "-Wextra", "-Werror", "-fsyntax-only")
+        with row(model.name):
+            run("g++", "-x", "c++", *flags, "-I", model.include, model.source)
 
 
 # Symbols
@@ -146,13 +143,14 @@ def test_every_symbol_has_the_prefix_and_libc_gives_the_rest(models):
             assert_own_symbols(model, model.objects)
 
 
-@pytest.mark.parametrize("name", ["bare", pytest.param("small", marks=pytest.mark.slow)])
-def test_optimiser_asks_for_no_more_than_sincos(tmp_path, name):
-    model = model_of(name)
-    objects = {
-        source.stem.removeprefix(name): compiled(tmp_path, source, *PLAIN, "-O2")
-        for source in model.sources
-    }
+@pytest.mark.parametrize(
+    "name", ["bare", *(pytest.param(n, marks=pytest.mark.slow) for n in ("small", "m1_n1"))]
+)
+def test_optimiser_warns_about_nothing_and_asks_for_no_more_than_sincos(tmp_path, name):
+    model, objects = model_of(name), {}
+    for source in model.sources:
+        flags = (*C99, *PLAIN, *known(model, source, "gcc"), "-O2")
+        objects[source.stem.removeprefix(name)] = compiled(tmp_path, source, *flags)
     assert_own_symbols(model, objects, "sincos")
 
 
