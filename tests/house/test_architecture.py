@@ -15,7 +15,6 @@ import pytest
 import serpentail
 import serpentail_codegen
 from tests.house import file_lengths
-from tests.house.test_golden import MODELS
 from tests.support.makes import away_from_make, stand_in
 from tests.support.rows import row
 
@@ -53,32 +52,6 @@ def test_files_are_short():
             assert len(lines) <= 120
             numbers = [line for line in lines if re.search(r"%\.\d+[feg]", line)]
             assert all("printf" in line for line in numbers)
-
-
-def test_the_pages_lock_file_has_versions_and_no_addresses():
-    lock = json.loads((VIEWER / "package-lock.json").read_text(encoding="utf-8"))
-    packages = {name: entry for name, entry in lock["packages"].items() if name}
-    assert "node_modules/three" in packages
-    for entry in packages.values():
-        assert entry["version"] and entry["integrity"] and "resolved" not in entry
-    for path in (*VIEWER.glob("*.*"), VIEWER / ".npmrc"):
-        assert "://" not in path.read_text(encoding="utf-8")
-
-
-def test_what_is_built_is_not_kept_but_the_golden_models():
-    def git(*words):
-        done = subprocess.run(
-            ["git", *words], cwd=ROOT, capture_output=True, text=True, check=False
-        )
-        if done.returncode == 128:
-            pytest.skip("this is no checkout")
-        return done.stdout.split()
-
-    built = ["viewer/node_modules/", "runtime/serpentail/viewer/page.html"]
-    assert git("check-ignore", *built) == built
-    kept = git("ls-files", "--", "generated")
-    assert {name.split("/")[1] for name in kept} == {"README.md", *MODELS}
-    assert sum((ROOT / name).stat().st_size for name in kept) < 400_000
 
 
 def test_package_changelog_and_citation_have_one_version():
@@ -145,19 +118,6 @@ def test_options_of_make_are_those_of_the_generator(tree, make):
     assert not (tree / "generated").exists()
 
 
-def test_a_wrong_option_is_one_readable_line_and_nothing_is_made(tree, make):
-    for options, words in [
-        (["M=0"], r"segments: value 0"),
-        (["N=abc"], r"--links: .*'abc'"),
-        (["SCENE=--help"], r"scene file: value '--help'"),
-    ]:
-        with row(*options):
-            done = make("model", *options)
-            assert done.returncode == 2 and "Traceback" not in done.stderr
-            (line,) = (line for line in done.stderr.splitlines() if re.search(words, line))
-            assert len(line) < 130 and not list((tree / "generated").glob("[a-z]*"))
-
-
 @pytest.mark.slow
 def test_what_is_there_is_not_made_again_and_what_was_lost_is(tree, make):
     failed = make("model", *ORDER, CC="no-such-cc", SERPENTAIL_CACHE=str(tree / "cache"))
@@ -175,12 +135,3 @@ def test_what_is_there_is_not_made_again_and_what_was_lost_is(tree, make):
     (folder / "README.md").unlink()
     assert "1 files written" in make("model", *ORDER).stdout
     assert (folder / "README.md").read_bytes() == readme
-
-
-def test_clean_removes_what_was_made(tree, make):
-    kept = ("generated/README.md", "generated/golden_loops/src")  # part of the checkout
-    for name in ("generated/x", "generated/.stamps", "output", *kept):
-        (tree / name).mkdir(parents=True)
-    assert make("clean").returncode == 0
-    assert {path.name for path in (tree / "generated").iterdir()} == {"README.md", "golden_loops"}
-    assert not (tree / "output").exists() and (tree / "generated/golden_loops/src").is_dir()

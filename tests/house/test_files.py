@@ -2,11 +2,8 @@
 the old file stays whole, whenever and however the system refuses.
 """
 
-import builtins
 import errno
-import io
 import os
-from contextlib import contextmanager
 from unittest import mock
 
 import numpy as np
@@ -14,7 +11,6 @@ import pytest
 
 import serpentail as st
 from serpentail.checks import (
-    Refusals,
     did_you_mean,
     finite_array,
     number,
@@ -24,7 +20,7 @@ from serpentail.checks import (
     shown,
     whole_number,
 )
-from serpentail.errors import PlanningError, StateError
+from serpentail.errors import PlanningError
 from serpentail.files import refuse_unusable, refuse_unwritable
 from tests.support.drawn_flight import flight
 from tests.support.rows import row
@@ -87,16 +83,6 @@ def test_values_are_shown_on_one_line_that_is_not_long():
     assert shown(10**5000) == "of type int, too long to show"
 
 
-def test_refusals_tell_all_parts_at_once_and_try_none_twice():
-    found = Refusals(PlanningError)
-    found.tell()  # nothing is wrong yet
-    assert found.attempt("first", number, "first", 2, StateError) == 2.0
-    for part, value in [("second", "a"), ("third", np.nan), ("second", 1)]:
-        assert found.attempt(part, number, part, value, StateError) is None
-    with pytest.raises(PlanningError, match=r"^second.*'a'.*\nthird.*nan.*number$"):
-        found.tell()
-
-
 # Files.
 
 WRITERS = {
@@ -111,27 +97,6 @@ OLD = b"what was there before"
 QUICK = ("run.npz", "film.gif")  # drawings take long
 DRAWN = ("times.svg", "times.png", "film.pdf")
 tiers = pytest.mark.parametrize("names", [QUICK, pytest.param(DRAWN, marks=pytest.mark.slow)])
-
-
-@contextmanager
-def full(room, code):
-    """Let a device take so many bytes of a file that is being written, and then refuse."""
-    real = builtins.open
-
-    class Refusing(io.FileIO):
-        def write(self, data):
-            if self.tell() + len(data) > room:
-                raise OSError(code, os.strerror(code))
-            return super().write(data)
-
-    def lent(file, mode="r", *rest, **options):
-        if not (isinstance(file, str | os.PathLike) and str(file).endswith(".part")):
-            return real(file, mode, *rest, **options)
-        raw = Refusing(file, mode.replace("b", ""))
-        return io.BufferedRandom(raw, 512) if "+" in mode else io.BufferedWriter(raw, 512)
-
-    with mock.patch.object(builtins, "open", lent), mock.patch.object(io, "open", lent):
-        yield
 
 
 def refused(name, folder, words):
@@ -150,19 +115,6 @@ def unchanged(folder, name):
     """Nothing but the old file is there."""
     assert [path.name for path in folder.iterdir()] == [name]
     assert (folder / name).read_bytes() == OLD
-
-
-@tiers
-def test_a_device_that_refuses_leaves_the_old_file(names, tmp_path):
-    """At half of the file; of one kind at the first byte and at the last byte, too."""
-    for name in names:
-        WRITERS[name](flight(samples=20), tmp_path / name)
-        size = (tmp_path / name).stat().st_size
-        rooms = [(size // 2, "EIO"), (0, "ENOSPC"), (size - 1, "ENOSPC")]
-        for room, code in rooms[: 3 if name == "run.npz" else 1]:
-            number = getattr(errno, code)
-            with row(name, room, code), full(room, number):
-                refused(name, tmp_path, os.strerror(number))
 
 
 @tiers

@@ -1,12 +1,10 @@
 """Mutants change what runs and nothing that only tells, and are judged by the tests that run it."""
 
-import ast
 from pathlib import Path
-from types import SimpleNamespace
 
-from mutants import judge, python_source, results, sample, template_source
+from mutants import python_source, results, sample, template_source
 from mutants.mutation import Mutation
-from mutants.recorded import NO_JUDGES, own_lines
+from mutants.recorded import NO_JUDGES
 from tests.support.rows import row
 
 ROOT = Path(__file__).parents[2]
@@ -66,42 +64,6 @@ def test_mutants_change_what_runs_and_not_what_only_tells():
             found = {m.change.strip() for m in mutations if "->" in m.change}
             found -= {"a < {{ 0 | number }} -> !(a < {{ 0 | number }})"}
             assert found == {change.strip() for change in changes}
-
-
-def test_a_sample_is_of_programs_of_all_parts_and_grows(tmp_path):
-    for folder, suffix in sample.PARTS.values():
-        for path in sorted((ROOT / folder).rglob(f"*{suffix}"))[3:9:2]:
-            copy = tmp_path / path.relative_to(ROOT)
-            copy.parent.mkdir(parents=True, exist_ok=True)
-            copy.write_bytes(path.read_bytes())
-    few, many = sample.drawn(tmp_path, 30, 7), sample.drawn(tmp_path, 60, 7)
-    assert many[:30] == few != sample.drawn(tmp_path, 30, 8)
-    assert len({mutation.key for mutation in many}) == 60
-    parts = [sample.part_of(mutation.path) for mutation in few]
-    assert [parts.count(part) for part in sample.PARTS] == [10, 10, 10]
-    (path,) = {mutation.path for mutation in sample.drawn(tmp_path, 30, 7, few[0].path)}
-    assert path == few[0].path
-    for mutation in (m for m in many if m.path.endswith(".py")):
-        source = (ROOT / mutation.path).read_bytes()
-        assert ast.dump(ast.parse(mutation.of(source))) != ast.dump(ast.parse(source))
-
-
-def test_the_nearest_files_judge_first_and_alone_where_no_test_runs_the_line():
-    source = "codegen/serpentail_codegen/targets/c/templates/batch/lane_samples.c.jinja"
-    names = ("simulation/test_adaptive_lanes", "c/batches/test_kernels", "fuzz/test_plans")
-    assert [judge.nearness(source, f"tests/{name}.py") for name in names] == [1, 2, 0]
-    passed = {"tests/sweeps/test_kills.py": ["kills"], "tests/fuzz/test_plans.py": ["plans"]}
-    child = Mutation("runtime/serpentail/sweeps/child.py", 1, 0, 1, "", "", "")
-    for runs in (True, False):
-        recorder = SimpleNamespace(
-            files=lambda: list(passed),
-            cost=lambda file: 1.0,
-            chosen=lambda _, file, runs=runs: [["plans"] if runs and "plans" in file else []],
-            of=lambda file: SimpleNamespace(passed=passed[file]),
-        )
-        assert list(judge.rows(recorder, child)) == [["plans" if runs else "kills"]]
-    tree = ast.parse("if (a and\n    b):\n    c()\nd()\n")
-    assert [list(own_lines(node)) for node in tree.body] == [[1, 2], [4]]
 
 
 def test_the_score_leaves_out_what_is_argued_of_lines_that_are_there(monkeypatch):
