@@ -98,14 +98,6 @@ def test_bodies_without_the_warning_keep_their_digits(name):
                 assert error_of_mass_matrix(other, rng, bends) < 1e-12
 
 
-def test_vjp_of_a_model_with_contacts_is_that_of_flight():
-    flight, standing, rng = zoo.model("m1_n3"), zoo.model("feet_tail"), np.random.default_rng(5)
-    arguments = [rng.normal(size=n) for n in (flight.nq, flight.nv, 2, flight.nv)]
-    pairs = zip(*(m.forward_dynamics_vjp(*arguments) for m in (flight, standing)), strict=True)
-    for expected, found in pairs:
-        np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12 * np.abs(expected).max())
-
-
 def test_simulations_that_cannot_be_are_refused():
     q = np.array([0, 0, 0.3, 1, 0, 0, 0, 0, 0.0])
     settings = {"legs": st.Legs.fixed(3.6, -0.3), "t_span": 0.01}
