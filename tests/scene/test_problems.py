@@ -2,17 +2,15 @@
 files, which both packages refuse in the same words.
 """
 
-import json
 import os
 import pickle
-import random
 from pathlib import Path
 
 import pytest
 
 from serpentail.errors import ModelError
 from serpentail.scenes.file import read_scene
-from serpentail_codegen.scene.parse import load_scene, parse_scene, scene_for, scene_to_dict
+from serpentail_codegen.scene.parse import load_scene, scene_for, scene_to_dict
 from serpentail_codegen.scene.problems import Problem, SceneError
 from serpentail_codegen.scene.scene import Scene
 from tests.support.rows import row
@@ -175,43 +173,6 @@ def test_each_problem_is_one_short_line_that_crosses_process_borders(refuse):
 
 
 # Broken files
-
-# fmt: off
-PIECES = [
-    "[[", "]", "=", "#", ".", "\n", "'''", "\\", "\0", "\udcff", "é", "functions", "link_inertia",
-    "name", "[parameters]", "[[parameters]]", "[parameters.x]", '"\\u0000" = 1\n',
-    "true", "false", "nan", "-inf", "0", "-1", "1", "3.5", "1e308", "9" * 400, "0x" + "f" * 4000,
-    "12:30:00", '""', '"3"', '"polar"', '"float"', "[]", "{}", "[1, 1, 1]", "[1, 2, 3.1]",
-    '["energy"]', "[[[]]]", "[{}]",
-]
-# fmt: on
-
-
-def _mutate(text: str, dice: random.Random) -> str:
-    """Replace, insert or swap a few pieces of the text."""
-    for _ in range(dice.randint(1, 2)):
-        start = dice.randrange(len(text) + 1)
-        stop = min(len(text), start + dice.choice([0, 1, 3, 12]))
-        piece = dice.choice([dice.choice(PIECES), text[dice.randrange(len(text) + 1) :][:20]])
-        text = text[:start] + piece + text[stop:]
-    return text
-
-
-def test_damaged_files_never_raise_anything_but_scene_errors(read):
-    dice, survivors, errors = random.Random(2023), [], []
-    parameters = scene_to_dict(scene_for("articulated", 2, 3))["parameters"]
-    lines = [f"{name} = {json.dumps(value)}" for name, value in parameters.items()]
-    text = "\n".join([VALID, 'functions = ["energy"]', "[parameters]", *lines])
-    assert read(text).functions == ("energy",)
-    for _ in range(1200):
-        try:
-            survivors.append(read(_mutate(text, dice).encode(errors="surrogateescape")))
-        except SceneError as error:
-            errors.append(error)
-    assert any(error.problems[0].field != "scene file" for error in errors)
-    assert all(len(str(error).split("\n")) == len(error.problems) > 0 for error in errors)
-    assert all(parse_scene(scene_to_dict(found), "another") == found for found in survivors)
-    assert survivors
 
 
 def test_files_that_are_not_toml_are_refused_with_the_place(read):
