@@ -124,10 +124,9 @@ def test_pieces_of_a_mixed_tail_may_be_parameters(refuse_rows):
     given |= {"arc_masses": 1e-3, "arc_lengths": "5 cm"}
     found = parameters(BARE, "mixed", parameters=given)
     assert found["link_centers"] == (0.01, 0.015) and found["arc_lengths"] == 0.05
-    rows = {"arc_masses": given | {"arc_masses": [1, 2]}}
-    rows |= {"arc_lengths": {name: given[name] for name in given if name != "arc_lengths"}}
-    for name, wrong in rows.items():
-        refuse_rows([(table(BARE, "mixed", parameters=wrong), f"parameters.{name}", "")])
+    two = table(BARE, "mixed", parameters=given | {"arc_masses": [1, 2]})
+    short = table(BARE, "mixed", parameters={n: given[n] for n in given if n != "arc_lengths"})
+    refuse_rows([(two, "parameters.arc_masses", ""), (short, "parameters.arc_lengths", "")])
 
 
 def test_a_continuum_scene(refuse_rows, read):
