@@ -4,7 +4,6 @@ project says of itself; and make, which builds what is asked for, once.
 
 import json
 import re
-import shlex
 import shutil
 import subprocess
 import sys
@@ -14,6 +13,8 @@ import pytest
 
 import serpentail
 import serpentail_codegen
+from mutants import results, sample
+from mutants.recorded import NO_JUDGES
 from tests.house import file_lengths
 from tests.support.makes import away_from_make, stand_in
 from tests.support.rows import row
@@ -72,6 +73,14 @@ def test_package_changelog_and_citation_have_one_version():
     assert {"CITATION.cff", "CHANGELOG.md", notes} <= files
 
 
+def test_mutants_that_are_argued_away_are_those_of_lines_that_are_there():
+    for entry in results.arguments():
+        with row(entry):
+            of_file = sample.of_file(ROOT, entry["file"])
+            assert any(results.argument(mutation, [entry]) for mutation in of_file)
+    assert all((ROOT / name).is_file() for name in NO_JUDGES)
+
+
 # Make.
 
 NAME = "articulated_m1_n1_fc4a05d"  # of these functions
@@ -101,21 +110,6 @@ def make(tree):
         )
 
     return run
-
-
-def test_options_of_make_are_those_of_the_generator(tree, make):
-    options = ("REAL=float", "EMISSION=loops", "BAKED=1", "FUNCTIONS=energy,momentum")
-    told = "--real float --emission loops --baked --functions energy,momentum"
-    for given, wanted in [
-        (("TAIL=continuum", "M=2"), "--tail continuum --segments 2"),
-        (options, f"{told} --tail articulated --segments 1 --links 3"),
-        (("SCENE=my scenes/it's.toml",), "-- my scenes/it's.toml"),
-    ]:
-        with row(*given):
-            done = make("-n", "model", *given)
-            command = done.stdout.split(" && ")[0].replace("$(", " ").replace(")", " ")
-            assert done.returncode == 0 and wanted in " ".join(shlex.split(command))
-    assert not (tree / "generated").exists()
 
 
 @pytest.mark.slow

@@ -110,18 +110,6 @@ def test_wrong_usage_is_status_2_and_help_names_every_verb(capsys):
     assert all(verb in out for room in cli.ROOMS.values() for verb in room)
 
 
-def test_installed_program(tmp_path):
-    beside = Path(sys.executable).parent / "serpentail"
-    for program, place, status in [
-        ([beside], zoo.folder("bare"), 0),
-        ([sys.executable, "-m", "serpentail.cli"], tmp_path, 2),
-    ]:
-        command = [*program, "info", place, "--json", "-"]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        told = besides_progress(done.stderr)
-        assert done.returncode == status and bool(done.stdout) != bool(told)
-
-
 # Scripts.
 
 FOLDERS = ("benchmarks", "embedded", "examples", "mutants", "stress")

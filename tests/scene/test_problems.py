@@ -206,7 +206,7 @@ def unreadable(folder):
 def test_both_packages_refuse_what_is_no_scene_file_in_one_line(tmp_path):
     for what, path in unreadable(tmp_path).items():
         with row(what):
-            with pytest.raises(SceneError, match="^scene file: ") as by_generator:
+            with pytest.raises(SceneError, match=r"^scene file: ") as by_generator:
                 load_scene(path)
             if what == "null":  # a device that ends at once is none either
                 assert "no regular file" in str(by_generator.value)
