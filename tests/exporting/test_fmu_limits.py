@@ -35,9 +35,7 @@ def test_what_no_fmu_can_be_of(tmp_path):
 
 def status_of(call, *arguments):
     """The status that a call is refused with."""
-    from fmpy.fmi1 import FMICallException
-
-    with pytest.raises(FMICallException) as refused:
+    with pytest.raises(Exception, match="status") as refused:
         call(*arguments)
     return refused.value.status
 

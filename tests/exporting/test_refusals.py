@@ -35,12 +35,9 @@ def test_arguments_that_are_wrong(here):
         ((model, "udrf", "x.urdf"), "kind: value 'udrf': .*'urdf'"),
         ((model, None), "kind: value None: .*'urdf' or 'mjcf' or 'bundle' or 'fmu'"),
         ((model, ["urdf"]), r"kind: value \['urdf'\]"),
-        ((None, "urdf"), "model: value None"),
         (("m1_n3", "urdf"), "model: value 'm1_n3'"),
-        ((3, "urdf"), "model: value 3"),
         ((model, "urdf", "x.xml"), r"path: value 'x\.xml': .*\.urdf"),
         ((model, "mjcf", "x.urdf"), r"path: value 'x\.urdf': .*\.xml"),
-        ((model, "urdf", "x"), r"path: value 'x': .*\.urdf"),
         ((model, "urdf", ""), r"path: value '': .*\.urdf"),
         ((model, "urdf", "x.urdf/"), r"path: value 'x\.urdf/': .*\.urdf"),
         ((model, "urdf", 3), "path: value 3: "),
@@ -52,23 +49,20 @@ def test_arguments_that_are_wrong(here):
 
 
 def test_files_that_cannot_be_written(tmp_path, monkeypatch):
-    model = zoo.model("m1_n3")
     (tmp_path / "x.urdf").mkdir()
     with pytest.raises(st.ExportError, match=r"x\.urdf is a folder"):
-        st.export(model, "urdf", tmp_path / "x.urdf")
-    (tmp_path / "x.urdf").rmdir()
-    with pytest.raises(st.NotWritten, match=r"/proc/x\.urdf"):
-        st.export(model, "urdf", "/proc/x.urdf")
+        st.export(zoo.model("m1_n3"), "urdf", tmp_path / "x.urdf")
 
     def full(path, content):
         path.touch()
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    (tmp_path / "x.urdf").write_text("before")
+    (tmp_path / "y.urdf").write_text("before")
     monkeypatch.setattr(Path, "write_bytes", full)
     with pytest.raises(st.NotWritten, match="No space left on device"):
-        st.export(model, "urdf", tmp_path / "x.urdf")
-    assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("x.urdf", "before")]
+        st.export(zoo.model("m1_n3"), "urdf", tmp_path / "y.urdf")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["x.urdf", "y.urdf"]
+    assert (tmp_path / "y.urdf").read_text() == "before"
 
 
 @pytest.mark.filterwarnings("ignore::serpentail.UnusualSize")
@@ -85,7 +79,6 @@ def test_what_no_file_would_say_is_refused(here, monkeypatch):
             with row(kind, name), pytest.raises(st.ExportError, match=words):
                 st.export(zoo.model(name), kind)
     for changes, words in (
-        ({"link_inertia": (1e-9, 1e-16, 1e-9)}, "inertia of link_1_1: value .* 1e-15"),
         ({"link_inertia": (1e-9, 1e-15, 1e-9)}, "inertia of link_1_1: value .* 1e-15"),
         ({"link_inertia": (1e-9, 1e-9, 3e-9)}, "inertia of link_1_1: value"),
         ({"tail_mass": 3e-16}, "mass of link_1_1: value"),
@@ -93,7 +86,6 @@ def test_what_no_file_would_say_is_refused(here, monkeypatch):
     ):
         with row(changes), pytest.raises(st.ExportError, match=words):
             st.export(model.with_parameters(**changes), "mjcf")
-    assert mjcf.MOST_LINKS == 480  # more MuJoCo does not read
     monkeypatch.setattr(mjcf, "MOST_LINKS", 11)
     with pytest.raises(st.ExportError, match=r"11 links.* m3_n4 has 12"):
         st.export(zoo.model("m3_n4"), "mjcf")
