@@ -2,7 +2,6 @@
 project says of itself; and make, which builds what is asked for, once.
 """
 
-import json
 import re
 import shutil
 import subprocess
@@ -81,51 +80,36 @@ def test_mutants_that_are_argued_away_are_those_of_lines_that_are_there():
     assert all((ROOT / name).is_file() for name in NO_JUDGES)
 
 
-# Make.
-
 NAME = "articulated_m1_n1_fc4a05d"  # of these functions
 ORDER = ("TAIL=articulated", "M=1", "N=1", "FUNCTIONS=mass_matrix")
 
 
-@pytest.fixture
-def tree(tmp_path):
-    """A copy of what make builds from, with a stand-in for .venv that is ready."""
+@pytest.mark.slow
+def test_what_is_there_is_not_made_again_and_what_was_lost_is(tmp_path):
+    """In a copy of what make builds from, away from a make that runs these tests."""
     for name in ("Makefile", "pyproject.toml"):
         shutil.copy2(ROOT / name, tmp_path)
     for name in ("codegen", "scenes"):
         shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
     stand_in(tmp_path)
-    return tmp_path
+    own = {name: value for name, value in away_from_make().items() if name != "CC"}
+    own |= {"PYTHONPATH": str(tmp_path / "codegen"), "LC_ALL": "C", "UV": ""}
 
-
-@pytest.fixture
-def make(tree):
-    """Return a function that runs make there, away from a make that runs these tests."""
-
-    def run(*arguments, **more):
-        own = {name: value for name, value in away_from_make().items() if name != "CC"}
-        own |= {"PYTHONPATH": str(tree / "codegen"), "LC_ALL": "C", "UV": "", **more}
+    def make(**more):
+        command = ["make", "model", "TAIL=articulated", "M=1", "N=1", "FUNCTIONS=mass_matrix"]
         return subprocess.run(
-            ["make", *arguments], cwd=tree, env=own, capture_output=True, text=True, check=False
+            command, cwd=tmp_path, env=own | more, capture_output=True, text=True, check=False
         )
 
-    return run
-
-
-@pytest.mark.slow
-def test_what_is_there_is_not_made_again_and_what_was_lost_is(tree, make):
-    failed = make("model", *ORDER, CC="no-such-cc", SERPENTAIL_CACHE=str(tree / "cache"))
+    failed = make(CC="no-such-cc", SERPENTAIL_CACHE=str(tmp_path / "cache"))
     assert failed.returncode == 2 and "CC='no-such-cc'" in failed.stderr
-    first = make("model", *ORDER)
-    assert first.returncode == 0 and f"{NAME}: 1 x 1 links" in first.stdout
-    folder = tree / "generated" / NAME
-    manifest = json.loads((folder / "manifest.json").read_text())
-    assert manifest["prefix"] == NAME and manifest["real"] == "double"
+    first, name = make(), "articulated_m1_n1_fc4a05d"  # of these functions
+    assert first.returncode == 0 and f"{name}: 1 x 1 links" in first.stdout
+    folder = tmp_path / "generated" / name
     before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
-    again = make("model", *ORDER)
-    assert re.fullmatch(rf"generated/{NAME}: up to date, \d+\.\d\d s\n", again.stdout)
+    assert re.fullmatch(rf"generated/{name}: up to date, \d+\.\d\d s\n", make().stdout)
     assert {path: path.stat().st_mtime_ns for path in folder.rglob("*")} == before
     readme = (folder / "README.md").read_bytes()
     (folder / "README.md").unlink()
-    assert "1 files written" in make("model", *ORDER).stdout
+    assert "1 files written" in make().stdout
     assert (folder / "README.md").read_bytes() == readme
