@@ -14,7 +14,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
-from contextlib import ExitStack, chdir, redirect_stdout
+from contextlib import chdir, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 from unittest import mock
@@ -69,17 +69,8 @@ def blocks(page: Path) -> list[Block]:
     return found
 
 
-@dataclass(frozen=True)
-class Ran:
-    """What a page left: the names of its Python blocks, what they printed, and the folder."""
-
-    names: dict
-    printed: str
-    folder: Path
-
-
-def run_page(page: Path, folder: Path) -> Ran:
-    """Run the blocks of a page in a folder like a checkout; raise what fails."""
+def run_page(page: Path, folder: Path) -> str:
+    """Run the blocks of a page in a folder like a checkout; return what they print."""
     for name in LINKED:
         (folder / name).symlink_to(ROOT / name)
     shutil.copytree(ROOT / "examples", folder / "examples")  # scripts write beside themselves
@@ -89,16 +80,13 @@ def run_page(page: Path, folder: Path) -> Ran:
     own = away_from_make()
     own["PATH"] = f"{folder}/.venv/bin:{Path(sys.executable).parent}:{os.environ['PATH']}"
     todo = [block for block in blocks(page) if not block.reason]
-    with ExitStack() as stack:
-        stack.enter_context(mock.patch.dict(os.environ, own, clear=True))
-        stack.enter_context(chdir(folder))
-        stack.enter_context(redirect_stdout(printed))
+    with mock.patch.dict(os.environ, own, clear=True), chdir(folder), redirect_stdout(printed):
         for block in todo:
             _do(block, names)
         for block in todo:
             if block.language == "c":
                 _compile(block)
-    return Ran(names, printed.getvalue(), folder)
+    return printed.getvalue()
 
 
 def _do(block: Block, names: dict) -> None:

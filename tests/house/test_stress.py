@@ -114,3 +114,23 @@ def test_simulations_that_cannot_be_are_refused():
     ]:
         with row(change), pytest.raises(st.SimulationError, match=words):
             st.simulate(zoo.model("feet_tail"), q, np.zeros(8), **settings | change)
+
+
+def test_arguments_that_the_fuzz_once_broke_are_refused():
+    model = zoo.model("feet_tail")
+    for call, words in [
+        (lambda: st.Legs.ramp(3.6, (-0.3, -1.0), 0.4, 1e-320), "inf s"),
+        (lambda: st.Pfl(model, ([0.0], np.zeros((1, 2)))), "Pfl: one node"),
+        (lambda: model.external_force(moment=(0, np.nan, 0)), r"moment\[1\]: value nan"),
+        (lambda: st.polar_to_bend(np.zeros(2), np.zeros(3)), "shapes differ"),
+        (lambda: st.polar_to_bend(np.inf, 1.0), "phi: value inf"),
+        (lambda: st.bend_to_polar(5e-324, 0.0, 1.0, 1.0), "too large"),
+        (lambda: st.rotation_matrix(np.zeros(4)), "a quaternion is zero"),
+        (lambda: st.rotation_matrix(np.zeros(3)), "quaternion has shape"),
+        (lambda: st.pitch_roll_yaw(3.0), "q has shape"),
+    ]:
+        with row(words), pytest.raises(st.SerpentailError, match=words):
+            call()
+    for size in (1e-300, 1e-160, 1e160, 1e300):  # quaternions of any norm are rotations
+        q = np.array([0.5, 0.5, -0.5, 0.5])
+        np.testing.assert_allclose(st.rotation_matrix(q * size), st.rotation_matrix(q), atol=1e-15)

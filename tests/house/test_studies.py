@@ -14,7 +14,7 @@ import pytest
 from filelock import FileLock
 
 import serpentail as st
-from examples.studies.parts import Part, as_flight, as_lists, digest, made
+from examples.studies.parts import Part, as_flight, as_lists, made
 from tests.support import tiny_study, zoo
 
 ROOT = Path(__file__).parents[2]
@@ -88,11 +88,3 @@ def test_ctrl_c_ends_all_in_one_line_and_the_same_command_goes_on(tmp_path, whol
     results = [(f"part {k}", {"number": k, "square": k**2, "third": k / 3}) for k in parts]
     assert printed == f"{results}\n"
     assert all(ended(tmp_path)[k] == counts[k] for k in kept) and {*ended(tmp_path)} == {*parts}
-
-
-def test_digests_follow_the_sources(tmp_path):
-    found = []
-    for name, text in [("a.py", "1"), ("notes.md", "words"), ("a.py", "2"), ("native.c", "int x;")]:
-        (tmp_path / name).write_text(text)
-        found.append(digest(tmp_path))
-    assert found[0] == found[1] and len(set(found)) == 3

@@ -58,12 +58,6 @@ def test_simulate_tells_units_and_warnings_and_draws(simulate):
     assert any("segment 1 is bent by 4 rad" in each for each in told["warnings"])
 
 
-def test_wrong_sets_are_status_2(simulate):
-    for given in ("mu=-1", "mu", "duration=0"):
-        status, out, err = simulate("--set", given, "--json", "-")
-        assert (status, out) == (2, "") and given.split("=")[0] in err
-
-
 def test_a_flight_is_generated_where_there_is_no_folder(tmp_path, monkeypatch, capsys):
     """The smallest model: one link and what a simulation needs."""
     monkeypatch.chdir(tmp_path)
