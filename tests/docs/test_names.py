@@ -4,10 +4,8 @@
 """
 
 import ast
-import io
 import re
 import shlex
-import tokenize
 from pathlib import Path
 
 import serpentail as st
@@ -124,17 +122,13 @@ def text_of(file: str, name: str | None) -> str:
 
 
 def prose(source: str, name: str) -> str:
-    """Docstrings and comments of a function, a class or a method `Class.method`."""
-    node, kinds = ast.parse(source), (ast.FunctionDef, ast.ClassDef)
+    """The text of a function, a class or a method `Class.method`, comments as its prose."""
+    node = ast.parse(source)
     for part in name.split("."):
-        inside = [entry for entry in node.body if isinstance(entry, kinds) and entry.name == part]
+        inside = [entry for entry in node.body if getattr(entry, "name", None) == part]
         assert inside, f"{name} is not there"
         node = inside[0]
-    texts = [ast.get_docstring(each) or "" for each in ast.walk(node) if isinstance(each, kinds)]
-    for token in tokenize.generate_tokens(io.StringIO(source).readline):
-        if token.type == tokenize.COMMENT and node.lineno <= token.start[0] <= node.end_lineno:
-            texts.append(token.string.lstrip("# "))
-    return " ".join(texts)
+    return (ast.get_source_segment(source, node) or "").replace("#", " ")
 
 
 def named(text: str) -> set[str]:

@@ -59,27 +59,22 @@ def pinocchio_state(model, read, q, turned):
     return state, turn
 
 
-def check_pinocchio(model, folder):
-    read = pinocchio_model(model, folder)
-    links = [(i + 1, j + 1) for i, count in enumerate(model.joints_each) for j in range(count)]
-    data, names = read.createData(), [f"link_{i}_{j}" for i, j in links]
-    assert (read.nq, read.nv) == (model.nq, model.nv)
-    for q, turned in configurations(model):
-        state, turn = pinocchio_state(model, read, q, turned)
-        upper = np.triu(pin.crba(read, read.createData(), state, pin.Convention.LOCAL))
-        H = turn.T @ (upper + np.triu(upper, 1).T) @ turn
-        expected = model.mass_matrix(q)
-        scale = np.sqrt(np.diag(expected))  # of each coordinate: the tail's moments are small
-        assert (np.abs(H - expected) <= 1e-14 * np.outer(scale, scale)).all()
-        pin.framesForwardKinematics(read, data, state)
-        places = [data.oMf[read.getFrameId(name)].translation for name in [*names, "tip"]]
-        assert np.abs(places - model.tail_points(q)).max() < 1e-12
-
-
 def test_pinocchio_finds_inertia_and_points_of_the_model(tmp_path):
     for name, model in tails():
-        with row(name):
-            check_pinocchio(model, tmp_path)
+        read = pinocchio_model(model, tmp_path)
+        links = [(i + 1, j + 1) for i, count in enumerate(model.joints_each) for j in range(count)]
+        data, names = read.createData(), [f"link_{i}_{j}" for i, j in links]
+        assert (read.nq, read.nv) == (model.nq, model.nv), name
+        for q, turned in configurations(model):
+            state, turn = pinocchio_state(model, read, q, turned)
+            upper = np.triu(pin.crba(read, read.createData(), state, pin.Convention.LOCAL))
+            H = turn.T @ (upper + np.triu(upper, 1).T) @ turn
+            expected = model.mass_matrix(q)
+            scale = np.sqrt(np.diag(expected))  # of each coordinate: the tail's moments are small
+            assert (np.abs(H - expected) <= 1e-14 * np.outer(scale, scale)).all(), name
+            pin.framesForwardKinematics(read, data, state)
+            places = [data.oMf[read.getFrameId(each)].translation for each in [*names, "tip"]]
+            assert np.abs(places - model.tail_points(q)).max() < 1e-12, name
 
 
 def mujoco_model(model, folder):

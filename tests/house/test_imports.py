@@ -31,9 +31,6 @@ settings = {"controller": st.Damping(), "t_span": 0.01}
 flight = st.simulate(model, [0, 0, 0, 1, 0, 0, 0, 0, 0], [0] * 8, **settings)
 assert len(flight.t) == 201
 """
-PICTURES_LATER = (
-    "import serpentail.cli, serpentail.scenes.simulate, serpentail.planning.result.plan"
-)
 # of the generator, what works without SymPy
 BARE = ("ir.tape", "ir.interpret", "autodiff.reverse", "passes.schedule", "scene.parse")
 BARE += ("targets.write", "targets.templating", "targets.expressions", "targets.c.routine")
@@ -51,7 +48,8 @@ def test_heavy_packages_are_loaded_by_those_who_use_them():
     assert loaded("import serpentail") == set()
     assert loaded(generator) == {"serpentail_codegen"}
     assert loaded(FLIGHT, zoo.folder("m1_n1")) == {"numpy"}
-    assert "serpentail.viewer" not in loaded(PICTURES_LATER)
+    later = "import serpentail.cli, serpentail.scenes.simulate, serpentail.planning.result.plan"
+    assert "serpentail.viewer" not in loaded(later)
     # instead of its time, which hangs on the machine: typing, contextlib and importlib
     few = (
         "import sys; old = {*sys.modules}; import serpentail; assert len({*sys.modules} - old) < 20"

@@ -9,7 +9,7 @@ import pytest
 from serpentail_codegen.__main__ import main, parser, scene_of
 from serpentail_codegen.functions.catalogue import CATALOGUE
 from serpentail_codegen.scene.parameters import PARAMETERS
-from serpentail_codegen.scene.parse import load_scene, parse_scene, scene_for, scene_to_dict
+from serpentail_codegen.scene.parse import parse_scene, scene_for, scene_to_dict
 from serpentail_codegen.scene.problems import SceneError
 from serpentail_codegen.scene.resolve import resolve_parameters
 from serpentail_codegen.scene.scene import Scene
@@ -17,7 +17,7 @@ from serpentail_codegen.scene.signatures import table as functions
 from serpentail_codegen.scene.signatures.signature import ALWAYS, CALLED, GROUND, NAMED
 from serpentail_codegen.scene.signatures.table import ALL, DEFAULT, FIXED, SIGNATURES
 from tests.support.rows import row
-from tests.support.scenes import SCENES, VALID
+from tests.support.scenes import VALID
 
 STANCE = VALID + 'contacts = ["torso", "feet"]\n'
 SIZE = ["--tail", "articulated", "--segments", "1", "--links", "3"]
@@ -77,14 +77,6 @@ def test_scenes_are_read_again_as_they_are():
         with row(keys):
             assert parse_scene(table, "other") == scene == pickle.loads(pickle.dumps(scene))
             assert scene_to_dict(parse_scene(table, "other")) == table
-
-
-def test_tables_of_motions_are_left_to_the_runtime():
-    alone = {"kind": "articulated", "segments": 1, "links": 3}
-    motions = {name: {"anything": 1} for name in ("plan", "simulate", "identify", "sweep")}
-    motions |= {"phase": [{"anything": 1}]}
-    assert parse_scene(alone | motions, "rat") == parse_scene(alone, "rat")
-    assert load_scene(SCENES / "righting_m1_n3.toml").links == 3
 
 
 # Functions.
@@ -162,19 +154,15 @@ def test_what_an_option_changes_is_part_of_the_name():
     assert len(names) == 1 and names != {named(*SIZE, "--functions", "energy")}
 
 
-def test_a_scenes_own_choice_is_no_part_of_its_name(tmp_path):
-    path = tmp_path / "rat.toml"
+def test_a_scenes_own_choice_is_no_part_of_its_name_and_one_that_is_given_is_checked(
+    tmp_path, capsys
+):
+    path = tmp_path / f"{'a' * 60}.toml"
     path.write_text(VALID + 'real = "float"\nbaked = true\nfunctions = ["energy"]\n')
     own = ["--real", "float", "--baked", "--functions", "energy"]
-    assert named(str(path), *own) == named(str(path)) == "rat"
-    assert named(str(path), "--real", "double") == "rat_double"
-
-
-def test_a_name_that_is_given_stays_and_is_checked(tmp_path, capsys):
+    assert named(str(path), *own) == named(str(path)) == path.stem
     assert named(*SIZE, "--real", "float", "--name", "own") == "own"
-    path = tmp_path / ("a" * 60 + ".toml")
-    path.write_text(VALID)
-    rows = {"../own": [*SIZE, "--name", "../own"], f"{path.stem}_float": [path, "--real", "float"]}
-    for name, arguments in rows.items():
-        assert main([*map(str, arguments)]) == 2
+    wrong = {"../own": [*SIZE, "--name", "../own"]}
+    for name, words in (wrong | {f"{path.stem}_double": [str(path), "--real", "double"]}).items():
+        assert main(words) == 2
         assert capsys.readouterr().err.startswith(f"name: value '{name}': ")
