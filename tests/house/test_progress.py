@@ -84,8 +84,7 @@ def test_a_pipe_has_few_lines_and_a_terminal_one_that_ends_empty(clock):
     assert "\n" not in text and "short" not in text and text.count("derive long") == 60
     assert text.rsplit("\r", 2)[1].isspace() and text.endswith("\r")
 
-
-def test_a_part_of_another_stage_is_told_to_functions_alone(clock):
+    # a part of another stage is told to functions alone
     stream, told = io.StringIO(), []
     for hook in (Told(stream), told.append):
         with st.progress(hook), Stage("plan", "all") as outer:
