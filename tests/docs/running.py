@@ -97,8 +97,11 @@ def _do(block: Block, names: dict) -> None:
     elif block.language == "sh":  # whose FOLDER is what Python calls ``folder``
         own = {"FOLDER": names["folder"]} if "folder" in names else {}
         _command(block, ["bash", "-euc", block.text], os.environ | own)
-    elif block.language == "toml":
-        _scene(block)
+    elif block.language == "toml":  # parsed as the generator does, and all of it by the schema
+        tables = tomllib.loads(block.text)
+        parse_scene({k: v for k, v in tables.items() if k not in OF_RUNTIME}, "example")
+        faults = [error.message for error in Draft7Validator(scene_schema()).iter_errors(tables)]
+        assert faults == [], f"{block}: {faults}"
 
 
 def _command(block: Block, command: list[str], own: dict | None = None) -> None:
@@ -108,19 +111,9 @@ def _command(block: Block, command: list[str], own: dict | None = None) -> None:
     print(done.stdout, end="")
 
 
-def _scene(block: Block) -> None:
-    """Parse a scene as the generator does, and compare all of it with the schema of editors."""
-    tables = tomllib.loads(block.text)
-    parse_scene({k: v for k, v in tables.items() if k not in OF_RUNTIME}, "example")
-    faults = [error.message for error in Draft7Validator(scene_schema()).iter_errors(tables)]
-    assert faults == [], f"{block}: {faults}"
-
-
 def _compile(block: Block) -> None:
     """Compile a C file without warnings against the models that are there, and run it."""
-    flags = [
-        f"-I{manifest.parent}/include" for manifest in Path().glob("generated/*/manifest.json")
-    ]
+    flags = [f"-I{folder}/include" for folder in Path().glob("generated/*")]
     sources = [path for path in Path().glob("generated/*/src/*.c") if path.stem == path.parts[1]]
     own = ["-lm", "-o", "checked"]
     _command(block, ["cc", *STRICT, *flags, block.name, *map(str, sources), *own])

@@ -88,19 +88,13 @@ def test_names_exist_and_theory_has_every_parameter():
     assert {(p.name, p.unit) for p in PARAMETERS} <= set(rows)
 
 
-def test_links_resolve_no_machine_is_named_and_pictures_are_used():
+def test_links_resolve_and_no_machine_is_named():
     for document, text in TEXTS.items():
         with row(document.name):
             for target in re.findall(r"\]\(([^)\s]+)\)", text):
                 place = target.split("#")[0]
                 assert target.startswith("https://") or (document.parent / place).exists(), target
-            notes = re.findall(r"\[\^(\w+)\](:?)", text)
-            assert {n for n, colon in notes if colon} == {n for n, colon in notes if not colon}
             assert re.findall(r"(?<![\w.~])/(?:home|root|tmp|work|Users)/", text) == []
-    for picture in (ROOT / "docs" / "images").iterdir():
-        with row(picture.name):
-            assert picture.stat().st_size < 200_000
-            assert any(f"images/{picture.name}" in text for text in TEXTS.values())
 
 
 # The table of equations: a row for each; its functions exist and name it.

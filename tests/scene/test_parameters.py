@@ -211,6 +211,16 @@ def test_a_scale_keeps_shape_and_froude_number():
     assert b["torso_mass"] == pytest.approx(1.6**3 * a["torso_mass"])
     scene = parsed({"scale": 4.0})
     assert scene.size == (64.0, 4.0, 2.0) and scene.unscaled == a
+    # what a scene names is scaled, too
+    named = {"parameters": {"torso_mass": 0.2, "link_inertia": [1e-7, 1e-8, 1e-7]}}
+    found = parsed({"scale": 2.0}, **named).parameters
+    assert found["torso_mass"] == pytest.approx(1.6) and found["link_inertia"][0] == 32e-7
+    a, b = (parsed(body, **TAPER).parameters for body in (None, {"scale": 2.0}))
+    np.testing.assert_allclose(b["link_masses"], 8 * np.array(a["link_masses"]), rtol=1e-14)
+    stiff = {"tail_stiffness": 0.02, "tail_damping": 1e-4}
+    b = parsed({"scale": 2.0}, parameters=stiff).parameters
+    np.testing.assert_allclose(b["tail_stiffness"], 16 * 0.02)
+    np.testing.assert_allclose(b["tail_damping"], 2**4.5 * 1e-4)
 
 
 def test_a_mass_scales_by_published_exponents():
@@ -223,18 +233,6 @@ def test_a_mass_scales_by_published_exponents():
     assert b["torso_inertia"][0] / a["torso_inertia"][0] == pytest.approx(ratio ** (5 / 3))
     c = parsed({"mass": 2.5}, **TAPER).parameters
     assert c["torso_mass"] + sum(c["link_masses"]) == pytest.approx(2.5)
-
-
-def test_what_a_scene_names_is_scaled_too():
-    named = {"parameters": {"torso_mass": 0.2, "link_inertia": [1e-7, 1e-8, 1e-7]}}
-    found = parsed({"scale": 2.0}, **named).parameters
-    assert found["torso_mass"] == pytest.approx(1.6) and found["link_inertia"][0] == 32e-7
-    a, b = (parsed(body, **TAPER).parameters for body in (None, {"scale": 2.0}))
-    np.testing.assert_allclose(b["link_masses"], 8 * np.array(a["link_masses"]), rtol=1e-14)
-    stiff = {"tail_stiffness": 0.02, "tail_damping": 1e-4}
-    b = parsed({"scale": 2.0}, parameters=stiff).parameters
-    np.testing.assert_allclose(b["tail_stiffness"], 16 * 0.02)
-    np.testing.assert_allclose(b["tail_damping"], 2**4.5 * 1e-4)
 
 
 def test_a_torso_of_one_density_has_the_moments_of_its_points():

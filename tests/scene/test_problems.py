@@ -178,8 +178,7 @@ def test_files_that_are_not_toml_are_refused_with_the_place(read):
     assert read(b"\xef\xbb\xbf" + VALID.replace("\n", "\r\n").encode()) == read(VALID)
 
 
-def unreadable(folder):
-    """Make files from which no scene can be read; their paths by description."""
+def test_both_packages_refuse_what_is_no_scene_file_in_one_line(tmp_path):
     texts = {
         "empty name": b"kind = ",
         "latin": b"kind = '\xff'",
@@ -192,19 +191,15 @@ def unreadable(folder):
         "digits": b"a = " + b"9" * 100_000,
         "nul": b"a = 1\0",
     }
-    paths = {name: folder / f"{name.replace(' ', '_')}.toml" for name in texts}
-    for name, path in paths.items():
-        path.write_bytes(texts[name])
-    os.mkfifo(folder / "pipe.toml")
-    (folder / "folder.toml").mkdir()
-    (folder / "loop.toml").symlink_to(folder / "loop.toml")
-    more = {name: folder / f"{name}.toml" for name in ("pipe", "folder", "loop", "absent")}
-    more |= {"endless": Path("/dev/zero"), "null": Path("/dev/null")}
-    return paths | more | {"nul in path": folder / "a\0.toml", "long": folder / ("a" * 5000)}
-
-
-def test_both_packages_refuse_what_is_no_scene_file_in_one_line(tmp_path):
-    for what, path in unreadable(tmp_path).items():
+    for name, text in texts.items():
+        (tmp_path / f"{name}.toml").write_bytes(text)
+    os.mkfifo(tmp_path / "pipe.toml")
+    (tmp_path / "folder.toml").mkdir()
+    (tmp_path / "loop.toml").symlink_to(tmp_path / "loop.toml")
+    names = (*texts, "pipe", "folder", "loop", "absent", "a\0", "a" * 5000)
+    paths = {name: tmp_path / f"{name}.toml" for name in names}
+    paths |= {"endless": Path("/dev/zero"), "null": Path("/dev/null")}
+    for what, path in paths.items():
         with row(what):
             with pytest.raises(SceneError, match=r"^scene file: ") as by_generator:
                 load_scene(path)
