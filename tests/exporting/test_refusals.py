@@ -168,12 +168,12 @@ def test_equal_models_have_equal_bundles_and_others_none(tmp_path):
 # FMUs
 
 DISCARD, ERROR = 2, 3
-FLYING = ["forward_dynamics", "forward_dynamics_derivatives", "rollout"]
 
 
 def test_what_no_fmu_can_be_of(tmp_path):
     # no model of the zoo lacks C
-    casadi = st.load(model_folder(1, 1, functions=FLYING, targets=["casadi"]), compiled=False)
+    functions = ["forward_dynamics", "forward_dynamics_derivatives", "rollout"]
+    casadi = st.load(model_folder(1, 1, functions=functions, targets=["casadi"]), compiled=False)
     for model, error, words in (
         (zoo.model("fixed"), st.ExportError, "base: value 'fixed' of fixed"),
         (zoo.model("polar"), st.ExportError, "coordinates: value 'polar' of polar.*bend"),

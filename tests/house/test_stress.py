@@ -25,16 +25,16 @@ from stress.subjects import Subject, changed, exact_of, state
 from tests.references.metrics import mass_matrix_error
 from tests.support import tiny_study, zoo
 from tests.support.rows import row
+from tests.support.scenes import SCENES
 
 ROOT = Path(__file__).parents[2]
-SCENES = sorted((ROOT / "scenes").glob("*.toml"))
 
 
 @pytest.mark.parametrize("count", [100, pytest.param(1000, marks=pytest.mark.slow)])
 def test_mutated_scene_files_are_read_or_refused(count, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     dice, model = random.Random(count), zoo.model("ground")
-    assert scene_fuzz.faults(SCENES, count, dice, tmp_path, model) == []
+    assert scene_fuzz.faults(sorted(SCENES.glob("*.toml")), count, dice, tmp_path, model) == []
 
 
 @pytest.mark.parametrize("one_arc", [False, pytest.param(True, marks=pytest.mark.slow)])

@@ -23,16 +23,14 @@ STANCE = VALID + 'contacts = ["torso", "feet"]\n'
 SIZE = ["--tail", "articulated", "--segments", "1", "--links", "3"]
 
 
-def test_defaults_of_the_other_keys(read):
+def test_defaults_of_the_other_keys_and_scenes_of_options(read):
     scene = read(VALID)
     assert scene == Scene("rat", "articulated", 2, 3, DEFAULT, resolve_parameters({}, 6))
     keys = (scene.coordinates, scene.baked, scene.real, scene.emission, scene.profile)
     assert keys == ("joint", False, "double", "auto", "fast")
     assert read('name = "kick_2"\n' + VALID).name == "kick_2"
     assert read(VALID).targets == read('targets = ["casadi", "c"]\n' + VALID).targets
-
-
-def test_scenes_of_options_are_frozen_and_hashable():
+    # those of options are frozen and hashable
     keys = {"baked": True, "functions": ["energy"], "parameters": {"gravity": 0}}
     scene = scene_for("articulated", 3, 4, **keys)
     assert (scene.name, scene.segments, scene.links) == ("articulated_m3_n4", 3, 4)

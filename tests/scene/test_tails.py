@@ -32,7 +32,7 @@ def quadrature(a, b, length, density, count=20000):
     return m.sum(), center, (across, along, across)
 
 
-def test_links_of_a_cone_are_its_slices():
+def test_links_and_arcs_of_a_cone_are_its_slices():
     """Of a taper, and of a segment with radii: its density, or its mass, is that of the cone."""
     found = parameters([{"links": 2}, {"links": 3}], taper=CONE)
     own = {"links": 2, "length": "8 cm", "radii": [0.004, 0.0028]}
@@ -49,6 +49,10 @@ def test_links_of_a_cone_are_its_slices():
             given = numbers["link_masses"][k], numbers["link_centers"][k]
             assert given == pytest.approx(expected[:2], rel=1e-7)
             assert moments == pytest.approx(expected[2], rel=1e-7)
+    arcs = parameters(2, "continuum", taper=CONE)
+    masses = [quadrature(*ends, 0.1, 1200)[0] for ends in ((0.004, 0.0025), (0.0025, 0.001))]
+    assert arcs["arc_masses"] == pytest.approx(masses, rel=1e-7)
+    assert arcs["arc_lengths"] == (0.1, 0.1)
 
 
 def test_a_taper_may_have_a_mass_and_segments_their_lengths():
@@ -61,13 +65,6 @@ def test_a_taper_may_have_a_mass_and_segments_their_lengths():
     square = [a * a + a * b + b * b for a, b in (ends, (0.004, 0.001))]
     share = square[0] * 0.03 / (square[1] * 0.18)
     assert found["link_masses"][2] == pytest.approx(0.003 * share)
-
-
-def test_arcs_of_a_taper():
-    found = parameters(2, "continuum", taper=CONE)
-    masses = [quadrature(*ends, 0.1, 1200)[0] for ends in ((0.004, 0.0025), (0.0025, 0.001))]
-    assert found["arc_masses"] == pytest.approx(masses, rel=1e-7)
-    assert found["arc_lengths"] == (0.1, 0.1)
 
 
 def test_links_of_their_own_are_as_given_or_ellipsoids():

@@ -88,11 +88,8 @@ def test_a_plan_has_the_size_of_its_body():
     assert tuple(found["goal"].torso_rate) == (0.5, 0.0, 0.0)
 
 
-@cache
 def of_scene(name):
-    """The generated folder of a scene of the repository: three segments, all groups; no other
-    test needs it, and it takes long.
-    """
+    """The generated folder of a scene that no other test needs, and that takes long."""
     return folder_of(load_scene(SCENES / f"{name}.toml"))
 
 
@@ -108,14 +105,14 @@ def test_a_jumping_rat_stands_again_by_its_tail():
 
 
 @pytest.mark.slow
-def test_a_rat_on_its_back_stands_up_by_its_tail(tmp_path):
+def test_a_rat_on_its_back_stands_up_by_its_tail():
     for name in ("self_recovery", "self_recovery_continuum"):
-        scene, _, summary = simulated(SCENES / f"{name}.toml", of_scene(name))
+        path, folder = SCENES / f"{name}.toml", of_scene(name)
+        scene, _, summary = simulated(path, folder)
         assert scene.q0[2] == pytest.approx(0.0167, abs=2e-4), name
         assert st.rotation_matrix(scene.q0[3:7])[2, 2] < -0.99, name
         assert summary["standing_end"] is True, name
         assert summary["upright_end"] == pytest.approx(0.976, abs=2e-3), name
-    path, folder = SCENES / f"{name}.toml", of_scene(name)
     assert simulated(path, folder, {"controller": PASSIVE})[2]["upright_end"] < 0
 
 
