@@ -22,7 +22,6 @@ def named(**vectors):
 
 
 def names(model):
-    """Names of the states."""
     bristles = range(2 * sum((model.contacts or {}).values()))
     return list(named(q=range(model.nq), v=range(model.nv), bristle=bristles))
 
@@ -41,7 +40,6 @@ def put(unit, references, values):
 
 
 def simulated(path, interface, start, span, step, **more):
-    """Rows that FMPy finds."""
     more |= {"fmi_type": interface, "start_values": start}
     return fmpy.simulate_fmu(str(path), stop_time=span, output_interval=step, **more)
 

@@ -238,7 +238,6 @@ def test_a_step_that_cannot_be_made_leaves_the_state(fmu, opened):
 
 
 def shown(library):
-    """The functions that a library shows."""
     command = ["nm", "-D", "--defined-only", str(library)]
     listed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     return set(re.findall(r" T (\w+)", listed))

@@ -19,8 +19,6 @@ MOST_LINES, MOST_CHARACTERS = 6, 600  # a terminal of 100 columns wraps what is 
 
 
 class Terminal(io.StringIO):
-    """A stream that says it is a terminal."""
-
     def isatty(self):
         return True
 
@@ -34,7 +32,6 @@ def clock(monkeypatch):
 
 
 def enough(now):
-    """End the work."""
     raise ZeroDivisionError(now.stage)
 
 

@@ -173,3 +173,9 @@ def test_a_pose_is_yaw_pitch_roll_and_legs_are_drawn_there(scenario):
     joints = leg_joints(found.model, motion, found.legs.curve.at(motion.t)[0])
     feet = motion.contact.of("feet").points.reshape(-1, 2, 3, 3)
     np.testing.assert_allclose(joints[:, :, 3:], feet, atol=1e-15)
+
+    # only where the model has their joints
+    for drawn in (True, False):
+        (key,) = motion.filmstrip(frames=2)[0].legends
+        assert ("leg" in [text.get_text() for text in key.get_texts()]) is drawn
+        found.model.kernels.pop("leg_points", None)
