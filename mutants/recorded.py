@@ -14,12 +14,11 @@ from . import tree
 from .mutation import Mutation
 from .processes import run
 
-# They compare texts, or check documents, mutants and make: a change of a text is no fault.
+# They compare texts, or check documents and make: a change of a text is no fault.
 NO_JUDGES = {
     "tests/docs/test_names.py",
     "tests/house/test_architecture.py",
     "tests/house/test_golden.py",
-    "tests/house/test_mutants.py",
 }
 LONGEST = 1200.0  # s that one file of tests may take
 

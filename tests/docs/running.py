@@ -14,7 +14,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
-from contextlib import ExitStack, chdir, redirect_stdout
+from contextlib import chdir, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 from unittest import mock
@@ -69,17 +69,8 @@ def blocks(page: Path) -> list[Block]:
     return found
 
 
-@dataclass(frozen=True)
-class Ran:
-    """What a page left: the names of its Python blocks, what they printed, and the folder."""
-
-    names: dict
-    printed: str
-    folder: Path
-
-
-def run_page(page: Path, folder: Path) -> Ran:
-    """Run the blocks of a page in a folder like a checkout; raise what fails."""
+def run_page(page: Path, folder: Path) -> str:
+    """Run the blocks of a page in a folder like a checkout; return what they print."""
     for name in LINKED:
         (folder / name).symlink_to(ROOT / name)
     shutil.copytree(ROOT / "examples", folder / "examples")  # scripts write beside themselves
@@ -89,16 +80,13 @@ def run_page(page: Path, folder: Path) -> Ran:
     own = away_from_make()
     own["PATH"] = f"{folder}/.venv/bin:{Path(sys.executable).parent}:{os.environ['PATH']}"
     todo = [block for block in blocks(page) if not block.reason]
-    with ExitStack() as stack:
-        stack.enter_context(mock.patch.dict(os.environ, own, clear=True))
-        stack.enter_context(chdir(folder))
-        stack.enter_context(redirect_stdout(printed))
+    with mock.patch.dict(os.environ, own, clear=True), chdir(folder), redirect_stdout(printed):
         for block in todo:
             _do(block, names)
         for block in todo:
             if block.language == "c":
                 _compile(block)
-    return Ran(names, printed.getvalue(), folder)
+    return printed.getvalue()
 
 
 def _do(block: Block, names: dict) -> None:
@@ -109,8 +97,11 @@ def _do(block: Block, names: dict) -> None:
     elif block.language == "sh":  # whose FOLDER is what Python calls ``folder``
         own = {"FOLDER": names["folder"]} if "folder" in names else {}
         _command(block, ["bash", "-euc", block.text], os.environ | own)
-    elif block.language == "toml":
-        _scene(block)
+    elif block.language == "toml":  # parsed as the generator does, and all of it by the schema
+        tables = tomllib.loads(block.text)
+        parse_scene({k: v for k, v in tables.items() if k not in OF_RUNTIME}, "example")
+        faults = [error.message for error in Draft7Validator(scene_schema()).iter_errors(tables)]
+        assert faults == [], f"{block}: {faults}"
 
 
 def _command(block: Block, command: list[str], own: dict | None = None) -> None:
@@ -120,19 +111,9 @@ def _command(block: Block, command: list[str], own: dict | None = None) -> None:
     print(done.stdout, end="")
 
 
-def _scene(block: Block) -> None:
-    """Parse a scene as the generator does, and compare all of it with the schema of editors."""
-    tables = tomllib.loads(block.text)
-    parse_scene({k: v for k, v in tables.items() if k not in OF_RUNTIME}, "example")
-    faults = [error.message for error in Draft7Validator(scene_schema()).iter_errors(tables)]
-    assert faults == [], f"{block}: {faults}"
-
-
 def _compile(block: Block) -> None:
     """Compile a C file without warnings against the models that are there, and run it."""
-    flags = [
-        f"-I{manifest.parent}/include" for manifest in Path().glob("generated/*/manifest.json")
-    ]
+    flags = [f"-I{folder}/include" for folder in Path().glob("generated/*")]
     sources = [path for path in Path().glob("generated/*/src/*.c") if path.stem == path.parts[1]]
     own = ["-lm", "-o", "checked"]
     _command(block, ["cc", *STRICT, *flags, block.name, *map(str, sources), *own])

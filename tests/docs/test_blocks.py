@@ -1,30 +1,23 @@
-"""Every block of every document runs as pasted, or says why it does not; the table of functions
-that a scene needs is what the runtime asks for.
+"""Every block of every document runs as pasted, or says why it does not; the site is whole, without
+a warning, and complete in itself.
 """
 
 import ast
 import doctest
 import inspect
 import re
+import shutil
 import subprocess
+import sys
 import tomllib
-from contextlib import chdir
-from pathlib import Path
+from html import unescape
+from urllib.parse import unquote
 
 import numpy as np
 import pytest
-from scipy.integrate import simpson
 
 import serpentail as st
-from serpentail.differentiable.rules import RULES
-from serpentail.exporting.fmu import FLYING, TOUCHING
-from serpentail.identification import identify
-from serpentail.planning import best
-from serpentail.planning.condensed import node
-from serpentail.planning.predictive import settings
-from serpentail_codegen.scene.signatures.table import ALL, EXACT_DERIVATIVES
-from tests.docs.running import PAGES, blocks, run_page
-from tests.support import zoo
+from tests.docs.running import PAGES, ROOT, blocks, run_page
 from tests.support.rows import row
 
 RUN = ("python", "sh", "toml", "c", "cpp", "cmake")  # languages whose blocks do something here
@@ -55,105 +48,13 @@ def test_every_block_says_what_it_is_or_why_it_is_not_run():
 def test_the_blocks_of_a_page_run(name, tmp_path):
     for library in NEEDS.get(name, []):
         pytest.importorskip(library)
-    ran = run_page(PAGES[name], tmp_path)
-    for check in TOLD.get(name, []):
-        check(ran)
-
-
-def of_c(ran):
-    model = st.load(ran.folder / "generated" / "articulated_m3_n4")
-    q = np.array([0, 0, 0, 1, 0, 0, 0, 0.5, 0, 0, 0, 0, 0])
-    v_dot = model.forward_dynamics(q, np.zeros(model.nv), np.array([1e-3, 0, 0, 0, 0, 0]))
-    line = f"status 0, p_ddot_z = {v_dot[2]:g} m/s^2, alpha_1_ddot = {v_dot[6]:g} rad/s^2\n"
-    assert ran.printed.count(line) == 2  # by the page's command, and without warnings
-
-
-def of_planning(ran):
-    good, error, _ = ran.printed.split()[:3]
-    assert good == "True" and float(error) <= 0.01
-
-
-def of_sweeps(ran):
-    text = PAGES["sweeps"].read_text(encoding="utf-8")
-    first, second = ran.printed.splitlines()
-    assert first == re.search(r"print\(study.status\(\)\)  # (.*)", text)[1] and float(second) > 0
-    assert {path.name for path in ran.folder.iterdir()} >= {"study.db", "run.html"}
-
-
-def of_getting_started(ran):
-    tilts = re.findall(r"^(\S+) degrees of tilt at the end", ran.printed, re.MULTILINE)
-    planned, passive = map(float, tilts[-2:])
-    assert planned < 0.1 and passive > 90
-
-
-def of_casadi(ran):
-    assert ran.printed.count("Solve_Succeeded") == 3
-
-
-def of_python(ran):
-    numbers = re.search(r"C = \[(.*?)\]", ran.printed, re.DOTALL)[1].split()
-    assert np.abs(np.array(numbers, float)).max() < 1e-12
-
-
-def of_flight(ran):
-    (height,) = re.findall(r"after 0.5 s: height (\S+) m", ran.printed)
-    fallen = 0.3 + 2 * 0.5 - 9.8 / 2 * 0.5**2
-    assert float(height) == pytest.approx(fallen, abs=0.1)  # of B, not of the centre of mass
-    assert {"flight.html", "leap.html"} <= {path.name for path in ran.folder.iterdir()}
-
-
-def of_demo(ran):
-    """The demo writes its files, and its flights lose what is damped."""
-    demo = ran.folder / "output" / "demo"
-    for scene in ("kangaroo_rat_m1_n3", "kangaroo_rat_m3_n4"):
-        flight = st.Trajectory.load(demo / f"{scene}.npz")
-        damped = simpson(-np.sum(flight.tau * flight.v[:, 6:], axis=1), x=flight.t)
-        assert flight.energy[0] - flight.energy[-1] == pytest.approx(damped, rel=1e-3)
-    assert len([*demo.glob("*.png")]) >= 6 and (demo / "righting.gif").exists()
-    assert "0.00 deg with the planned tail" in ran.printed
-    drifts = re.findall(r"constant to (\S+),", ran.printed)
-    differences = re.findall(r"differ by (\S+) at most", ran.printed)
-    assert len(drifts) == 4
-    assert max(map(float, drifts)) < 1e-9 and max(map(float, differences)) < 1e-8
-
-
-def of_recipes(ran):
-    """Code of CasADi, a unit and plain C come to what the model does."""
-    model, casadi, block, flown = (ran.names[x] for x in ("model", "casadi", "block", "flown"))
-    q, v = np.array([0, 0, 0.34, 0.9, 0.3, -0.2, 0.1, 0.2, 0.1]), np.arange(8.0) - 3.5
-    q[3:7] /= np.linalg.norm(q[3:7])
-    x, u = np.concatenate([q, v]), np.array([1e-3, -2e-3])
-    with chdir(ran.folder):
-        words = "cc -shared -fPIC f.c -L. -lrat -Wl,-rpath,$ORIGIN -lm -o g.so"  # as for acados
-        subprocess.run(words.split(), check=True)
-        for rates in (ran.names["compiled"], casadi.external("f", "./g.so")):
-            np.testing.assert_allclose(rates(x, u), model.x_dot(x, u)[:, None], rtol=1e-12)
-        jacobians = casadi.external("f_jac", "./f.so")(x, u)
-        for found, one in zip(jacobians, model.x_dot_derivatives(x, u), strict=True):
-            np.testing.assert_allclose(found, one, rtol=0, atol=1e-9 * np.abs(one).max())
-        printed = np.loadtxt("v_dot.txt")
-        assert "rat_casadi_forward_dynamics(" in Path("f.c").read_text()
-    wanted = model.forward_dynamics(block["q"], block["v"], block["tau"])
-    assert ran.names["status"] == 0
-    for found in (block["v_dot"], printed):
-        np.testing.assert_allclose(found, wanted, rtol=1e-10, atol=1e-12)
-    law, q, v = st.TorqueTable([0.0, 1.0], [[1e-3, 0.0]] * 2), np.eye(9)[3], 5 * np.eye(8)[3]
-    q[2] = 2.0
-    motion = st.simulate(model, q, v, controller=law, t_span=0.2)
-    for k in range(9):
-        assert flown[f"q[{k + 1}]"][-1] == pytest.approx(motion.q[-1, k], abs=1e-6)
-
-
-TOLD = {
-    "README": [of_c, of_python, of_flight, of_demo],
-    "c": [of_c],
-    "casadi": [of_casadi],
-    "getting_started": [of_getting_started],
-    "planning": [of_planning],
-    "python": [of_python],
-    "recipes": [of_recipes],
-    "sweeps": [of_sweeps],
-}
+    printed = run_page(PAGES[name], tmp_path)
+    if name in ("README", "c"):  # their C is what the model is
+        model = st.load(tmp_path / "generated" / "articulated_m3_n4")
+        q = np.array([0, 0, 0, 1, 0, 0, 0, 0.5, 0, 0, 0, 0, 0])
+        v_dot = model.forward_dynamics(q, np.zeros(model.nv), np.array([1e-3, 0, 0, 0, 0, 0]))
+        line = f"status 0, p_ddot_z = {v_dot[2]:g} m/s^2, alpha_1_ddot = {v_dot[6]:g} rad/s^2\n"
+        assert printed.count(line) == 2  # by the page's command, and without warnings
 
 
 def test_examples_of_docstrings_run():
@@ -170,50 +71,65 @@ def test_examples_of_docstrings_run():
             assert doctest.DocTestRunner().run(each).failed == 0
 
 
-def test_figures_of_the_readme_are_those_of_the_benchmarks():
-    readme = PAGES["README"].read_text(encoding="utf-8")
-    table = readme.split("## How fast, how accurate")[1].split("## ")[0]
-    rows = re.findall(r"^\| (?!what|---)(.*) \|$", table, re.MULTILINE)
-    measured = PAGES["benchmarks"].read_text(encoding="utf-8")
-    assert rows
-    for text in rows:
-        for number in re.findall(r"(?<![\w.-])\d[\d.e-]*(?:x| us| ms)?(?![\w.])", text):
-            assert number.removesuffix(" us") in measured, (text, number)
+# The site.
+
+CLASSES = (st.Model, st.Trajectory, st.Plan, st.Rollouts, st.Mpc, st.Sweep, st.Identification)
+LINK = r'<link\b(?=[^>]*\srel="([^"]*)")[^>]*\shref="([^"]*)"'
+RELATED = {"next", "prev", "search", "index"}
+BESIDE = ("CHANGELOG.md", "CONTRIBUTING.md", "LICENSE", "README.md", "SECURITY.md")
+BESIDE += ("examples", "hatch_build.py", "scenes", "tests", "viewer")  # what pages link to
 
 
-# Functions that a scene needs.
-
-FIRST, SECOND = EXACT_DERIVATIVES["forward_dynamics"]
-ALL_DERIVATIVES = {part for orders in EXACT_DERIVATIVES.values() for o in orders for part in o}
-OF_RULES = {name for rule in RULES.values() for name, _ in rule.jacobians}
-NEEDED = {
-    "`st.plan`": set(best.NEEDED),
-    "`st.plan`, up to seven times as fast": ALL_DERIVATIVES - set(best.NEEDED),
-    '`st.plan(..., solver="fatrop")`': set(node.FUNCTIONS.values()),
-    "`st.Mpc`": set(settings.NEEDED.values()),
-    "`st.identify`": {*identify.FUNCTIONS, "forward_dynamics_parameter_derivatives"},
-    '`casadi.external("x_dot", derivatives=1)`': {"forward_dynamics", *FIRST},
-    '`casadi.external("x_dot", derivatives=2)`': set(SECOND) - set(FIRST),
-    "`st.jax_functions`, `st.torch_functions`": {*RULES, *OF_RULES},
-    "[an FMU](export.md)": {*FLYING, *TOUCHING},
-}
+def made_site(tree):
+    """The site, built as `make docs` does, but without running the scripts of the gallery."""
+    made = shutil.ignore_patterns("api", "gallery", "__pycache__")
+    shutil.copytree(ROOT / "docs", tree / "docs", ignore=made)
+    for name in BESIDE:
+        (tree / name).symlink_to(ROOT / name)
+    options = ["-W", "--keep-going", "-n", "-q", "-D", "plot_gallery=False"]
+    command = [sys.executable, "-m", "sphinx", *options, "docs", "html"]
+    done = subprocess.run(command, cwd=tree, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    return tree / "html"
 
 
-def test_the_table_of_functions_that_a_scene_needs_is_what_the_runtime_asks_for():
-    """Of simulations, what their errors name: a model with next to nothing is told all it lacks."""
-    section = PAGES["models"].read_text(encoding="utf-8").partition("## Which functions")[2]
-    section = section.partition("\n## ")[0]
-    _, *table = [line.strip("|").split("|") for line in section.splitlines() if line[:2] == "| "]
-    rows = {purpose.strip(): {*re.findall(r"`(\w+)`", names)} & {*ALL} for purpose, names in table}
-    model = zoo.model("bare")
-    q, v = np.eye(model.nq)[3], np.zeros(model.nv)
-    for purpose, at_times, call in [
-        ("`st.simulate`", "implicit", lambda: st.simulate(model, q, v)),
-        ("`model.step`, `st.environment`", "implicit", lambda: model.step(q, v, [0, 0], 1e-3)),
-        ("`st.Pfl`", "pfl", lambda: st.Pfl(model, ([0.0, 1.0], np.zeros((2, 2))))),
-    ]:
-        with row(purpose), pytest.raises(st.ModelError) as caught:
-            call()
-        named = re.findall(r"'(\w+)'", str(caught.value).partition("(it has")[0])
-        assert rows.pop(purpose) - {*model.generated} == {*named, at_times}, purpose
-    assert rows == NEEDED
+def parts(page):
+    """What a page fetches, where it leads, and the anchors that it has."""
+    text = unescape(page.read_text(encoding="utf-8"))
+    fetched = re.findall(r'<(?:script|img|iframe|source|video)\b[^>]*\ssrc="([^"]*)"', text)
+    fetched += [href for rel, href in re.findall(LINK, text) if rel not in RELATED]
+    links = re.findall(r'<a\b[^>]*\shref="([^"]*)"', text)
+    return fetched, links, set(re.findall(r'\sid="([^"]*)"', text))
+
+
+def of_class(member) -> bool:
+    """Tell whether a member is a method or a property; fields are explained by their class."""
+    return inspect.isfunction(member) or inspect.ismethod(member) or isinstance(member, property)
+
+
+@pytest.mark.slow
+def test_the_site_has_every_name_fetches_nothing_from_elsewhere_and_leads_somewhere(tmp_path):
+    inventory = pytest.importorskip("sphinx.util.inventory").InventoryFile
+    site = made_site(tmp_path)
+    with (site / "objects.inv").open("rb") as file:
+        known = inventory.load(file, "", lambda base, name: name)
+    names = {name for kind in known for name in known[kind] if kind.startswith("py:")}
+    wanted = {f"serpentail.{name}" for name in st.__all__}
+    for each in CLASSES:
+        members = inspect.getmembers(each, of_class)
+        wanted |= {f"serpentail.{each.__name__}.{name}" for name, _ in members if name[0] != "_"}
+    assert wanted - names == set()
+    pages = {path: parts(path) for path in site.rglob("*.html")}
+    for path, (fetched, links, _) in pages.items():
+        with row(path):
+            assert fetched and links
+            assert [x for x in fetched if "//" in x.split("?")[0] or x.startswith("/")] == []
+            for target in filter(None, [*links, *fetched]):
+                place, _, anchor = target.partition("#")
+                other = (path.parent / unquote(place.split("?")[0])).resolve() if place else path
+                assert re.match(r"[a-z]+:", target) or other.exists(), target
+                if anchor and other in pages:
+                    assert unquote(anchor) in pages[other][2], target
+    for sheet in site.rglob("*.css"):
+        text = sheet.read_text(encoding="utf-8")
+        assert re.findall(r"@import[^;]*//|url\([\"']?(?:https?:)?//", text) == [], sheet

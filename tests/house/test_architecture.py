@@ -2,9 +2,7 @@
 project says of itself; and make, which builds what is asked for, once.
 """
 
-import json
 import re
-import shlex
 import shutil
 import subprocess
 import sys
@@ -14,8 +12,9 @@ import pytest
 
 import serpentail
 import serpentail_codegen
+from mutants import results, sample
+from mutants.recorded import NO_JUDGES
 from tests.house import file_lengths
-from tests.house.test_golden import MODELS
 from tests.support.makes import away_from_make, stand_in
 from tests.support.rows import row
 
@@ -55,32 +54,6 @@ def test_files_are_short():
             assert all("printf" in line for line in numbers)
 
 
-def test_the_pages_lock_file_has_versions_and_no_addresses():
-    lock = json.loads((VIEWER / "package-lock.json").read_text(encoding="utf-8"))
-    packages = {name: entry for name, entry in lock["packages"].items() if name}
-    assert "node_modules/three" in packages
-    for entry in packages.values():
-        assert entry["version"] and entry["integrity"] and "resolved" not in entry
-    for path in (*VIEWER.glob("*.*"), VIEWER / ".npmrc"):
-        assert "://" not in path.read_text(encoding="utf-8")
-
-
-def test_what_is_built_is_not_kept_but_the_golden_models():
-    def git(*words):
-        done = subprocess.run(
-            ["git", *words], cwd=ROOT, capture_output=True, text=True, check=False
-        )
-        if done.returncode == 128:
-            pytest.skip("this is no checkout")
-        return done.stdout.split()
-
-    built = ["viewer/node_modules/", "runtime/serpentail/viewer/page.html"]
-    assert git("check-ignore", *built) == built
-    kept = git("ls-files", "--", "generated")
-    assert {name.split("/")[1] for name in kept} == {"README.md", *MODELS}
-    assert sum((ROOT / name).stat().st_size for name in kept) < 400_000
-
-
 def test_package_changelog_and_citation_have_one_version():
     version = serpentail.__version__
     assert re.fullmatch(r"\d+\.\d+\.\d+", version) and version == serpentail_codegen.__version__
@@ -99,88 +72,44 @@ def test_package_changelog_and_citation_have_one_version():
     assert {"CITATION.cff", "CHANGELOG.md", notes} <= files
 
 
-# Make.
+def test_mutants_that_are_argued_away_are_those_of_lines_that_are_there():
+    for entry in results.arguments():
+        with row(entry):
+            of_file = sample.of_file(ROOT, entry["file"])
+            assert any(results.argument(mutation, [entry]) for mutation in of_file)
+    assert all((ROOT / name).is_file() for name in NO_JUDGES)
+
 
 NAME = "articulated_m1_n1_fc4a05d"  # of these functions
 ORDER = ("TAIL=articulated", "M=1", "N=1", "FUNCTIONS=mass_matrix")
 
 
-@pytest.fixture
-def tree(tmp_path):
-    """A copy of what make builds from, with a stand-in for .venv that is ready."""
+@pytest.mark.slow
+def test_what_is_there_is_not_made_again_and_what_was_lost_is(tmp_path):
+    """In a copy of what make builds from, away from a make that runs these tests."""
     for name in ("Makefile", "pyproject.toml"):
         shutil.copy2(ROOT / name, tmp_path)
     for name in ("codegen", "scenes"):
         shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
     stand_in(tmp_path)
-    return tmp_path
+    own = {name: value for name, value in away_from_make().items() if name != "CC"}
+    own |= {"PYTHONPATH": str(tmp_path / "codegen"), "LC_ALL": "C", "UV": ""}
 
-
-@pytest.fixture
-def make(tree):
-    """Return a function that runs make there, away from a make that runs these tests."""
-
-    def run(*arguments, **more):
-        own = {name: value for name, value in away_from_make().items() if name != "CC"}
-        own |= {"PYTHONPATH": str(tree / "codegen"), "LC_ALL": "C", "UV": "", **more}
+    def make(**more):
+        command = ["make", "model", "TAIL=articulated", "M=1", "N=1", "FUNCTIONS=mass_matrix"]
         return subprocess.run(
-            ["make", *arguments], cwd=tree, env=own, capture_output=True, text=True, check=False
+            command, cwd=tmp_path, env=own | more, capture_output=True, text=True, check=False
         )
 
-    return run
-
-
-def test_options_of_make_are_those_of_the_generator(tree, make):
-    options = ("REAL=float", "EMISSION=loops", "BAKED=1", "FUNCTIONS=energy,momentum")
-    told = "--real float --emission loops --baked --functions energy,momentum"
-    for given, wanted in [
-        (("TAIL=continuum", "M=2"), "--tail continuum --segments 2"),
-        (options, f"{told} --tail articulated --segments 1 --links 3"),
-        (("SCENE=my scenes/it's.toml",), "-- my scenes/it's.toml"),
-    ]:
-        with row(*given):
-            done = make("-n", "model", *given)
-            command = done.stdout.split(" && ")[0].replace("$(", " ").replace(")", " ")
-            assert done.returncode == 0 and wanted in " ".join(shlex.split(command))
-    assert not (tree / "generated").exists()
-
-
-def test_a_wrong_option_is_one_readable_line_and_nothing_is_made(tree, make):
-    for options, words in [
-        (["M=0"], r"segments: value 0"),
-        (["N=abc"], r"--links: .*'abc'"),
-        (["SCENE=--help"], r"scene file: value '--help'"),
-    ]:
-        with row(*options):
-            done = make("model", *options)
-            assert done.returncode == 2 and "Traceback" not in done.stderr
-            (line,) = (line for line in done.stderr.splitlines() if re.search(words, line))
-            assert len(line) < 130 and not list((tree / "generated").glob("[a-z]*"))
-
-
-@pytest.mark.slow
-def test_what_is_there_is_not_made_again_and_what_was_lost_is(tree, make):
-    failed = make("model", *ORDER, CC="no-such-cc", SERPENTAIL_CACHE=str(tree / "cache"))
+    failed = make(CC="no-such-cc", SERPENTAIL_CACHE=str(tmp_path / "cache"))
     assert failed.returncode == 2 and "CC='no-such-cc'" in failed.stderr
-    first = make("model", *ORDER)
-    assert first.returncode == 0 and f"{NAME}: 1 x 1 links" in first.stdout
-    folder = tree / "generated" / NAME
-    manifest = json.loads((folder / "manifest.json").read_text())
-    assert manifest["prefix"] == NAME and manifest["real"] == "double"
+    first, name = make(), "articulated_m1_n1_fc4a05d"  # of these functions
+    assert first.returncode == 0 and f"{name}: 1 x 1 links" in first.stdout
+    folder = tmp_path / "generated" / name
     before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
-    again = make("model", *ORDER)
-    assert re.fullmatch(rf"generated/{NAME}: up to date, \d+\.\d\d s\n", again.stdout)
+    assert re.fullmatch(rf"generated/{name}: up to date, \d+\.\d\d s\n", make().stdout)
     assert {path: path.stat().st_mtime_ns for path in folder.rglob("*")} == before
     readme = (folder / "README.md").read_bytes()
     (folder / "README.md").unlink()
-    assert "1 files written" in make("model", *ORDER).stdout
+    assert "1 files written" in make().stdout
     assert (folder / "README.md").read_bytes() == readme
-
-
-def test_clean_removes_what_was_made(tree, make):
-    kept = ("generated/README.md", "generated/golden_loops/src")  # part of the checkout
-    for name in ("generated/x", "generated/.stamps", "output", *kept):
-        (tree / name).mkdir(parents=True)
-    assert make("clean").returncode == 0
-    assert {path.name for path in (tree / "generated").iterdir()} == {"README.md", "golden_loops"}
-    assert not (tree / "output").exists() and (tree / "generated/golden_loops/src").is_dir()

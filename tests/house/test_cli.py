@@ -5,7 +5,6 @@ tells which; all answer `--help` at once and refuse what they do not know, witho
 import json
 import os
 import re
-import stat
 import subprocess
 import sys
 from pathlib import Path
@@ -34,50 +33,43 @@ def run(capsys):
 
 
 def test_info_is_a_table_in_columns_or_json(run):
-    model = zoo.model("m1_n1")
-    status, out, err = run("info", model.folder)
+    status, out, err = run("info", zoo.folder("m1_n1"))
     head, *lines = out.splitlines()
     assert (status, besides_progress(err)) == (0, "")
     assert head == "m1_n1: 1 x 1 links, nq 9, nv 8, double"
     functions = [line for line in lines if not line.startswith("    ")]
     names = [line.split()[0] for line in functions]
     assert names == [name for name in SIGNATURES if name in names] and "energy" in names
-    for line in functions:  # no column is glued to the next
-        with row(line):
-            assert re.fullmatch(r"  \w+ +(straight|loops) +\d+ operations", line)
+    assert all(re.fullmatch(r"  \w+ +(straight|loops) +\d+ operations", x) for x in functions)
     assert len({line.index(" operations") for line in functions}) == 1
-    ports = [line for line in lines if line.startswith("    ")]
-    words = [re.split("  +", line.strip()) for line in ports]
-    assert ["out H", "8 x 8", SIGNATURES["mass_matrix"].outputs[0].meaning] in words
-    assert ["in", "q", "9", SIGNATURES["energy"].inputs[0].meaning] in words
-    # each last column begins where the others do
-    assert len({line.index(last) for line, (*_, last) in zip(ports, words, strict=True)}) == 1
+    ports = [re.split("  +", line.strip()) for line in lines if line.startswith("    ")]
+    assert ["out H", "8 x 8", SIGNATURES["mass_matrix"].outputs[0].meaning] in ports
+    assert ["in", "q", "9", SIGNATURES["energy"].inputs[0].meaning] in ports
     status, out, err = run("info", zoo.folder("m1_n1"), "--json", "-")
     report = json.loads(out)
     assert (status, err, out.count("\n")) == (0, "", 1)
-    wanted = {"name": "m1_n1", "real": "double", "segments": 1, "links": 1}
-    assert wanted | {"nq": 9, "nv": 8} == {k: report[k] for k in (*wanted, "nq", "nv")}
+    wanted = {"name": "m1_n1", "real": "double", "segments": 1, "links": 1, "nq": 9, "nv": 8}
+    assert wanted == {k: report[k] for k in wanted}
     assert report["parameters"]["tail_mount"] == [0.0, -0.0405, 0.0045]
     assert report["functions"]["energy"]["inputs"] == {"q": [9], "v": [8]}
     assert report["functions"]["energy"]["outputs"] == {"kinetic": [1], "potential": [1]}
 
 
 def test_verify_tells_what_failed_by_status_1(run, monkeypatch):
-    def both():
-        told = run("verify", zoo.folder("bare")), run("verify", zoo.folder("bare"), "--json", "-")
-        (status, text, words), (same, out, err) = told
-        assert (status, besides_progress(words), err, out.count("\n")) == (same, "", "", 1)
-        return status, text, json.loads(out)
-
-    status, text, found = both()
-    assert status == 0 and "0 failed" in text and "FAILED" not in text
-    assert found["passed"] is True and found["counts"]["failed"] == 0
+    folder = zoo.folder("bare")
+    status, text, words = run("verify", folder)
+    assert (status, besides_progress(words)) == (0, "") and "0 failed" in text
+    status, out, err = run("verify", folder, "--json", "-")
+    found = json.loads(out)
+    assert (status, err, out.count("\n"), found["passed"]) == (0, "", 1, True)
     assert {check["status"] for check in found["checks"]} == {"passed", "not checked"}
     broken = verify.Check("a law", "It holds.", 2.0, 1.0, "a state")
     whole = verify.Check("another", "It holds.", 0.0, 1.0)
     monkeypatch.setattr(verify, "laws", lambda _: [broken, whole])
-    status, text, found = both()
-    assert status == 1 and "FAILED" in text and found["passed"] is False
+    status, text, _ = run("verify", folder)
+    assert status == 1 and "FAILED" in text
+    status, out, _ = run("verify", folder, "--json", "-")
+    assert status == 1 and json.loads(out)["passed"] is False
 
 
 def test_no_folder_and_no_compiler_are_one_line_and_status_2(run, tmp_path, monkeypatch):
@@ -117,43 +109,29 @@ def test_wrong_usage_is_status_2_and_help_names_every_verb(capsys):
     assert all(verb in out for room in cli.ROOMS.values() for verb in room)
 
 
-def test_installed_program(tmp_path):
-    beside = Path(sys.executable).parent / "serpentail"
-    for program, place, status in [
-        ([beside], zoo.folder("bare"), 0),
-        ([sys.executable, "-m", "serpentail.cli"], tmp_path, 2),
-    ]:
-        command = [*program, "info", place, "--json", "-"]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        told = besides_progress(done.stderr)
-        assert done.returncode == status and bool(done.stdout) != bool(told)
-
-
 # Scripts.
 
 FOLDERS = ("benchmarks", "embedded", "examples", "mutants", "stress")
-HEAVY = ("casadi", "matplotlib", "numpy", "scipy", "serpentail_codegen.pipeline", "sympy")
-# Runs each module of the words as a program with some arguments, in a process that this one forks:
-# it prints its status, and the heavy packages that it has loaded.
+HEAVY = {"casadi", "matplotlib", "numpy", "scipy", "serpentail_codegen.pipeline", "sympy"}
+# Runs each module of the words as a program with an argument, in a process that this one forks: it
+# prints its status, and the packages that it has loaded.
 EACH = """
 import argparse, contextlib, dataclasses, io, os, pathlib, runpy, subprocess, sys
-count = int(sys.argv[1])
-for name in sys.argv[2 + count:]:
+for name in sys.argv[2:]:
     if os.fork() == 0:
-        sys.argv, text, status = [name, *sys.argv[2:2 + count]], io.StringIO(), None
+        sys.argv, text, status = [name, sys.argv[1]], io.StringIO(), None
         with contextlib.redirect_stdout(text), contextlib.redirect_stderr(text):
             try:
                 runpy.run_module(name, run_name="__main__", alter_sys=True)
             except SystemExit as end:
                 status = end.code
-        found = [x for x in HEAVY if x in sys.modules] + ["usage"] * ("usage:" in text.getvalue())
-        print(name, status, *found, flush=True)
+        print(name, status, "usage:" in text.getvalue(), *sys.modules, flush=True)
         os._exit(0)
     os.wait()
 """
 
 
-def scripts() -> list[str]:
+def scripts():
     """The modules that people run: those of tests by the Makefile, which runs the zoo itself."""
     found = [path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py")]
     found = [path for path in found if '\nif __name__ == "__main__":\n' in path.read_text()]
@@ -162,51 +140,25 @@ def scripts() -> list[str]:
     return sorted({*names, "serpentail_codegen", "serpentail.cli"} - {"tests.support.zoo"})
 
 
-SCRIPTS = scripts()
-
-
-def python(folder: Path, *words: str | Path) -> subprocess.CompletedProcess:
-    """Run Python in an empty folder, in which it finds the scripts."""
-    return subprocess.run(
-        [sys.executable, *words],
-        cwd=folder,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=60,
-    )
-
-
-def answers(folder: Path, *arguments: str, of: list[str] = SCRIPTS) -> dict[str, list[str]]:
-    """Status of scripts with some arguments, what heavy they loaded, and "usage" if told."""
-    program = f"HEAVY = {HEAVY}\n{EACH}"
-    done = python(folder, "-c", program, str(len(arguments)), *arguments, *of)
-    assert (done.returncode, done.stderr) == (0, "")
-    return {name: rest for name, *rest in map(str.split, done.stdout.splitlines())}
-
-
-def test_scripts_answer_help_and_nonsense_without_work(tmp_path):
-    for words, status in [("--help", "0"), ("--nonsense", "2")]:
-        found = answers(tmp_path, words)
-        assert {"examples.studies.contact", "benchmarks.bench", "tests.verification"} <= {*found}
-        assert {name: told for name, told in found.items() if told != [status, "usage"]} == {}
-    assert list(tmp_path.iterdir()) == []
-    # help is for stdout, a refusal for stderr; an example runs by its path, too
-    path = ROOT / "examples" / "demo.py"
-    helped, refused = (python(tmp_path, path, option) for option in ("--help", "--nonsense"))
-    assert (helped.returncode, helped.stderr) == (0, "") and "usage: demo.py" in helped.stdout
-    assert (refused.returncode, refused.stdout) == (2, "") and "usage:" in refused.stderr
-
-
-def test_folders_that_cannot_be_used_are_refused_before_work(tmp_path):
+def test_scripts_answer_help_nonsense_and_folders_that_cannot_be_without_work(tmp_path):
+    names = scripts()
+    assert {"examples.studies.contact", "benchmarks.bench", "tests.verification"} <= {*names}
     (tmp_path / "file").write_text("")
-    places = {"file": "not a folder", "file/below": "not a folder"}
-    if os.geteuid():  # root may write anywhere
-        (tmp_path / "locked").mkdir(mode=stat.S_IRUSR)
-        places["locked/below"] = "cannot be written to"
-    for folder, words in places.items():
-        refused = python(tmp_path, "-m", "examples.demo", folder)
-        assert refused.returncode == 2 and words in refused.stderr
-    writers = [s for s in SCRIPTS if s.startswith(("examples.", "bench"))]
-    assert answers(tmp_path, "file", of=writers) == {script: ["2", "usage"] for script in writers}
+    writers = [name for name in names if name.startswith(("examples.", "bench"))]
+    for word, of, status in [("--help", names, 0), ("--nonsense", names, 2), ("file", writers, 2)]:
+        done = subprocess.run(
+            [sys.executable, "-c", EACH, word, *of],
+            cwd=tmp_path,
+            env=os.environ | {"PYTHONPATH": str(ROOT)},
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=60,
+        )
+        assert (done.returncode, done.stderr) == (0, "")
+        told = [line.split() for line in done.stdout.splitlines()]
+        assert [name for name, *_ in told] == of
+        for name, *found in told:
+            with row(name, word):
+                assert found[:2] == [str(status), "True"] and not HEAVY & {*found}
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]

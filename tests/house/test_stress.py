@@ -1,31 +1,40 @@
 """Bad scenes and calls are answered or refused, drops gain no energy, and what once broke stays
-mended.
+mended; parts of studies are made once, whatever happens.
 """
 
+import os
 import random
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
+from filelock import FileLock
 
 import serpentail as st
+from examples.studies.parts import Part, made
 from serpentail.model.sizes import UNLIKE as UNLIKE_FROM
 from serpentail.model.sizes import disparity
 from stress import drops, scene_fuzz
 from stress.subjects import Subject, changed, exact_of, state
 from tests.references.metrics import mass_matrix_error
-from tests.support import zoo
+from tests.support import tiny_study, zoo
 from tests.support.rows import row
+from tests.support.scenes import SCENES
 
 ROOT = Path(__file__).parents[2]
-SCENES = sorted((ROOT / "scenes").glob("*.toml"))
 
 
 @pytest.mark.parametrize("count", [100, pytest.param(1000, marks=pytest.mark.slow)])
 def test_mutated_scene_files_are_read_or_refused(count, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     dice, model = random.Random(count), zoo.model("ground")
-    assert scene_fuzz.faults(SCENES, count, dice, tmp_path, model) == []
+    assert scene_fuzz.faults(sorted(SCENES.glob("*.toml")), count, dice, tmp_path, model) == []
 
 
 @pytest.mark.parametrize("one_arc", [False, pytest.param(True, marks=pytest.mark.slow)])
@@ -98,14 +107,6 @@ def test_bodies_without_the_warning_keep_their_digits(name):
                 assert error_of_mass_matrix(other, rng, bends) < 1e-12
 
 
-def test_vjp_of_a_model_with_contacts_is_that_of_flight():
-    flight, standing, rng = zoo.model("m1_n3"), zoo.model("feet_tail"), np.random.default_rng(5)
-    arguments = [rng.normal(size=n) for n in (flight.nq, flight.nv, 2, flight.nv)]
-    pairs = zip(*(m.forward_dynamics_vjp(*arguments) for m in (flight, standing)), strict=True)
-    for expected, found in pairs:
-        np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12 * np.abs(expected).max())
-
-
 def test_simulations_that_cannot_be_are_refused():
     q = np.array([0, 0, 0.3, 1, 0, 0, 0, 0, 0.0])
     settings = {"legs": st.Legs.fixed(3.6, -0.3), "t_span": 0.01}
@@ -125,29 +126,89 @@ def test_simulations_that_cannot_be_are_refused():
 
 
 def test_arguments_that_the_fuzz_once_broke_are_refused():
-    model, still = zoo.model("feet_tail"), ([0.0, 1.0], np.zeros((2, 2)))
+    model = zoo.model("feet_tail")
     for call, words in [
         (lambda: st.Legs.ramp(3.6, (-0.3, -1.0), 0.4, 1e-320), "inf s"),
-        (lambda: st.Reference([0.0, 1.0], [1, [2, 3]]), "Reference: angles: type list"),
-        (lambda: st.Pfl(model, still, 10**60), "Pfl: kp: value 10{60}"),
-        (lambda: st.Pfl(model, np.zeros((2, 3), complex)), "Pfl: times: type complex128"),
-        (lambda: st.Pfl(model, ([0.0], np.zeros((1, 2)))), "Pfl: one node"),
         (lambda: model.external_force(moment=(0, np.nan, 0)), r"moment\[1\]: value nan"),
+        (lambda: st.polar_to_bend(np.zeros(2), np.zeros(3)), "shapes differ"),
+        (lambda: st.polar_to_bend(np.inf, 1.0), "phi: value inf"),
+        (lambda: st.bend_to_polar(5e-324, 0.0, 1.0, 1.0), "too large"),
+        (lambda: st.rotation_matrix(np.zeros(4)), "a quaternion is zero"),
+        (lambda: st.rotation_matrix(np.zeros(3)), "quaternion has shape"),
+        (lambda: st.pitch_roll_yaw(3.0), "q has shape"),
     ]:
         with row(words), pytest.raises(st.SerpentailError, match=words):
             call()
-    for convert, *values in [
-        (st.polar_to_bend, "x", 1.0),
-        (st.polar_to_bend, np.zeros(2), np.zeros(3)),
-        (st.polar_to_bend, np.inf, 1.0),
-        (st.bend_to_polar, 5e-324, 0.0, 1.0, 1.0),
-        (st.rotation_matrix, np.zeros(4)),
-        (st.rotation_matrix, [np.nan, 0, 0, 0]),
-        (st.rotation_matrix, np.zeros(3)),
-        (st.pitch_roll_yaw, 3.0),
-    ]:
-        with row(convert.__name__, values), pytest.raises(st.StateError):
-            convert(*values)
     for size in (1e-300, 1e-160, 1e160, 1e300):  # quaternions of any norm are rotations
         q = np.array([0.5, 0.5, -0.5, 0.5])
         np.testing.assert_allclose(st.rotation_matrix(q * size), st.rotation_matrix(q), atol=1e-15)
+
+
+# Studies.
+
+PATIENCE = 60  # s
+
+
+def one(folder, of, make, files=()):
+    """The result of a part called "one"."""
+    return made("study", folder, {"one": Part(make, of, files)})["one"]
+
+
+def ended(folder):
+    """How often each part ended."""
+    path = folder / "ended"
+    lines = path.read_text().splitlines() if path.exists() else []
+    return Counter(int(line.split()[0]) for line in lines)
+
+
+def test_parts_are_made_once_and_again_where_inputs_change_or_files_are_gone(tmp_path):
+    make, picture = partial(tiny_study.square, 3, tmp_path), tmp_path / "picture.png"
+    for starts, gone, count in [(2, False, 1), (2, False, 1), (3, False, 2), (3, True, 3)]:
+        if gone:
+            picture.unlink()
+        found = one(tmp_path / "parts", {"starts": (1, starts)}, make, (picture,))
+        assert found == {"number": 3, "square": 9, "third": 1.0} and ended(tmp_path) == {3: count}
+        picture.touch()
+
+
+def test_a_part_that_fails_is_told_and_none_is_made_while_another_process_writes(tmp_path):
+    with pytest.raises(st.SerpentailError, match="one: ZeroDivisionError: no such part"):
+        one(tmp_path, {}, tiny_study.wrong)
+    assert tiny_study.titles(tmp_path / "study.db") == []
+    lock = FileLock(tmp_path / ".study.db.lock")
+    with lock, pytest.raises(st.SerpentailError, match="another process is writing"):
+        one(tmp_path, {}, tiny_study.ones)
+    assert np.isnan(one(tmp_path, {}, tiny_study.lost)["lost"])  # JSON has no NaN of its own
+
+
+def started(folder):
+    """Start the tiny study in a process; one of its parts has begun, when another ends."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "tests.support.tiny_study", str(folder)],
+        cwd=ROOT,
+        env=os.environ | {"SERPENTAIL_THREADS": "1"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+@pytest.mark.parametrize("whole", [True, pytest.param(False, marks=pytest.mark.slow)])
+def test_ctrl_c_ends_all_in_one_line_and_the_same_command_goes_on(tmp_path, whole):
+    """From a terminal all processes hear it, from another program the parent alone."""
+    store, process = tmp_path / "parts" / "tiny.db", started(tmp_path)
+    while not tiny_study.titles(store):
+        time.sleep(0.02)
+    (os.killpg if whole else os.kill)(process.pid, signal.SIGINT)
+    printed, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130 and printed == ""
+    *told, last = errors.splitlines()
+    assert last == "interrupted: the same command goes on from here"
+    assert [line for line in told if not line.startswith("sweep")] == []
+    counts, kept = ended(tmp_path), [int(title.split()[1]) for title in tiny_study.titles(store)]
+    printed, _ = started(tmp_path).communicate(timeout=PATIENCE)
+    parts = range(tiny_study.PARTS)
+    results = [(f"part {k}", {"number": k, "square": k**2, "third": k / 3}) for k in parts]
+    assert printed == f"{results}\n"
+    assert all(ended(tmp_path)[k] == counts[k] for k in kept) and {*ended(tmp_path)} == {*parts}

@@ -8,9 +8,8 @@ import pytest
 
 from serpentail_codegen.__main__ import main, parser, scene_of
 from serpentail_codegen.functions.catalogue import CATALOGUE
-from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.scene.parameters import PARAMETERS
-from serpentail_codegen.scene.parse import load_scene, parse_scene, scene_for, scene_to_dict
+from serpentail_codegen.scene.parse import parse_scene, scene_for, scene_to_dict
 from serpentail_codegen.scene.problems import SceneError
 from serpentail_codegen.scene.resolve import resolve_parameters
 from serpentail_codegen.scene.scene import Scene
@@ -18,21 +17,20 @@ from serpentail_codegen.scene.signatures import table as functions
 from serpentail_codegen.scene.signatures.signature import ALWAYS, CALLED, GROUND, NAMED
 from serpentail_codegen.scene.signatures.table import ALL, DEFAULT, FIXED, SIGNATURES
 from tests.support.rows import row
-from tests.support.scenes import SCENES, VALID
+from tests.support.scenes import VALID
 
 STANCE = VALID + 'contacts = ["torso", "feet"]\n'
 SIZE = ["--tail", "articulated", "--segments", "1", "--links", "3"]
 
 
-def test_defaults_of_the_other_keys(read):
+def test_defaults_of_the_other_keys_and_scenes_of_options(read):
     scene = read(VALID)
     assert scene == Scene("rat", "articulated", 2, 3, DEFAULT, resolve_parameters({}, 6))
     keys = (scene.coordinates, scene.baked, scene.real, scene.emission, scene.profile)
     assert keys == ("joint", False, "double", "auto", "fast")
     assert read('name = "kick_2"\n' + VALID).name == "kick_2"
-
-
-def test_scenes_of_options_are_frozen_and_hashable():
+    assert read(VALID).targets == read('targets = ["casadi", "c"]\n' + VALID).targets
+    # those of options are frozen and hashable
     keys = {"baked": True, "functions": ["energy"], "parameters": {"gravity": 0}}
     scene = scene_for("articulated", 3, 4, **keys)
     assert (scene.name, scene.segments, scene.links) == ("articulated_m3_n4", 3, 4)
@@ -79,22 +77,12 @@ def test_scenes_are_read_again_as_they_are():
             assert scene_to_dict(parse_scene(table, "other")) == table
 
 
-def test_tables_of_motions_are_left_to_the_runtime():
-    alone = {"kind": "articulated", "segments": 1, "links": 3}
-    motions = {name: {"anything": 1} for name in ("plan", "simulate", "identify", "sweep")}
-    motions |= {"phase": [{"anything": 1}]}
-    assert parse_scene(alone | motions, "rat") == parse_scene(alone, "rat")
-    assert load_scene(SCENES / "righting_m1_n3.toml").links == 3
-
-
 # Functions.
 
 
 def test_functions_come_in_their_order_and_all_that_fit(read):
-    assert read('functions = ["energy", "mass_matrix"]\n' + VALID).functions == (
-        "mass_matrix",
-        "energy",
-    )
+    named = read('functions = ["energy", "mass_matrix"]\n' + VALID).functions
+    assert named == ("mass_matrix", "energy")
     every = 'functions = "all"\n'
     assert not set(functions.NEEDS) & set(read(VALID + every).functions)
     fixed = VALID + 'base = "fixed"\n'
@@ -112,7 +100,7 @@ def test_contacts_bring_their_parameters_and_functions(read):
     assert scene.functions == tuple(
         name for name in ALL if name in DEFAULT + functions.DEFAULT_ON_GROUND
     )
-    own = dict(scene.parameters).keys() - dict(read(VALID).parameters)
+    own = scene.parameters.keys() - read(VALID).parameters.keys()
     assert own == {p.name for p in PARAMETERS if p.needs}
     legs = [scene.parameters[f"L_{link}"] for link in ("h2d", "d2k", "k2a", "a2m", "m2t")]
     assert legs == [0.008, 0.024, 0.032, 0.035, 0.016]
@@ -130,23 +118,13 @@ def test_contacts_bring_their_parameters_and_functions(read):
 
 def test_the_table_of_functions_knows_assemblies_shapes_and_derivatives():
     assert list(CATALOGUE) == [name for name, s in SIGNATURES.items() if s.outputs]
-    tails = [Tail(2, 3), Tail(1, 5, "continuum"), Tail(2, 2, contacts=("feet", "tail", "torso"))]
     for name, function in CATALOGUE.items():
         signature = SIGNATURES[name]
         assert (function.inputs, function.outputs) == (signature.inputs, signature.outputs)
-        for argument in (*signature.inputs, *signature.outputs):
-            with row(name, argument.name):
-                assert all(n >= 0 for tail in tails for n in argument.shape(tail))
-                assert argument.meaning
     assert {s.emitted for s in SIGNATURES.values()} == {ALWAYS, GROUND, NAMED, CALLED}
     assert set(ALL) == {name for name, s in SIGNATURES.items() if s.emitted != CALLED}
-    parts = {
-        part
-        for orders in functions.EXACT_DERIVATIVES.values()
-        for order in orders
-        for part in order
-    }
-    assert parts <= set(CATALOGUE)
+    orders = [order for each in functions.EXACT_DERIVATIVES.values() for order in each]
+    assert {part for order in orders for part in order} <= set(CATALOGUE)
 
 
 # Options of the command line are part of a model's name: none overwrites another's folder.
@@ -174,19 +152,15 @@ def test_what_an_option_changes_is_part_of_the_name():
     assert len(names) == 1 and names != {named(*SIZE, "--functions", "energy")}
 
 
-def test_a_scenes_own_choice_is_no_part_of_its_name(tmp_path):
-    path = tmp_path / "rat.toml"
+def test_a_scenes_own_choice_is_no_part_of_its_name_and_one_that_is_given_is_checked(
+    tmp_path, capsys
+):
+    path = tmp_path / f"{'a' * 60}.toml"
     path.write_text(VALID + 'real = "float"\nbaked = true\nfunctions = ["energy"]\n')
     own = ["--real", "float", "--baked", "--functions", "energy"]
-    assert named(str(path), *own) == named(str(path)) == "rat"
-    assert named(str(path), "--real", "double") == "rat_double"
-
-
-def test_a_name_that_is_given_stays_and_is_checked(tmp_path, capsys):
+    assert named(str(path), *own) == named(str(path)) == path.stem
     assert named(*SIZE, "--real", "float", "--name", "own") == "own"
-    path = tmp_path / ("a" * 60 + ".toml")
-    path.write_text(VALID)
-    rows = {"../own": [*SIZE, "--name", "../own"], f"{path.stem}_float": [path, "--real", "float"]}
-    for name, arguments in rows.items():
-        assert main([*map(str, arguments)]) == 2
+    wrong = {"../own": [*SIZE, "--name", "../own"]}
+    for name, words in (wrong | {f"{path.stem}_double": [str(path), "--real", "double"]}).items():
+        assert main(words) == 2
         assert capsys.readouterr().err.startswith(f"name: value '{name}': ")

@@ -20,7 +20,6 @@ from tests.support.scenes import SCENES
 
 START = {"q": [0, 0, 0.3, 1, 0, 0, 0, 0, 0], "v": [0] * 8}
 TASK = {"start": START, "duration": 0.3}
-LONG = "1" + "0" * 400
 HEX = f"0x{'f' * 5000}"
 OVERLAP = "[{at = 0.1, delta = 1.0, duration = 0.2}, {at = 0.2, delta = 0.0, rate = 9}]"
 
@@ -42,8 +41,6 @@ def moves(text):
 LINES = [
     ("duration", "duration = -1.0", r"simulate.duration: value -1.0"),
     ("duration", "", "simulate.duration: no value"),
-    ("duration", "duration = nan", "simulate.duration: value nan"),
-    ("duration", f"duration = {LONG}", "simulate.duration: value 1000"),
     ("duration", f"duration = {HEX}", "simulate.duration: value of type int"),
     ("duration", "duration = 1.0\nstep = 1e-12", r"step 1e-12: needs 1e\+12"),
     ("duration", "duration = 1.0\nmost_step = 1e-9", r"1e\+09 steps"),
@@ -58,20 +55,15 @@ LINES = [
     ("delta", moves("1"), "legs.moves: value 1: .*tables"),
     ("delta", moves('"at"'), "legs.moves: value 'at': .*tables"),
     ("delta", moves("[]") + "\ntimes = [0.0, 1.0]", "simulate.legs: .*not both"),
-    ("delta", moves("[{ at = 0.1, delta = -1.0 }]"), "one of rate"),
     ("delta", moves("[{ at = 0.1, delta = -1.0, rate = -1 }]"), r"moves\[0\].rate: value -1"),
     ("delta", moves("[{ at = 0.1, delta = -0.26, rate = 1 }]"), "another angle"),
     ("delta", moves("[{ at = 0.1, dleta = 1, rate = 1 }]"), "'delta'"),
     ("delta", moves(OVERLAP), r"legs.moves\[1\].at: value 0.2: .* 0.3 s"),
-    ("delta", "delta = [0.0, 1.0]\ntimes = [1.0, 0.0]", "Legs: times: value"),
     ("duration", "duration = 1\ncontroller = []", r"simulate.controller: value \[\]: .*begin"),
-    ("duration", "duration = 1\ncontroller = 3", r"simulate.controller: value 3"),
 ]
 # what is added to it
 ADDED = {
     '[simulate.controller]\nkind = "pfl"\n': "simulate.controller: .*reference",
-    '[simulate.controller]\nkind = "pdf"\n': "'pfl'",
-    '[simulate.controller]\nkind = "damping"\ndamping = -1.0\n': "damping: value -1.0",
     '[simulate.controller]\nkind = "damping"\nkp = 1.0\n': "'kp': .*'damping'",
     '[[simulate.controller]]\nkind = "none"\n': r"simulate.controller\[0\]: .*begin",
     '[[simulate.controller]]\nbegin = 0\nkind = "pdf"\n': r"controller\[0\].kind: value 'pdf'",
@@ -96,8 +88,6 @@ def test_what_no_model_can_be_is_one_line(scene, tmp_path):
     rows = [
         ("segments", "segments = 1\nparameters = true", "parameters: value true"),
         ("name", 'name = "../elsewhere/t"', "name: value '../elsewhere/t': .*63"),
-        ("name", "name = 3", "name: value 3"),
-        ("name", f"name = {'a' * 240!r}", "name: value 'aaa"),
         ("contacts", f"contacts = [{HEX}]", "contacts: value of type int"),
     ]
     for old, new, words in rows:
@@ -146,43 +136,32 @@ def test_changes_that_name_nothing_are_one_line():
         assert parsed([f"x={value}"]) == {"x": value}
 
 
-def test_what_no_plan_can_be_is_one_line():
+def test_what_no_plan_can_be_is_one_line_and_none_writes_files_or_runs_code():
     rows = [
         ({"start": START | {"q": [0, [1, 2], 3]}}, r"start\[0\]: value \[0, \[1, 2\], 3\]: .*9"),
-        ({"start": START | {"v": "free"}}, r"start\[1\]: value 'free': .*8"),
         ({"damping": 10**400}, "damping: value 1000"),
         ({"smoothing": 1e300}, r"smoothing: value 1e\+300: .* 1e\+100"),
         ({"bounds": {"torque": 1e308}}, r"bounds.torque: value 1e\+308"),
-        ({"goal": {"tail": [10**400, 0]}}, r"goal.tail: value \(1000"),
-        ({"rule": ["radau"]}, r"rule: value \['radau'\]: .*'trapezoidal'"),
-        ({"solver": ["ipopt"]}, r"solver: value \['ipopt'\]"),
         ({"intervals": 10**9}, "intervals: value 1000000000: .*10000"),
-        ({"track": "yes"}, "track: value 'yes': .*True"),
     ]
-
-    def planned(change):
-        st.plan(zoo.model("m1_n3"), **plan_arguments(TASK | change))
-
+    rows += [
+        (change, r"to serpentail\.plan")
+        for change in (
+            {"solver": "../../tmp/solver"},
+            {"solver": "sqpmethod", "options": {"jit": True}},
+            {"options": {"jit": True, "compiler": "shell"}},
+            {"options": {"ipopt.output_file": "somewhere"}},
+            {"options": {"ipopt.option_file_name": "somewhere"}},
+            {"options": {"ipopt.hsllib": "library.so"}},
+            {"options": {"ipopt.max_iter": {"jit": True}}},
+            {"options": {"bonmin.max_iter": 3}},
+            {"options": 3},
+        )
+    ]
     for change, words in rows:
-        with row(change):
-            assert re.search(words, told(st.PlanningError, planned, change))
-
-
-def test_a_scene_can_set_numbers_of_a_solver_but_not_make_it_write_files_or_run_code():
-    wrong = [
-        {"solver": "../../tmp/solver"},
-        {"solver": "sqpmethod", "options": {"jit": True}},
-        {"options": {"jit": True, "compiler": "shell"}},
-        {"options": {"ipopt.output_file": "somewhere"}},
-        {"options": {"ipopt.option_file_name": "somewhere"}},
-        {"options": {"ipopt.hsllib": "library.so"}},
-        {"options": {"ipopt.max_iter": {"jit": True}}},
-        {"options": {"bonmin.max_iter": 3}},
-        {"options": 3},
-    ]
-    for change in wrong:
-        with row(change), pytest.raises(st.PlanningError, match=r"to serpentail\.plan"):
-            plan_arguments(TASK | change)
+        with row(change), pytest.raises(st.PlanningError, match=words) as caught:
+            st.plan(zoo.model("m1_n3"), **plan_arguments(TASK | change))
+        assert len(str(caught.value)) < 700
     options = {"ipopt.max_iter": 100, "ipopt.mu_strategy": "adaptive", "ipopt.tol": 1e-6}
     assert plan_arguments(TASK | {"options": options})["options"] == options
 
@@ -228,24 +207,7 @@ def test_a_scene_without_a_motion(scene):
 KICK = SCENES / "kick_and_land.toml"
 
 
-@pytest.fixture
-def refused(tmp_path, capsys):
-    """Return a function from changes of the scene's text to what the command says against it."""
-
-    def told(change):
-        text = KICK.read_text()
-        for old, new in change.items():
-            assert old in text
-            text = text.replace(old, new)
-        path = tmp_path / "scene.toml"
-        path.write_text(text)
-        assert cli.main(["simulate", str(path), "--folder", str(zoo.folder("ground"))]) == 2
-        return capsys.readouterr().err
-
-    return told
-
-
-def test_one_command_makes_the_landing(capsys):
+def test_one_command_makes_the_landing_and_phases_can_be_changed(capsys):
     folder = str(zoo.folder("ground"))
     assert cli.main(["simulate", str(KICK), "--folder", folder, "--json", "-"]) == 0
     told = json.loads(capsys.readouterr().out)
@@ -253,9 +215,6 @@ def test_one_command_makes_the_landing(capsys):
     assert list(told["phases"]) == ["kick", "right", "land"]
     assert told["phases"]["right"]["plan_is_true"]
     assert told["phases"]["land"]["ended_by"] == "duration"
-
-
-def test_phases_can_be_changed():
     changes = {"phase.0.duration": "0.1 s", "phase.0.moves": []}
     scene = st.scenario(KICK, zoo.folder("ground"), changes)
     run = scene.sequence()
@@ -264,12 +223,12 @@ def test_phases_can_be_changed():
         scene.simulate(t_span=0.1)
 
 
-def test_what_a_phase_cannot_be_is_named(refused):
+def test_what_a_phase_cannot_be_is_named_all_at_once(tmp_path):
     rows = {
         'name = "kick"': ('nam = "kick"', r"phase\[0\]: key: value 'nam': .*'name'"),
         'name = "right"': ("", r"phase\[1\].name: no value"),
         "duration = 1.5": ("", r"phase\[1\].duration: no value"),
-        'until = "airborne"': ('until = "up"', "until: value 'up': .*'airborne'"),
+        'until = "airborne"': ("until = 3", "until"),
         'clearance = "10 mm"': ('clearance = "10 s"', r"phase\[0\].clearance: value '10 s'"),
         'torso_rate = "free"': ('torso_rat = 1', r"phase\[1\].plan.goal: key: value 'torso_rat'"),
         "[phase.plan]": ("[phase.plan]\nstart = {}", "'right': plan.start: value {}"),
@@ -278,8 +237,12 @@ def test_what_a_phase_cannot_be_is_named(refused):
         'delta = "-15 deg"': ('delta = "-15 deg"\nmoves = []', r"simulate.legs.moves: .*phase"),
         "damping = 5e-3": ("damping = -5e-3", "'land': damping: value -0.005"),
     }  # fmt: skip
+    path = tmp_path / "scene.toml"
     for old, (new, words) in rows.items():
-        with row(old):
-            assert re.search(words, refused({old: new}))
-    told = refused({'until = "airborne"': "until = 3", 'name = "land"': "name = 3"})
-    assert "until" in told and "name: value 3" in told  # all at once
+        path.write_text(KICK.read_text().replace(old, new))
+        with row(old), pytest.raises(st.SerpentailError, match=words):
+            st.scenario(path, zoo.folder("ground")).simulate()
+    both = KICK.read_text().replace('until = "airborne"', "until = 3")
+    path.write_text(both.replace('name = "land"', "name = 3"))
+    with pytest.raises(st.SimulationError, match=r"(?s)until.*name: value 3"):
+        st.scenario(path, zoo.folder("ground"))

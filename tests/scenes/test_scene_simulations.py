@@ -31,23 +31,19 @@ def kick(**changes):
 
 
 def test_kick_is_the_papers():
+    """It starts at rest; simulation/test_ground.py has the figures of the motion itself."""
     scene, motion, summary = kick()
     expected = {"take_off_s": (0.404, 1e-3), "com_rise_m": (0.619, 1e-3), "apex_m": (0.632, 2e-3)}
     expected |= {"recontact_s": (1.095, 2e-3), "peak_foot_force_N": (400, 40)}
     for name, (value, tolerance) in expected.items():
         assert summary[name] == pytest.approx(value, abs=tolerance), name
-    at = int(np.argmin(np.abs(motion.t - 0.5)))
     pitch = st.pitch_roll_yaw(motion.q, unwrap=True)[:, 0]
-    assert (pitch[at], motion.v[at, 3]) == pytest.approx((3.80, 26.2), abs=0.1)
-    assert pitch[at] == pytest.approx(3.80, abs=0.01)
+    assert pitch[np.argmin(np.abs(motion.t - 0.5))] == pytest.approx(3.80, abs=0.01)
     assert pitch[np.argmin(np.abs(motion.t - 1.08))] == pytest.approx(18.7, abs=0.05)
-    assert summary["pitch_at_end_rad"] == pitch[-1] and summary["method"] == "ros34pw2"
-
-    # it starts at rest
+    assert summary["pitch_at_end_rad"] == pitch[-1]
     before = motion.t < 0.4
     assert np.abs(motion.q[before] - scene.q0).max() < 1e-3
     assert np.abs(motion.v[before]).max() < 1e-2
-    assert np.degrees(st.pitch_roll_yaw(scene.q0)[0]) == pytest.approx(12.8, abs=0.2)
     loads = motion.contact.forces[0, :3, 2]
     assert loads[:2].min() > 5 * loads[2] > 0  # on A and M
 
@@ -92,11 +88,8 @@ def test_a_plan_has_the_size_of_its_body():
     assert tuple(found["goal"].torso_rate) == (0.5, 0.0, 0.0)
 
 
-@cache
 def of_scene(name):
-    """The generated folder of a scene of the repository: three segments, all groups; no other
-    test needs it, and it takes long.
-    """
+    """The generated folder of a scene that no other test needs, and that takes long."""
     return folder_of(load_scene(SCENES / f"{name}.toml"))
 
 
@@ -112,14 +105,14 @@ def test_a_jumping_rat_stands_again_by_its_tail():
 
 
 @pytest.mark.slow
-def test_a_rat_on_its_back_stands_up_by_its_tail(tmp_path):
+def test_a_rat_on_its_back_stands_up_by_its_tail():
     for name in ("self_recovery", "self_recovery_continuum"):
-        scene, _, summary = simulated(SCENES / f"{name}.toml", of_scene(name))
+        path, folder = SCENES / f"{name}.toml", of_scene(name)
+        scene, _, summary = simulated(path, folder)
         assert scene.q0[2] == pytest.approx(0.0167, abs=2e-4), name
         assert st.rotation_matrix(scene.q0[3:7])[2, 2] < -0.99, name
         assert summary["standing_end"] is True, name
         assert summary["upright_end"] == pytest.approx(0.976, abs=2e-3), name
-    path, folder = SCENES / f"{name}.toml", of_scene(name)
     assert simulated(path, folder, {"controller": PASSIVE})[2]["upright_end"] < 0
 
 
@@ -148,23 +141,6 @@ def test_controllers_follow_one_another(scenario):
     ).simulate()
     apart = np.abs(motion.t - 0.01) > 1e-9
     np.testing.assert_allclose(motion.tau[apart, 0], np.where(motion.t < 0.01, 0, 1e-4)[apart])
-
-
-def test_a_settled_start_is_at_rest(scenario):
-    found = scenario(height="height = 0.05\nsettle = { rounds = 8, duration = 0.25 }")
-    assert found.settings["bristles0"].shape == (9, 2) and not found.v0.any()
-    assert np.abs(found.simulate().q[-1] - found.q0).max() < 1e-3
-
-
-def test_a_start_without_a_torso_has_bends_alone(tmp_path):
-    path = tmp_path / "fixed.toml"
-    text = 'kind = "articulated"\nsegments = 2\nlinks = 2\nbase = "fixed"\n[simulate]\n'
-    path.write_text(text + "duration = 0.01\nstart = {bends = [[0.2, 0.4], [0.6, 0.8]]}\n")
-    found = st.scenario(path, zoo.folder("fixed"))
-    np.testing.assert_allclose(found.q0, [0.1, 0.2, 0.3, 0.4], rtol=1e-15)
-    assert found.v0.shape == (4,) and found.simulate().t[-1] == 0.01
-    with pytest.raises(st.SimulationError, match=r"simulate\.start\.height: .*bends"):
-        st.scenario(path, zoo.folder("fixed"), {"start.height": 1.0})
 
 
 def test_a_saved_motion_is_a_reference(scenario, tmp_path):
@@ -199,9 +175,7 @@ def test_a_pose_is_yaw_pitch_roll_and_legs_are_drawn_there(scenario):
     np.testing.assert_allclose(joints[:, :, 3:], feet, atol=1e-15)
 
     # only where the model has their joints
-    marks = []
-    for _ in range(2):
+    for drawn in (True, False):
         (key,) = motion.filmstrip(frames=2)[0].legends
-        marks.append([text.get_text() for text in key.get_texts()])
+        assert ("leg" in [text.get_text() for text in key.get_texts()]) is drawn
         found.model.kernels.pop("leg_points", None)
-    assert "leg" in marks[0] and "leg" not in marks[1]

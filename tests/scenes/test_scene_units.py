@@ -3,7 +3,6 @@
 import re
 from dataclasses import fields
 from math import pi, radians
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,11 +16,8 @@ from serpentail.scenes.keys import read
 from serpentail.scenes.plan import CODE_ONLY, plan_arguments
 from serpentail.scenes.plan_keys import BOUNDS, GOAL, PLAN
 from serpentail.scenes.simulate_keys import SIMULATE
-from serpentail.units import MEASURES
 from tests.support import zoo
 from tests.support.rows import row
-
-DOCUMENT = (Path(__file__).parents[2] / "docs" / "scenes.md").read_text(encoding="utf-8")
 
 
 def test_a_motion_with_units_is_that_in_si(scenario):
@@ -205,21 +201,3 @@ def test_a_scene_in_grams_millimetres_and_degrees_is_told(scene, capsys):
         for name, words in (("torso_mass", "105.7 g"), ("pitch", "20 deg"), ("height", "300 mm"))
     ]
     assert_told(err.splitlines(), expected)
-
-
-# The document.
-
-
-def test_the_document_has_every_unit_and_a_motion(tmp_path, monkeypatch):
-    rows = DOCUMENT.split("| what | units |")[1].split("\n\n")[0].splitlines()[2:]
-    listed = {unit for line in rows for unit in line.split("|")[2].strip().split(", ")}
-    assert listed == {unit for _, units in MEASURES.values() for unit in units}
-    monkeypatch.chdir(tmp_path)
-    text = re.findall(r"^```toml\n(.*?)^```$", DOCUMENT, re.MULTILINE | re.DOTALL)[0]
-    Path("rat.toml").write_text(text)
-    found = st.scenario("rat.toml", zoo.folder("m1_n3"))
-    assert found.duration == 0.6 and found.v0[2] == 3.0 and found.q0[2] == 0.3
-    assert found.controller == st.Damping(1e-3)
-    parameters = found.model.parameters
-    assert parameters["torso_mass"] == 0.1057
-    assert parameters["torso_inertia"] == (6.72e-5, 3.64e-5, 7.28e-5)

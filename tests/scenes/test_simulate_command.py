@@ -31,32 +31,18 @@ def simulate(scene, capsys):
 
 def test_simulate_prints_one_json_object_and_saves_files_of_all_kinds(simulate):
     sets = ["--set", "mu=0.5", "--set", "duration=0.01", "--set", "start.height=12 cm"]
-    readers = {
-        "a.npz": lambda path: st.Trajectory.load(path).t,
-        "new/a": lambda path: st.Trajectory.load(f"{path}.npz").t,
-        "a.csv": csv_times,
-        "a.nc": netcdf_times,
-    }
-    for path, times_of in readers.items():
-        with row(path):
-            status, out, err = simulate(*sets, "--save", path, "--json", "-")
-            assert (status, err, out.count("\n")) == (0, "", 1)
-            times = times_of(path)
-            assert times[-1] == 0.01 and len(times) == 201
+    for path in ("a.npz", "new/a", "a.csv", "a.nc"):
+        status, out, err = simulate(*sets, "--save", path, "--json", "-")
+        assert (status, err, out.count("\n")) == (0, "", 1), path
     names = "take_off_s apex_m com_rise_m recontact_s pitch_at_end_rad upright_end steps cpu_s"
     names += " peak_foot_force_N real_time_factor method"
     assert set(names.split()) <= set(json.loads(out))
     saved = st.Trajectory.load("a.npz")
     assert saved.info["parameters"]["mu"] == 0.5 and saved.q[0, 2] == 0.12
-
-
-def csv_times(path):
-    return [float(line.partition(",")[0]) for line in Path(path).read_text().splitlines()[1:]]
-
-
-def netcdf_times(path):
-    with netcdf_file(path, mmap=False) as file:
-        return file.variables["time"][:].copy()
+    times = [float(line.split(",")[0]) for line in Path("a.csv").read_text().splitlines()[1:]]
+    assert times == list(saved.t) == list(st.Trajectory.load("new/a.npz").t)
+    with netcdf_file("a.nc", mmap=False) as file:
+        assert times == file.variables["time"][:].tolist() and len(times) == 201
 
 
 def test_simulate_tells_units_and_warnings_and_draws(simulate):
@@ -70,12 +56,6 @@ def test_simulate_tells_units_and_warnings_and_draws(simulate):
     assert [path.name for path in Path("new").iterdir()] == ["a.svg"]
     told = json.loads(simulate(*bent, "--json", "-")[1])
     assert any("segment 1 is bent by 4 rad" in each for each in told["warnings"])
-
-
-def test_wrong_sets_are_status_2(simulate):
-    for given in ("mu=-1", "mu", "duration=0"):
-        status, out, err = simulate("--set", given, "--json", "-")
-        assert (status, out) == (2, "") and given.split("=")[0] in err
 
 
 def test_a_flight_is_generated_where_there_is_no_folder(tmp_path, monkeypatch, capsys):
@@ -92,12 +72,6 @@ def test_a_flight_is_generated_where_there_is_no_folder(tmp_path, monkeypatch, c
     assert summary["method"] == "tsit5" and summary["take_off_s"] is summary["standing_end"] is None
     assert summary["com_rise_m"] == pytest.approx(2 * 0.1 - 4.9 * 0.01, abs=0.01)
     assert [path.name for path in Path().iterdir()] == ["tumble.toml"]
-    wrong = {"start = { settle = {} }\n": (text, "settle")}
-    wrong |= {start: (text.replace("links = 1", "links = 0"), "could not be generated: .*links")}
-    for begin, (head, words) in wrong.items():
-        Path("wrong.toml").write_text(f"{head}duration = 0.1\n{begin}")
-        assert cli.main(["simulate", "wrong.toml"]) == 2
-        assert re.search(words, capsys.readouterr().err)
 
 
 # Files to write.
@@ -105,18 +79,12 @@ def test_a_flight_is_generated_where_there_is_no_folder(tmp_path, monkeypatch, c
 
 def test_a_target_that_cannot_be_is_refused_before_the_run(simulate, monkeypatch):
     monkeypatch.setattr(st.Scenario, "simulate", None)
-    access = lambda folder, _: str(folder) != "/proc"  # noqa: E731 - there no folder can be
-    monkeypatch.setattr("os.access", access)
     rows = [
         ("--save", "simple.toml/a.npz", "simple.toml is not a folder"),
-        ("--save", ".", ". is a folder"),
         ("--save", "motions/", "motions/ is a folder"),
         ("--save", "a.dat", r"\.dat, .*\.npz, \.csv, \.nc"),
-        ("--save", "a.csv/a.v2", r"\.v2"),
         ("--film", "simple.toml/deep/a.png", "simple.toml is not a folder"),
         ("--film", "a.avi", r"'\.avi': .*\.gif, \.html, \.mp4, \.pdf, \.png, \.svg"),
-        ("--film", "a", "''"),
-        ("--save", "/proc/a.npz", "written|not a folder"),
     ]
     for option, path, words in rows:
         with row(option, path):
