@@ -7,6 +7,7 @@ import subprocess
 import sys
 import sysconfig
 import tracemalloc
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,6 @@ from ...support.rows import row
 from .conftest import ARGUMENTS, CALLS, FORMS, assert_same, call, state, states
 
 HEADERS = Path(sysconfig.get_path("include"))
-WARNINGS = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
 
 
 def by_ctypes(model):
@@ -68,17 +68,21 @@ def test_calls_hold_neither_results_nor_arguments_and_leave_nothing_in_memory(mo
     s, other = state(), state()["q"].astype("datetime64[s]")
 
     def work(times):
-        for _ in range(times):
+        for k in range(times):
             model.forward_dynamics(s["q"], s["v"], s["tau"])
             model.energy(s["q"], s["v"])
-            model.momentum(s["q"], FORMS["strided"](s["v"]))
-        for _ in range(times // 100):
-            with pytest.raises(st.StateError):
-                model.energy(other, s["v"])
-            with pytest.raises(st.StateError):
-                model.mass_matrix(0 * s["q"])
+            model.momentum(s["q"], FORMS["spread"](s["v"]))
+            if k % 100 == 0:
+                for wrong in (other, 0 * s["q"]):
+                    with pytest.raises(st.StateError):
+                        model.energy(wrong, s["v"])
+        return now()
+
+    def now():
+        """Bytes that Python holds, and pages of the process."""
         gc.collect()
-        return np.array([tracemalloc.get_traced_memory()[0], pages()])
+        pages = Path("/proc/self/statm").read_text().split()[1]
+        return np.array([tracemalloc.get_traced_memory()[0], int(pages)])
 
     tracemalloc.start()
     try:
@@ -86,16 +90,11 @@ def test_calls_hold_neither_results_nor_arguments_and_leave_nothing_in_memory(mo
         grown = -work(1000) + work(15_000)
     finally:
         tracemalloc.stop()
-    assert grown[0] < 15_000  # bytes: of each call less than one
-    before = pages()
+    assert grown[0] < 15_000  # of each call less than one
+    grown -= now()
     for _ in range(300):
         copy.copy(model).energy(s["q"], s["v"])
-    gc.collect()
-    assert (grown[1] + pages() - before) * os.sysconf("SC_PAGE_SIZE") < 1_000_000
-
-
-def pages():
-    return int(Path("/proc/self/statm").read_text().split()[1])
+    assert (grown + now())[1] * os.sysconf("SC_PAGE_SIZE") < 1_000_000
 
 
 def test_a_call_keeps_what_it_works_on(model):
@@ -134,6 +133,20 @@ def test_a_call_within_a_call(model):
     assert found and set(found) == {expected[1]} and set(outer) == {expected[0]}
 
 
+def test_threads_share_a_model(model):
+    """By ctypes other threads run while C does."""
+    rows = list(zip(*map(states(300).get, ("q", "v", "tau")), strict=True))
+    expected, usual = [model.forward_dynamics(*each) for each in rows], sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)  # as often as can be
+    try:
+        for function in (each.forward_dynamics for each in (model, by_ctypes(model))):
+            with ThreadPoolExecutor(8) as pool:
+                found = pool.map(function, *zip(*(8 * rows), strict=True))
+                np.testing.assert_array_equal(list(found), 8 * expected)
+    finally:
+        sys.setswitchinterval(usual)
+
+
 def test_where_it_cannot_be_had_or_calls_are_long_ctypes_serves(model, monkeypatch, tmp_path):
     assert (calls.extension() is not None) == (HEADERS / "Python.h").is_file()
     monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path))
@@ -146,20 +159,20 @@ def test_where_it_cannot_be_had_or_calls_are_long_ctypes_serves(model, monkeypat
             change(changed)
             assert calls.extension.__wrapped__() is None
     for owner, name, lack in ((calls, "extension", lambda: None), (kernel, "MOST_HELD", 0)):
-        with monkeypatch.context() as changed:
-            changed.setattr(owner, name, lack)
-            other = copy.copy(model)
-            for function in CALLS:
-                with row(name, function):
-                    found = call(other, function, state())
-                    call(other, function, state(2))
-                    assert_same(found, call(model, function, state()))
-                    assert other.kernels[function].fast in (calls.declined, None)
+        monkeypatch.setattr(owner, name, lack)
+        other = copy.copy(model)
+        for function in CALLS:
+            with row(name, function):
+                found = call(other, function, state())
+                call(other, function, state(2))
+                assert_same(found, call(model, function, state()))
+                assert other.kernels[function].fast in (calls.declined, None)
+        monkeypatch.undo()
 
 
 def test_it_compiles_without_warnings(tmp_path):
-    made = str(tmp_path / "calls.o")
-    headers = ("-isystem", str(HEADERS))
-    command = (*next(iter(candidates())), *WARNINGS, *headers, "-c", str(calls.SOURCE), "-o", made)
+    flags = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror", "-c")
+    places = ("-isystem", HEADERS, calls.SOURCE, "-o", tmp_path / "calls.o")
+    command = [*next(iter(candidates())), *flags, *places]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
