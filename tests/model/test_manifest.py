@@ -5,6 +5,7 @@ Those of one target alone evaluate what is there, and refuse what is not; the zo
 
 import json
 import os
+import pickle
 import shutil
 
 import casadi
@@ -49,67 +50,19 @@ def test_folder_without_manifest_says_how_to_make_one(folder, tmp_path):
 
 
 def test_intact_copy_and_settings_of_load(folder):
-    assert st.load(folder).name == st.load(str(folder)).name == "bare"
     edit(folder, lambda manifest: dict(sorted(manifest.items())))  # the same, laid out anew
-    assert st.load(folder).name == "bare"
-    for name, value in (("compiled", 1), ("threads", 0), ("threads", True)):
-        with row(name), pytest.raises(st.ModelError, match=f"{name}: value {value}"):
+    assert st.load(str(folder)).name == "bare"
+    for name, value in (("compiled", 1), ("threads", 0), ("threads", True), ("profile", "quick")):
+        with row(name), pytest.raises(st.SerpentailError, match=f"{name}: value '?{value}"):
             st.load(folder, **{name: value})
-    scene = json.loads((folder / "manifest.json").read_text())["scene"]
+    scene, libraries = json.loads((folder / "manifest.json").read_text())["scene"], set()
     for profile in ("fast", "reproducible"):  # the scene's, unless one is asked for
         edit(folder, signed, scene=scene | {"profile": profile})
-        assert st.load(folder).profile == profile
+        found = st.load(folder)
+        assert found.profile == profile
+        libraries.add(found.library._name)
+    assert len(libraries) == 2 and st.load(folder, profile="fast").library._name in libraries
     assert st.load(folder, profile="fast").profile == "fast"
-
-
-def test_damaged_manifest(folder):
-    path = folder / "manifest.json"
-    whole = path.read_text()
-    for text in ("", "{", "[]", "{}", "null", '{"format": 2}', "\xff", whole[:-100]):
-        with row(text[:20]):
-            path.write_text(text, encoding="latin-1")
-            refused(folder, f"{path} is damaged (", "generate it again")
-    for key in (
-        *("format", "generator", "abi_hash", "prefix", "real", "scene", "dimensions", "parameters"),
-        *("functions", "work", "batch", "files", "manifest_hash"),
-    ):
-        with row(key):
-            path.write_text(whole)
-            edit(folder, **{key: None})
-            refused(folder, "manifest.json is damaged (", key)
-
-
-def test_folder_of_another_generator_is_stale(folder):
-    whole = (folder / "manifest.json").read_text()
-    for change in ({"generator": "0.0.9"}, {"format": 1}, {"generator": "0.9", "parameters": None}):
-        with row(change):
-            (folder / "manifest.json").write_text(whole)
-            edit(folder, **change)
-            made, now = f"format {change.get('format', 2)}, ", f"format 2, {st.__version__}"
-            refused(folder, f"{folder} is stale", made, now, "generate it again")
-
-
-def test_changed_missing_and_strange_files_are_named(folder):
-    for name in ("src/bare.c", "src/bare_host.c", "include/bare.h", "bare_casadi.py"):
-        path = folder / name
-        text = path.read_text()
-        with row(name):
-            path.write_text(text + " ")
-            refused(folder, f"{path} was changed after it was generated", f"delete {folder}")
-            path.unlink()
-            refused(folder, f"{path} cannot be read (No such file", f"delete {folder}")
-            path.write_text(text)
-    for name in ("manifest.json", "src/bare.c"):
-        path = folder / name
-        text = path.read_text()
-        for make in (os.mkfifo, os.mkdir):
-            with row(name, make):
-                path.unlink()
-                make(path)
-                refused(folder, "cannot be read (not a regular file)")
-                (os.rmdir if make is os.mkdir else os.unlink)(path)
-                path.write_text(text)
-    assert st.load(folder).name == "bare"
 
 
 def larger(manifest):
@@ -124,14 +77,55 @@ def heavier(manifest):
     return manifest
 
 
-def test_manifest_changed_by_hand_is_named(folder):
+def test_damaged_stale_and_changed_manifests_are_named(folder):
     path = folder / "manifest.json"
-    whole = path.read_text()
-    for change in (larger, heavier, lambda manifest: manifest | {"work": {"x": 1}}):
-        with row(change):
+    whole, changed = path.read_text(), f"{path} was changed after it was generated"
+    for text in ("", "{", "[]", "{}", "null", '{"format": 2}', "\xff", whole[:-100]):
+        with row(text[:20]):
+            path.write_text(text, encoding="latin-1")
+            refused(folder, f"{path} is damaged (", "generate it again")
+    keys = ("format", "generator", "abi_hash", "prefix", "real", "scene", "dimensions")
+    more = ("parameters", "functions", "work", "batch", "files", "manifest_hash")
+    rows = [({key: None}, ("manifest.json is damaged (", key)) for key in (*keys, *more)]
+    now = (f"{folder} is stale", f"format 2, {st.__version__}", "generate it again")
+    rows += [
+        ({"generator": "0.0.9"}, (*now, "format 2, generator 0.0.9")),
+        ({"format": 1}, (*now, "format 1, ")),
+        ({"generator": "0.9", "parameters": None}, now),
+        ({"change": larger}, (changed, "parameters=...")),
+        ({"change": heavier}, (changed, "parameters=...")),
+        ({"work": {"x": 1}}, (changed, "parameters=...")),
+    ]
+    for changes, words in rows:
+        with row(changes):
             path.write_text(whole)
-            edit(folder, change)
-            refused(folder, f"{path} was changed after it was generated", "parameters=...")
+            edit(folder, **changes)
+            refused(folder, *words)
+
+
+def test_changed_missing_and_strange_files_are_named(folder):
+    held = folder / "held"
+    for name in (
+        "manifest.json",
+        "src/bare.c",
+        "src/bare_host.c",
+        "include/bare.h",
+        "bare_casadi.py",
+    ):
+        path = folder / name
+        path.rename(held)
+        puts = [(make, "cannot be read (not a regular file)") for make in (os.mkfifo, os.mkdir)]
+        if name != "manifest.json":
+            edited = held.read_text() + " "
+            puts.append((lambda path, text=edited: path.write_text(text), "was changed after it"))
+            puts.append((lambda _: None, "cannot be read (No such file"))
+        for put, words in puts:
+            with row(name, words):
+                put(path)
+                refused(folder, f"{path} {words}", f"delete {folder}")
+                path.rmdir() if path.is_dir() else path.unlink(missing_ok=True)
+        held.rename(path)
+    assert st.load(folder).name == "bare"
 
 
 def test_manifest_of_other_code_or_outside_its_folder_is_refused(folder):
@@ -159,12 +153,16 @@ Q = [0, 0, 0, 1, 0, 0, 0, 0.3, -0.2]
 STATE = Q, [0.5] * 8, [0.1, 0.2]
 
 
-def test_a_model_without_c():
+def test_a_model_without_c_needs_no_cache(monkeypatch, tmp_path):
     names = ["forward_dynamics", "rollout"]
     symbolic = folder_of(zoo.scene("bare", functions=names, targets=["casadi"]))
+    both = zoo.model("bare")
+    monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path / "file" / "cache"))
+    (tmp_path / "file").touch()
     names = sorted(path.name for path in symbolic.iterdir())
     assert names == ["bare_casadi.py", "manifest.json"]
-    model, both = st.load(symbolic, compiled=False), zoo.model("bare")
+    for folder in (zoo.folder("bare"), symbolic):
+        model = pickle.loads(pickle.dumps(st.load(folder, compiled=False)))
     assert model.generated == ("forward_dynamics",)
     found = model.casadi.forward_dynamics(*STATE).full()[:, 0]
     np.testing.assert_allclose(found, both.forward_dynamics(*STATE), rtol=1e-12)

@@ -2,8 +2,6 @@
 what to do; what no animal or robot has is told.
 """
 
-import re
-import subprocess
 import warnings
 
 import numpy as np
@@ -18,6 +16,8 @@ from serpentail_codegen.scene.shape import EQUAL
 from tests.support import zoo
 from tests.support.models import folder_of
 from tests.support.rows import row
+
+from .compiler.conftest import forbid_processes
 
 TOTAL = 4  # links of "m2_n2"
 INERTIA = (2.5e-07, 3.9e-09, 2.6e-07)
@@ -62,6 +62,9 @@ def test_link_inertia_and_what_it_follows_from_replace_each_other(manifest, give
     assert resolve(given.manifest, {"tail_mass": 0.1})["link_inertia"] == INERTIA
     values = resolve(given.manifest, {"link_radius": 0.01})
     assert values["link_inertia"] == ellipsoid(values, 1)
+    late = zoo.model("bare").with_parameters(**GIVEN)
+    found, expected = (each.forward_dynamics(*STATE) for each in (late, given))
+    assert late.parameters == given.parameters and np.array_equal(found, expected)
 
 
 def test_flat_is_the_struct(manifest):
@@ -98,23 +101,21 @@ WRONG = {
 
 
 def test_wrong_value_is_named_with_its_unit_or_the_rule_that_it_breaks(manifest):
-    units = {p.name: p.unit for p in PARAMETERS}
-    told = [
-        (n, value, re.escape(f"({units[n]})")) for n, values in WRONG.items() for value in values
-    ]
+    units = {p.name: f"({p.unit})" for p in PARAMETERS}
+    rows = [(name, value, units[name]) for name, values in WRONG.items() for value in values]
     for name, value, words in (
-        *told,
+        *rows,
         ("torso_inertia", "1 g cm2", "here is 1 number$"),
         ("torso_inertia", [1e-5, 1e-5, 9e-5], "here 9e-05 is above 2e-05$"),
         ("torso_inertia", [1e-5, 1e-5, 0], "sum of the other two$"),
         ("tail_mount", [1, 2], "here are 2 numbers$"),
-        ("tail_mount", [1, 2, np.nan], r"3 finite numbers \(m\)$"),
+        ("tail_mount", [1, 2, np.nan], "3 finite numbers (m)$"),
         ("torso_mass", "217 deg", "an angle where a mass"),
         ("tail_length", "3 s", "a time where a length"),
     ):
         with row(name, value):
             message = refusal(manifest, {name: value})
-            assert re.match(f"(?s)parameters: {name}: value .*{words}", message), message
+            assert message.startswith(f"parameters: {name}: value ") and words in f"{message}$"
 
 
 def test_unknown_names_and_all_problems_come_at_once(manifest):
@@ -134,23 +135,13 @@ def test_unknown_names_and_all_problems_come_at_once(manifest):
 def test_parameters_change_without_a_compiler(monkeypatch):
     """Mass and inertia twice as large make H twice as large, bit for bit."""
     model = zoo.model("m1_n1")
-
-    def refuse(*_args, **_options):
-        raise AssertionError("a process was started")
-
-    monkeypatch.setattr(subprocess, "Popen", refuse)
+    forbid_processes(monkeypatch)
     double = {name: 2 * model.parameters[name] for name in ("torso_mass", "tail_mass")}
     double["torso_inertia"] = 2 * np.array(model.parameters["torso_inertia"])
     for heavy in (st.load(model.folder, double), model.with_parameters(**double)):
         assert np.array_equal(heavy.mass_matrix(Q), 2 * model.mass_matrix(Q))
         inertia = 2 * np.array(model.parameters["link_inertia"])
         assert heavy.parameters["link_inertia"] == tuple(inertia)
-
-
-def test_parameters_given_late_are_those_of_a_scene(given):
-    late = zoo.model("bare").with_parameters(**GIVEN)
-    found, expected = (each.forward_dynamics(*STATE) for each in (late, given))
-    assert late.parameters == given.parameters and np.array_equal(found, expected)
 
 
 def test_changes_add_up_and_the_first_model_keeps_its_own():
