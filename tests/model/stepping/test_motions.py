@@ -101,11 +101,9 @@ def test_a_run_on_the_ground_is_what_simulate_makes_of_it():
 
 
 def test_a_flight_by_implicit_steps_is_near_the_explicit():
-    values = pressing(2)
+    values, model = pressing(2), zoo.model("ground")
     values["q"][:, 2] += 1.0
-    implicit, explicit = (
-        stepped(zoo.model("ground"), values, FINE, steps=20, **method)
-        for method in ({}, {"method": "rk4"})
-    )
+    ways = ({}, {"method": "rk4"})
+    implicit, explicit = (stepped(model, values, FINE, steps=20, **way) for way in ways)
     np.testing.assert_allclose(implicit[:, :9], explicit[:, :9], atol=1e-6)
     assert not np.array_equal(implicit, explicit)
