@@ -2,17 +2,18 @@
 what to do; what no animal or robot has is told.
 """
 
+import copy
+import pickle
 import warnings
 
 import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.model.parameters import RunParameters, ellipsoid, flat, flat_names, resolve
+from serpentail.model.parameters import RunParameters, ellipsoid, resolve
 from serpentail_codegen.scene.parameters import PARAMETERS
 from serpentail_codegen.scene.parse import parse_scene
 from serpentail_codegen.scene.resolve import resolve_parameters
-from serpentail_codegen.scene.shape import EQUAL
 from tests.support import zoo
 from tests.support.models import folder_of
 from tests.support.rows import row
@@ -65,15 +66,6 @@ def test_link_inertia_and_what_it_follows_from_replace_each_other(manifest, give
     late = zoo.model("bare").with_parameters(**GIVEN)
     found, expected = (each.forward_dynamics(*STATE) for each in (late, given))
     assert late.parameters == given.parameters and np.array_equal(found, expected)
-
-
-def test_flat_is_the_struct(manifest):
-    values = resolve(manifest, {"tail_mount": (1, 2, 3)})
-    of_equal = [p for p in PARAMETERS if EQUAL.numbers_of(p.tail) and not p.needs]
-    own = [p.name for p in of_equal if p.name != "link_radius"]
-    assert flat(manifest, values) == np.hstack([values[name] for name in own]).tolist()
-    assert flat(manifest, values)[5:8] == [1.0, 2.0, 3.0]
-    assert flat_names(manifest)[4:6] == ("torso_inertia[2]", "tail_mount[0]")
 
 
 def test_numbers_in_any_row_of_any_type_and_with_units(manifest):
@@ -165,7 +157,8 @@ def test_baked_model_has_the_same_values_and_refuses_others():
     baked, model = zoo.model("baked"), zoo.model("m1_n3")
     found, expected = (each.forward_dynamics(*STATE) for each in (baked, model))
     np.testing.assert_allclose(found, expected, rtol=1e-9)
-    assert baked.with_parameters().parameters == model.parameters
+    for twin in (baked.with_parameters(), copy.deepcopy(baked), pickle.loads(pickle.dumps(baked))):
+        assert twin.parameters == model.parameters
     assert dict(resolve(baked.manifest, {})) == dict(resolve_parameters({}, 3))
     for attempt in (lambda p: baked.with_parameters(**p), lambda p: st.load(baked.folder, p)):
         with pytest.raises(st.ModelError, match="baked = false"):

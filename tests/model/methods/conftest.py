@@ -39,16 +39,11 @@ CALLS = {
 ARGUMENTS = {name: arguments.split() for name, (arguments, _) in CALLS.items()}
 
 
-def sizes(segments, links):
-    tail, points = 2 * segments, segments * links + 1
-    found = dict.fromkeys(("v", "v_dot", "dq", "dv", "multiplier"), 6 + tail)
-    found |= dict.fromkeys(("tau", "dtau", "accelerations"), tail)
-    found |= {"q": 7 + tail, "f_ext": 6 + 3 * points, "points": points}
-    return found | {"x": 4 + 2 * tail, "angular": 3, "weights": 7 + 2 * tail, "given": 4 + 3 * tail}
-
-
-SIZES = sizes(2, 2)  # of the zoo's "m2_n2"
-NV, POINTS = SIZES["v"], SIZES["points"]
+NV, NT, POINTS = 10, 4, 5  # of the zoo's "m2_n2"
+SIZES = dict.fromkeys(("v", "v_dot", "dq", "dv", "multiplier"), NV)
+SIZES |= dict.fromkeys(("tau", "dtau", "accelerations"), NT)
+SIZES |= {"q": 7 + NT, "f_ext": 6 + 3 * POINTS, "points": POINTS}
+SIZES |= {"x": 4 + 2 * NT, "angular": 3, "weights": 7 + 2 * NT, "given": 4 + 3 * NT}
 
 
 def shapes(name):
@@ -58,14 +53,14 @@ def shapes(name):
     return [shape(words) for words in CALLS[name][1].split()]
 
 
-def states(count, seed=1, sizes=SIZES):
+def states(count, seed=1):
     """Return arguments by name, each (count, size), the quaternions of any norm."""
     rng = np.random.default_rng(seed)
-    return {name: rng.uniform(-2, 2, (count, size)) for name, size in sizes.items()}
+    return {name: rng.uniform(-2, 2, (count, size)) for name, size in SIZES.items()}
 
 
-def state(seed=1, sizes=SIZES):
-    return {name: rows[0] for name, rows in states(1, seed, sizes).items()}
+def state(seed=1):
+    return {name: rows[0] for name, rows in states(1, seed).items()}
 
 
 def call(model, name, arguments):

@@ -40,6 +40,13 @@ def answer(model, name, arguments):
     return [(type(o), o.dtype, o.shape, o.flags.writeable, o.tobytes()) for o in outputs]
 
 
+def test_matching_arrays_take_the_fast_way_and_others_do_not(model):
+    s = state()
+    model.energy(s["q"], s["v"])
+    fast, there = model.kernels["energy"].fast, calls.extension() is not None
+    assert (fast(s["q"], s["v"]) is not None) == there and fast(s["q"], [0] * 10) is None
+
+
 def test_both_ways_give_the_same_bits_and_words(model):
     single, floats = st.load(zoo.folder("single")), {k: np.float32(a) for k, a in state().items()}
     for each, givens in ((model, (state(), states(1), states(3))), (single, (state(), floats))):

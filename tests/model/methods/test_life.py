@@ -1,9 +1,6 @@
-"""Models of floats, their names, copies, what they keep alive, and x_dot."""
+"""Models of floats, their names, what they keep alive, and x_dot."""
 
-import copy
 import gc
-import pickle
-import sys
 import weakref
 
 import numpy as np
@@ -14,7 +11,7 @@ import serpentail as st
 from tests.support import zoo
 
 from ...support.rows import row
-from .conftest import CALLS, NV, POINTS, SIZES, assert_same, call, sizes, state, states
+from .conftest import CALLS, NV, POINTS, SIZES, assert_same, call, state, states
 
 
 def assert_close(found, expected, rtol, atol):
@@ -89,34 +86,6 @@ def test_kernel_keeps_what_it_needs():
     del kernel
     gc.collect()
     assert kept[0]() is None
-
-
-def test_copies_are_models(model):
-    originals = [model, zoo.model("baked")]
-    originals += [model.with_parameters(tail_mass=0.05, link_inertia=(1, 1, 1))]
-    ways = (copy.copy, copy.deepcopy, lambda m: pickle.loads(pickle.dumps(m)))
-    for original in originals:
-        given = state(sizes=sizes(original.segments, original.links))
-        for k, duplicate in enumerate(ways):
-            twin = duplicate(original)
-            assert twin is not original and twin.parameters == original.parameters
-            for name in CALLS:
-                with row(original, k, name):
-                    assert_same(call(twin, name, given), call(original, name, given))
-
-
-def test_one_state_costs_few_calls(model):
-    """A call on matching arrays runs three Python functions: it converts no arguments."""
-    s, events = state(), []
-    model.forward_dynamics(s["q"], s["v"], s["tau"])
-    sys.setprofile(lambda frame, event, _: events.append((event, frame.f_code.co_name)))
-    try:
-        model.forward_dynamics(s["q"], s["v"], s["tau"])
-    finally:
-        sys.setprofile(None)
-    entered = [name for event, name in events if event == "call"]
-    assert entered == ["forward_dynamics", "kernel", "__call__"]
-    assert sum(event == "c_call" for event, _ in events) < 10
 
 
 # x_dot: the equations of motion as one first-order system
