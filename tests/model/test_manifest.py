@@ -41,14 +41,6 @@ def refused(folder, *words):
         assert word in str(caught.value)
 
 
-def test_folder_without_manifest_says_how_to_make_one(folder, tmp_path):
-    for place in ("nowhere", "bare/src", "bare/manifest.json"):
-        with row(place):
-            refused(tmp_path / place, f"{tmp_path / place} is not a generated", "make model")
-    with pytest.raises(st.ModelError, match="folder: value 3"):
-        st.load(3)
-
-
 def test_intact_copy_and_settings_of_load(folder):
     edit(folder, lambda manifest: dict(sorted(manifest.items())))  # the same, laid out anew
     assert st.load(str(folder)).name == "bare"
@@ -128,7 +120,13 @@ def test_changed_missing_and_strange_files_are_named(folder):
     assert st.load(folder).name == "bare"
 
 
-def test_manifest_of_other_code_or_outside_its_folder_is_refused(folder):
+def test_folders_that_are_none_or_lead_out_and_code_that_is_not_theirs(folder, monkeypatch):
+    for place in ("nowhere", "bare/src", "bare/manifest.json"):
+        with row(place):
+            path = folder.parent / place
+            refused(path, f"{path} is not a generated", "make model")
+    with pytest.raises(st.ModelError, match="folder: value 3"):
+        st.load(3)
     (folder.parent / "outside.c").write_text("")
     files = json.loads((folder / "manifest.json").read_text())["files"]
     for name in ("../outside.c", "/etc/passwd", "src/../../outside.c", "a\0"):
@@ -137,9 +135,6 @@ def test_manifest_of_other_code_or_outside_its_folder_is_refused(folder):
             refused(folder, "leads out of the folder")
     edit(folder, signed, files=files, abi_hash="0123456789abcdef")
     refused(folder, "the manifest 0123456789abcdef", f"delete {folder}")
-
-
-def test_library_that_cannot_be_loaded(folder, monkeypatch):
     foreign = folder / "foreign.so"
     foreign.write_text("of another machine")
     monkeypatch.setattr("serpentail.model.library.model_library", lambda *_: foreign)
@@ -154,9 +149,8 @@ STATE = Q, [0.5] * 8, [0.1, 0.2]
 
 
 def test_a_model_without_c_needs_no_cache(monkeypatch, tmp_path):
-    names = ["forward_dynamics", "rollout"]
+    names, both = ["forward_dynamics", "rollout"], zoo.model("bare")
     symbolic = folder_of(zoo.scene("bare", functions=names, targets=["casadi"]))
-    both = zoo.model("bare")
     monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path / "file" / "cache"))
     (tmp_path / "file").touch()
     names = sorted(path.name for path in symbolic.iterdir())

@@ -101,7 +101,7 @@ def moving(request):
 
 
 def test_x_dot_is_of_turns_and_accelerations_and_mends_the_norm(moving):
-    """The square s of the norm follows s_dot = 2 (1 - s) s."""
+    """The square s of the norm follows s_dot = 2 (1 - s) s; states may be in rows."""
     (model, x, u), h = moving, 1e-6
     nq, omega, x_dot = model.nq, x[model.nq + 3 : model.nq + 6], model.x_dot(x, u)
     assert np.array_equal(x_dot[:3], x[nq : nq + 3])
@@ -113,6 +113,19 @@ def test_x_dot_is_of_turns_and_accelerations_and_mends_the_norm(moving):
     x[3:7] *= 1.1
     expected = 1.1 * x_dot[3:7] + (1 - 1.21) * x[3:7]
     assert np.allclose(model.x_dot(x, u)[3:7], expected, rtol=1e-13, atol=1e-13)
+    assert np.array_equal(model.x_dot(np.stack([x, 2 * x]), u)[0], model.x_dot(x, u))
+    A, B = model.x_dot_derivatives(x, np.stack([u, 3 * u]))
+    assert np.array_equal(A[1], model.x_dot_derivatives(x, 3 * u)[0])
+    assert B.shape == (2, len(x), len(u))
+    for wrong, words in (
+        (x[1:], rf"x has shape \({len(x) - 1},\).*{len(x)}.*\({nq}\).*\({model.nv}\)"),
+        (np.float64(1), r"x has shape \(\)"),
+        (x * np.nan, r"x\[0\]: value nan"),
+        (0 * x, "quaternion"),
+    ):
+        for method in (model.x_dot, model.x_dot_derivatives):
+            with row(words), pytest.raises(st.StateError, match=words):
+                method(wrong, u)
 
 
 def test_values_and_derivatives_are_casadis_interpreted_and_compiled(moving):
@@ -130,20 +143,3 @@ def test_values_and_derivatives_are_casadis_interpreted_and_compiled(moving):
             assert np.abs(own - other.full()).max() < 1e-12 * np.abs(own).max()
     by_x = folded.factory("J", ["x", "u"], ["jac:x_dot:x"])(x, u).full()
     assert np.allclose(by_x, model.x_dot_derivatives(x, u)[0], rtol=1e-11, atol=1e-11)
-
-
-def test_states_in_rows_and_what_is_none(moving):
-    model, x, u = moving
-    assert np.array_equal(model.x_dot(np.stack([x, 2 * x]), u)[0], model.x_dot(x, u))
-    A, B = model.x_dot_derivatives(x, np.stack([u, 3 * u]))
-    assert np.array_equal(A[1], model.x_dot_derivatives(x, 3 * u)[0])
-    assert B.shape == (2, len(x), len(u))
-    for wrong, words in (
-        (x[1:], rf"x has shape \({len(x) - 1},\).*{len(x)}.*\({model.nq}\).*\({model.nv}\)"),
-        (np.float64(1), r"x has shape \(\)"),
-        (x * np.nan, r"x\[0\]: value nan"),
-        (0 * x, "quaternion"),
-    ):
-        for method in (model.x_dot, model.x_dot_derivatives):
-            with row(words), pytest.raises(st.StateError, match=words):
-                method(wrong, u)
