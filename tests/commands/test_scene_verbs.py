@@ -91,7 +91,6 @@ def test_what_cannot_be_a_new_scene(run):
         (["a.txt"], "'a.txt'"),
         (["there.toml"], "'there.toml': is there"),
         (["a.toml", "--segments", "0"], "segments: value 0"),
-        (["a.toml", "--links", "-1"], "links: value -1"),
         (["a.toml", "--tail", "continuum", "--links", "2"], "links: value 2"),
         (["a.toml", "--example", "kik"], "did you mean 'kick'"),
     ):
@@ -108,8 +107,6 @@ def test_generate_is_the_generator(run):
         (["none.toml"], 2, "none.toml"),
         (["--help"], 0, "usage: serpentail generate"),
         ([], 2, "scene: no value"),
-        (["--tail", "continuum"], 2, "--segments"),
-        (["--tail", "continuum", "--segments", "1", "--links", "3"], 2, "links: value 3"),
         (["kick", "--functions", "energi"], 2, "did you mean 'energy'"),
     ):
         with row(arguments):

@@ -104,23 +104,19 @@ def test_calls_hold_neither_results_nor_arguments_and_leave_nothing_in_memory(mo
     assert (grown + now())[1] * os.sysconf("SC_PAGE_SIZE") < 1_000_000
 
 
-def test_a_call_keeps_what_it_works_on(model):
-    """Threads that make a kernel's first call at once each make what calls; one of them stays."""
-    s = state()
-    expected = model.energy(s["q"], s["v"])
-    function = copy.copy(model).kernel("energy")
+def test_a_call_keeps_what_it_works_on_and_may_run_within_a_call(model):
+    """Threads that make a kernel's first call at once each make what calls; one of them stays.
+
+    Garbage that is collected while outputs are copied may run a call of the same function.
+    """
+    (a, b), function = (state(1), state(2)), copy.copy(model).kernel("energy")
+    outer, inner = (model.energy(s["q"], s["v"]) for s in (a, b))
     first, second = function._prepared(), function._prepared()
     assert first is not second and function.fast is second
     del function
     gc.collect()
     filler = [np.full(size, np.nan) for size in range(1, 40) for _ in range(200)]
-    assert first(s["q"], s["v"]) == second(s["q"], s["v"]) == expected and filler
-
-
-def test_a_call_within_a_call(model):
-    """Garbage that is collected while outputs are copied may run a call of the same function."""
-    a, b = state(1), state(2)
-    expected = {k: model.energy(s["q"], s["v"]) for k, s in enumerate((a, b))}
+    assert first(a["q"], a["v"]) == second(a["q"], a["v"]) == outer and filler
     found, within = [], []
 
     def collected(phase, _):
@@ -133,11 +129,11 @@ def test_a_call_within_a_call(model):
     gc.callbacks.append(collected)
     gc.set_threshold(1)
     try:
-        outer = [model.energy(a["q"], a["v"]) for _ in range(200)]
+        around = {model.energy(a["q"], a["v"]) for _ in range(200)}
     finally:
         gc.set_threshold(*thresholds)
         gc.callbacks.remove(collected)
-    assert found and set(found) == {expected[1]} and set(outer) == {expected[0]}
+    assert {*found} == {inner} and around == {outer}
 
 
 def test_threads_share_a_model(model):

@@ -255,27 +255,19 @@ def test_what_is_wrong_is_named():
         out = [SOUND["q"].copy(), spoil(SOUND["v"])]
         with row(name), pytest.raises(st.StateError, match=r"step: out: v: value .*writeable C"):
             tail.step(**SOUND, out=out)
-    made = tail.parameters_of_runs({"tail_mass": np.full(3, 0.01)}, 3)
-    with pytest.raises(st.StateError, match="parameters of 3 runs, not of 9"):
-        tail.step(**SOUND, parameters=made)
-    model = zoo.model("feet_tail")
-    q, v, points = [0, 0, 1, 1, 0, 0, 0, 0, 0], np.zeros(8), 2 * sum(model.contacts.values())
-    with pytest.raises(st.StateError, match=rf"bristles: none: .*\(k, {points}\)"):
-        model.step(q, v, np.zeros(2), 1e-3, legs=np.zeros(8))
-    with pytest.raises(st.StateError, match="legs: none: "):
-        model.step(q, v, np.zeros(2), 1e-3, bristles=np.zeros(points))
-
-
-def test_a_model_without_what_it_needs_says_which():
-    bare = zoo.model("bare")
+    made, bare = tail.parameters_of_runs({"tail_mass": np.full(3, 0.01)}, 3), zoo.model("bare")
     state = [0, 0, 0, 1, 0, 0, 0, 0, 0], np.zeros(8), np.zeros(2), H
-    rows = (
+    feet, points = zoo.model("feet_tail"), 2 * sum(zoo.model("feet_tail").contacts.values())
+    calls = (
+        (lambda: tail.step(**SOUND, parameters=made), "parameters of 3 runs, not of 9"),
+        (lambda: feet.step(*state, legs=np.zeros(8)), rf"bristles: none: .*\(k, {points}\)"),
+        (lambda: feet.step(*state, bristles=np.zeros(points)), "legs: none: "),
         (lambda: bare.step(*state), r"without 'rollout'.*`functions`"),
         (lambda: bare.step(*state, method="implicit_euler"), "without 'rollout', 'implicit'"),
         (lambda: zoo.model("fixed").step(*np.zeros((3, 4)), 1e-3), "step: fixed has a fixed base"),
         (lambda: st.load(zoo.folder(AIR), compiled=False).step(**SOUND), "compiled=False"),
-        (lambda: zoo.model(AIR).batch_library.rollouts.function("tail_hops"), "function tail_hops"),
+        (lambda: tail.batch_library.rollouts.function("tail_hops"), "function tail_hops"),
     )
-    for call, words in rows:
-        with row(words), pytest.raises(st.ModelError, match=words):
+    for k, (call, words) in enumerate(calls):
+        with row(words), pytest.raises(st.StateError if k < 3 else st.ModelError, match=words):
             call()
