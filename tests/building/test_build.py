@@ -1,7 +1,4 @@
-"""`build` makes a model once, whoever asks and however often, and never imports the generator.
-
-Its tables survive the way through a scene file, and its options are those of the generator.
-"""
+"""`build` makes a model once, whoever asks, by a text, and never imports the generator."""
 
 import math
 import os
@@ -125,7 +122,6 @@ def test_what_cannot_be_built_is_refused_by_name(cache, monkeypatch):
 
 
 def test_a_built_model_is_the_generated_one_and_nothing_else_is_imported(cache, tmp_path):
-    """Neither the generator nor what lies in the working folder."""
     options = TINY | {"functions": ["forward_dynamics"], "name": "bare", "torso_mass": 0.06}
     fake = tmp_path / "serpentail_codegen"
     fake.mkdir()
@@ -184,8 +180,6 @@ def test_processes_build_each_model_once(cache):
     ]
     assert counts == [2, 2, 2, 0]
 
-
-# The text of a scene
 
 TEXTS = some.text(some.characters(codec="utf-8"))
 VALUES = some.recursive(

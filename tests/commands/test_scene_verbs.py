@@ -21,7 +21,6 @@ from ..support.rows import row
 
 @pytest.fixture
 def run(tmp_path, monkeypatch, capfd):
-    """Return a function from arguments to status, stdout and stderr, in an empty folder."""
     monkeypatch.chdir(tmp_path)
 
     def invoke(*arguments):

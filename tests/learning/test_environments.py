@@ -1,6 +1,4 @@
-"""Environments are Gymnasium's: its checker finds nothing, many are what each is alone, and what
-they cannot be made of or take is refused in one line.
-"""
+"""Environments are Gymnasium's: many are what each is alone; what they cannot take is refused."""
 
 import sys
 
@@ -25,13 +23,10 @@ def flyer():
 
 
 def many(task, count, **settings):
-    """Environments of a model that can do the task."""
     return st.environments(zoo.model(TASKS[task]), task, count, **settings)
 
 
 def test_many_are_what_gymnasium_makes_of_single_ones():
-    """Seeds, observations, rewards and ends; its checker is content."""
-
     def single():
         return st.environment(zoo.model(TASKS[task]), task, **SHORT)
 

@@ -1,6 +1,4 @@
-"""The model that was checked is the model that runs, whatever becomes of its folder: it is compiled
-from a private copy in the cache.
-"""
+"""The model that was checked is the model that runs, whatever becomes of its folder."""
 
 import copy
 import json
@@ -43,7 +41,6 @@ def cache(tmp_path, monkeypatch):
 
 @pytest.fixture
 def folder(tmp_path):
-    """Where models called tail come and go."""
     return tmp_path / "tail"
 
 
@@ -73,7 +70,6 @@ def test_late_code_is_of_the_model_and_needs_nothing_of_the_cache(folder, cache,
 def test_pickle_is_of_the_model_that_was_pickled_and_takes_its_folder_or_none(
     folder, cache, tmp_path, monkeypatch
 ):
-    """Elsewhere, too, although it was loaded by a relative path."""
     monkeypatch.chdir(tmp_path)
     put(folder, 1)
     model = st.load("tail", {"tail_mass": 0.005}, profile="reproducible", threads=3)

@@ -1,7 +1,4 @@
-"""Generated folders: what does not fit together is refused with its name and the way out.
-
-Those of one target alone evaluate what is there, and refuse what is not; the zoo's have both.
-"""
+"""Generated folders: what does not fit together is refused with its name and the way out."""
 
 import json
 import os
@@ -22,7 +19,6 @@ from ..support.rows import row
 
 @pytest.fixture
 def folder(tmp_path):
-    """A copy of the smallest model, to break."""
     return shutil.copytree(zoo.folder("bare"), tmp_path / "bare")
 
 
@@ -34,7 +30,6 @@ def edit(folder, change=lambda manifest: manifest, **changes):
 
 
 def refused(folder, *words):
-    """Check that a folder is refused with words."""
     with pytest.raises(st.ModelError) as caught:
         st.load(folder)
     for word in map(str, words):
@@ -141,8 +136,6 @@ def test_folders_that_are_none_or_lead_out_and_code_that_is_not_theirs(folder, m
     with pytest.raises(st.SerpentailError, match=r"foreign\.so.*set SERPENTAIL_CACHE"):
         st.load(folder)
 
-
-# Models of one target
 
 Q = [0, 0, 0, 1, 0, 0, 0, 0.3, -0.2]
 STATE = Q, [0.5] * 8, [0.1, 0.2]

@@ -1,6 +1,4 @@
-"""Parameters: what a caller gives reaches the model as it would from a scene, or is refused with
-what to do; what no animal or robot has is told.
-"""
+"""Parameters are those of a scene, or refused with what to do; what no animal has is told."""
 
 import copy
 import pickle

@@ -1,6 +1,4 @@
-"""Builds the sdist, of it the wheel, tells what that lacks or has too much, and uses it as
-strangers do, for each Python here.
-"""
+"""Builds the sdist, of it the wheel, tells what is wrong, and uses it in each Python here."""
 
 import os
 import re
@@ -52,7 +50,6 @@ UV = shutil.which("uv")
 
 
 def main(folder: Path) -> int:
-    """Build and try everything; 1 where something failed, which is told."""
     wheel = build(folder)
     tell_all = faults(wheel, page=shutil.which("npm") is not None)
     with tempfile.TemporaryDirectory() as scratch:

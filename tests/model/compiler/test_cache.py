@@ -1,8 +1,4 @@
-"""One text gives one library for a compiler and a machine, and all that matters is in its key.
-
-What is in the cache is run: others may not say how it is compiled, and what is damaged is made
-anew.  The cache has a size, by which what nobody uses goes; a command tells what is in it.
-"""
+"""One text gives one library for a compiler and a machine, in a cache of bounded size."""
 
 import json
 import os
@@ -22,7 +18,6 @@ from .conftest import TWICE, call_twice, forbid_processes, libraries
 
 
 def test_a_library_works_and_is_found_again_without_a_process(model, cache, tmp_path, monkeypatch):
-    """For the user alone, wherever its text lies."""
     umask = os.umask(0)
     try:
         built = {p: compiler.compile_library(*model, profile=p) for p in ("fast", "reproducible")}
@@ -163,9 +158,6 @@ def test_damaged_notes_and_libraries_are_made_again(model, cache, tmp_path):
     assert place.exists() and part.exists()
 
 
-# The size of the cache
-
-
 def built(model, number):
     (source,), include = model
     source.write_text(f"{TWICE}int number = {number};\n")
@@ -173,12 +165,10 @@ def built(model, number):
 
 
 def used(path, hours):
-    """Let an entry have been used last so long ago."""
     os.utime(path, (time.time() - hours * HOUR,) * 2)
 
 
 def test_what_was_not_used_for_longest_goes_and_what_is_in_use_stays(model, cache, monkeypatch):
-    """Of parts, those of killed builds go."""
     entries, parts = [built(model, number).parent for number in range(4)], cache / "parts"
     for hours, entry in zip((20, 9, 2, 5), entries, strict=True):
         used(entry, hours)

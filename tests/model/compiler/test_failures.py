@@ -1,7 +1,4 @@
-"""What goes wrong with a compiler or its sources is named, and leaves no library.
-
-One process builds while others wait; killed and failing ones leave nothing that stays.
-"""
+"""Broken compilers, sources, caches and builds are named, and leave no library."""
 
 import errno
 import itertools
@@ -35,9 +32,6 @@ def refusal(model, error=st.SerpentailError):
     with pytest.raises(error) as caught:
         compiler.compile_library(*model)
     return str(caught.value)
-
-
-# Compilers
 
 
 def test_what_is_no_compiler_or_no_source_is_named_and_not_replaced(
@@ -129,9 +123,6 @@ def test_cache_folder_by_precedence(model, monkeypatch, tmp_path):
     assert re.search(rf"{tmp_path}/file.*SERPENTAIL_CACHE", refusal(model))
 
 
-# Whose it is
-
-
 def test_what_others_own_or_may_write_is_refused(model, cache, monkeypatch):
     """A cache below /tmp serves; /tmp itself does not, and nobody is told to close it."""
     cache.mkdir()
@@ -160,8 +151,6 @@ def test_what_others_own_or_may_write_is_refused(model, cache, monkeypatch):
     assert compiler.compile_library(*model) == library
 
 
-# Builders
-
 COMPILE = (
     "import pathlib, sys; from serpentail.model import compiler; path = pathlib.Path\n"
     "print(compiler.compile_library([path(sys.argv[1])], path(sys.argv[2])))"
@@ -170,7 +159,6 @@ LOAD = "import sys, serpentail as st; print(st.load(sys.argv[1]).library._name)"
 
 
 def started(text, *arguments, **options):
-    """A process of its own that runs a program."""
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     return subprocess.Popen([sys.executable, "-c", text, *map(str, arguments)], **pipes, **options)
 
@@ -232,7 +220,6 @@ while [ $# -gt 0 ]; do [ "$1" = -o ] && echo made > "$2"; shift; done
 
 @pytest.mark.parametrize("apart", [9, pytest.param(1, marks=pytest.mark.slow)])
 def test_fault_at_any_call_is_a_refusal_and_leaves_nothing(tmp_path, monkeypatch, apart):
-    """With a compiler that takes no time."""
     monkeypatch.setenv("CC", program(tmp_path / "fake", FAKE))
     checked, sources, refused = read_folder(zoo.folder("bare")), ["src/bare.c"], 0
     model_library(checked, sources, "fast")  # imports what it needs

@@ -39,8 +39,8 @@ CALLS = {
 ARGUMENTS = {name: arguments.split() for name, (arguments, _) in CALLS.items()}
 
 
-NV, NT, POINTS = 10, 4, 5  # of the zoo's "m2_n2"
-SIZES = dict.fromkeys(("v", "v_dot", "dq", "dv", "multiplier"), NV)
+NT, POINTS = 4, 5  # of the zoo's "m2_n2"
+SIZES = dict.fromkeys(("v", "v_dot", "dq", "dv", "multiplier"), 6 + NT)
 SIZES |= dict.fromkeys(("tau", "dtau", "accelerations"), NT)
 SIZES |= {"q": 7 + NT, "f_ext": 6 + 3 * POINTS, "points": POINTS}
 SIZES |= {"x": 4 + 2 * NT, "angular": 3, "weights": 7 + 2 * NT, "given": 4 + 3 * NT}
@@ -64,7 +64,6 @@ def state(seed=1):
 
 
 def call(model, name, arguments):
-    """Return the outputs of a function, always in a tuple."""
     method = model.forward_dynamics if name == "forward_dynamics_external" else getattr(model, name)
     result = method(*(arguments[argument] for argument in ARGUMENTS[name]))
     return result if isinstance(result, tuple) else (result,)

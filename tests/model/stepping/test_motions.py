@@ -1,6 +1,4 @@
-"""Steps against what knows nothing of them: classical Runge-Kutta in flight, SciPy on the ground,
-where they are also those of `simulate`.
-"""
+"""Steps against Runge-Kutta in flight, SciPy on the ground, and `simulate`."""
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -24,7 +22,6 @@ def rate(model, y, tau, legs=None):
 
 
 def runge_kutta(model, y, tau, h):
-    """Where one step of the classical method comes to, its quaternion made a unit one."""
     a = rate(model, y, tau)
     b = rate(model, y + h / 2 * a, tau)
     c = rate(model, y + h / 2 * b, tau)
@@ -50,7 +47,6 @@ FINE, STEPS = 5e-5, 60  # s
 
 
 def pressing(runs, seed=0):
-    """Runs of the zoo's "ground" whose feet press on the ground."""
     model, rng = zoo.model("ground"), np.random.default_rng(seed)
     q, v = np.zeros((runs, model.nq)), 0.05 * rng.normal(size=(runs, model.nv))
     q[:, 3], q[:, 7:] = 1, 0.2 * rng.normal(size=(runs, 2))

@@ -1,7 +1,4 @@
-"""Steps of many runs: in lanes as singly, in place as elsewhere, in any number of threads, each run
-under its own torques and parameters, in flight and on the ground, whichever points touch there;
-whatever a step cannot take is refused in one line that names it.
-"""
+"""Steps of many runs, in flight and on the ground: in lanes as singly; what is wrong is named."""
 
 import numpy as np
 import pytest
@@ -40,12 +37,10 @@ def runs_of(model, count=RUNS, seed=5, touching=TOUCHING):
 
 
 def moving(values):
-    """The arrays that steps advance."""
     return [values[name] for name in ("q", "v", "bristles") if name in values]
 
 
 def stepped(model, values, h=H, **settings):
-    """All numbers of the runs after some steps."""
     arguments = dict(values)
     state = [arguments.pop(name) for name in ("q", "v", "tau")]
     return np.hstack(model.step(*state, h, **arguments, **settings))
@@ -71,7 +66,6 @@ def model(request):
 
 
 def test_steps_of_one_call_are_those_of_many(model):
-    """In place, into other arrays, of one state, which has no batch axis, and in threads."""
     many = runs_of(model)
     for values in (many, {name: array[4] for name, array in many.items()}):
         expected, own = stepped(model, values, steps=3), dict(values)
@@ -144,9 +138,6 @@ def test_floats_and_baked_parameters_serve():
     np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
 
 
-# In lanes, on the ground
-
-
 @pytest.fixture
 def in_lanes(monkeypatch):
     """Fails if a call of several runs makes some of them singly."""
@@ -199,8 +190,6 @@ def test_arcs_bent_out_of_range_fail_where_they_do_alone():
     stepped(model, {name: array[4:5] for name, array in values.items()}, statuses=single)
     assert single[0] != 0 and lanes[4] == single[0] and not np.delete(lanes, 4).any()
 
-
-# What is refused
 
 UPRIGHT = np.eye(11)[3]
 SOUND = {"q": np.tile(UPRIGHT, (9, 1)), "v": np.zeros((9, 10)), "tau": np.zeros((9, 4)), "h": 1e-3}
