@@ -97,15 +97,12 @@ def test_a_scene_file_is_built_by_its_content(generations, tmp_path, monkeypatch
 REFUSED = [
     (None, {"segmens": 3}, "segmens: value 3: .*'segments'"),
     (None, {"m": 2}, "m: value 2.*'segments'"),
-    (None, {"n": 2}, "n: value 2.*'links'"),
     (None, {**TINY, "torso_mas": 1}, "torso_mas: .*'torso_mass'"),
-    (None, {**TINY, "torso_mass": -1}, "torso_mass: value -1"),
     (None, {**TINY, "mu": 1}, "mu: no such parameter"),
     (None, {"tail": "articulatd", "segments": 0}, "(?s)kind: .*segments: .*links: "),
     (None, {**TINY, "links": 10**30}, "links: value 1000.*64 bits"),
     (None, {**TINY, "contacts": {1j}}, "contacts: value {1j}"),
     (None, {**TINY, "name": "../x"}, "name: value '../x'"),
-    (None, {**TINY, "threads": 0}, "threads: value 0"),
     ("kik", {}, "'kik': .*'kick'"),
     ("none.toml", {}, "none.toml.*cannot be read"),
     (3, {}, "scene file: value 3"),
@@ -175,10 +172,8 @@ def test_processes_build_each_model_once(cache):
     links, masses = [1, 2] * 4, [0.05 + 1e-3 * k for k in range(8)]
     with ProcessPoolExecutor(4, get_context("fork")) as pool:
         assert list(pool.map(_mass, links, masses)) == masses
-    counts = [
-        len(list((cache / kind).iterdir())) for kind in ("builds", "models", "locks", "parts")
-    ]
-    assert counts == [2, 2, 2, 0]
+    for kind, count in {"builds": 2, "models": 2, "locks": 2, "parts": 0}.items():
+        assert len(list((cache / kind).iterdir())) == count, kind
 
 
 TEXTS = some.text(some.characters(codec="utf-8"))

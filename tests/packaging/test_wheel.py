@@ -30,14 +30,13 @@ def test_the_hook_leaves_the_page_to_later_or_removes_what_it_cannot_make(
     page.parent.mkdir(parents=True)
     page.write_text("old")
     hook = PageHook(str(tmp_path), {}, None, None, str(tmp_path), "wheel")
+    data = {"force_include": {}, "artifacts": []}
     with monkeypatch.context() as later:
         later.setenv("SERPENTAIL_PAGE", "later")
         later.setenv("PATH", "")  # so that nothing is asked for to make it
-        data = {"force_include": {}, "artifacts": []}
         hook.initialize("editable", data)
         assert hook.dependencies() == [] and page.read_text() == "old"
         assert data == {"force_include": {}, "artifacts": [MADE]}
-    data = {"force_include": {}, "artifacts": []}
     hook.initialize("standard", data)
     assert not page.exists() and "without the page of runs" in capsys.readouterr().err
     assert data["force_include"] == {str(tmp_path / "scenes"): "serpentail/examples"}

@@ -120,12 +120,8 @@ def tried(wheel: Path, python: str, home: Path, cache: Path) -> list[str]:
     environment, empty = home / "environment", home / "empty"
     empty.mkdir(parents=True)
     programs = environment / ("Scripts" if os.name == "nt" else "bin")
-    if UV:
-        run([UV, "venv", "--quiet", "--python", python, environment], empty)
-        run([UV, "pip", "install", "--quiet", "--python", programs / "python", wheel], empty)
-    else:
-        run([python, "-m", "venv", environment], empty)
-        run([programs / "python", "-m", "pip", "install", "--quiet", wheel], empty)
+    run([python, "-m", "venv", environment], empty)
+    run([programs / "python", "-m", "pip", "install", "--quiet", wheel], empty)
 
     own = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
     own |= {"PATH": f"{programs}{os.pathsep}{own['PATH']}", "SERPENTAIL_CACHE": str(cache)}

@@ -58,15 +58,18 @@ def test_a_run_is_shown_where_it_has_come_to(view):
     view(part)
     assert view.nodes == before
     assert_at(view, part.q[-1], part.contact.legs[-1])
-
-
-def test_head_and_belly_tell_the_sides_apart(view):
     q = np.array([0, 0, 1, 0, 1.0, 0, 0, 0, 0])  # upside down: half a turn about x
     still = st.simulate(zoo.model("feet"), q, np.zeros(8), legs=LEGS, t_span=1e-4, method="rk4")
     view(still.resample(still.t[:1]))
     nodes = [view.nodes[name] for name in ("back", "belly", "head")]
     back, belly, head = (node.batched_positions[0] for node in nodes)
     assert belly[2] > back[2] and head[1] < back[1] - 0.5 * nodes[0].batched_scales[0, 1]
+    other = st.simulate(zoo.model("m2_n2"), [0, 0, 0, 1, *[0] * 7], np.zeros(10), t_span=0.01)
+    for news in (3, None, "run", other):
+        with pytest.raises(st.ViewError, match=r"news: value .*Trajectory or a Plan.* q has 9"):
+            view(news)
+    assert repr(view) == f"<serpentail live view of feet at {view.url}>"
+    assert view.url.startswith("http://127.0.0.1:")
 
 
 def test_a_plan_is_shown_at_nine_moments_without_legs_or_ground(view):
@@ -96,15 +99,6 @@ def test_rods_lie_between_their_points():
     begins = found.positions - along * found.scales[:, 2:] / 2
     np.testing.assert_allclose(begins, points[:, :-1].reshape(-1, 3), atol=1e-12)
     assert np.isfinite(found.wxyzs).all() and (found.scales[:, :2] == 0.1).all()
-
-
-def test_what_is_no_motion_of_the_model_is_refused(view):
-    other = st.simulate(zoo.model("m2_n2"), [0, 0, 0, 1, *[0] * 7], np.zeros(10), t_span=0.01)
-    for news in (3, None, "run", other):
-        with pytest.raises(st.ViewError, match=r"news: value .*Trajectory or a Plan.* q has 9"):
-            view(news)
-    assert repr(view) == f"<serpentail live view of feet at {view.url}>"
-    assert view.url.startswith("http://127.0.0.1:")
 
 
 def test_what_is_missing_is_named_before_anything_is_served(monkeypatch):

@@ -40,14 +40,12 @@ def answer(model, name, arguments):
     return [(type(o), o.dtype, o.shape, o.flags.writeable, o.tobytes()) for o in outputs]
 
 
-def test_matching_arrays_take_the_fast_way_and_others_do_not(model):
+def test_both_ways_give_the_same_bits_and_words(model):
+    """The fast one takes matching arrays and no others."""
     s = state()
     model.energy(s["q"], s["v"])
     fast, there = model.kernels["energy"].fast, calls.extension() is not None
     assert (fast(s["q"], s["v"]) is not None) == there and fast(s["q"], [0] * 10) is None
-
-
-def test_both_ways_give_the_same_bits_and_words(model):
     single, floats = st.load(zoo.folder("single")), {k: np.float32(a) for k, a in state().items()}
     for each, givens in ((model, (state(), states(1), states(3))), (single, (state(), floats))):
         plain = by_ctypes(each)
@@ -171,9 +169,7 @@ def test_where_it_cannot_be_had_or_calls_are_long_ctypes_serves(model, monkeypat
                 assert_same(found, call(model, function, state()))
                 assert other.kernels[function].fast in (calls.declined, None)
         monkeypatch.undo()
-
-
-def test_it_compiles_without_warnings(tmp_path):
+    # it compiles without warnings
     flags = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror", "-c")
     places = ("-isystem", HEADERS, calls.SOURCE, "-o", tmp_path / "calls.o")
     command = [*next(iter(candidates())), *flags, *places]

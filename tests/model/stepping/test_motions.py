@@ -84,6 +84,7 @@ def test_steps_on_the_ground_come_to_where_the_motion_does():
 
 
 def test_a_run_on_the_ground_is_what_simulate_makes_of_it():
+    """In flight it is near that of explicit steps."""
     model, values, end = zoo.model("ground"), pressing(11), 40 * FINE
     values["legs"] = legs = values["legs"][4]
     found = stepped(model, values, FINE, steps=40)
@@ -94,10 +95,6 @@ def test_a_run_on_the_ground_is_what_simulate_makes_of_it():
         motion = st.simulate(model, values["q"][k], values["v"][k], **keys)
         expected = np.hstack([motion.q[-1], motion.v[-1], motion.contact.bristles[-1].ravel()])
         np.testing.assert_allclose(found[k], expected, rtol=1e-8, atol=1e-12)
-
-
-def test_a_flight_by_implicit_steps_is_near_the_explicit():
-    values, model = pressing(2), zoo.model("ground")
     values["q"][:, 2] += 1.0
     ways = ({}, {"method": "rk4"})
     implicit, explicit = (stepped(model, values, FINE, steps=20, **way) for way in ways)

@@ -182,10 +182,10 @@ def test_friction_that_jams_in_some_lanes_is_held_there(in_lanes):
 
 
 def test_arcs_bent_out_of_range_fail_where_they_do_alone():
-    model = zoo.model("ground_arcs")
-    values, limit = runs_of(model, 9), model.manifest["scene"]["bend_range"]
+    model, count = zoo.model("ground_arcs"), 9
+    values, limit = runs_of(model, count), model.manifest["scene"]["bend_range"]
     values["q"][4, 7:9], values["v"][4, 6:8] = [0.999 * limit, 0], [0.01 * limit / H, 0]
-    lanes, single = (np.zeros(count, np.intc) for count in (9, 1))
+    lanes, single = np.zeros(count, np.intc), np.zeros(1, np.intc)
     stepped(model, values, statuses=lanes)
     stepped(model, {name: array[4:5] for name, array in values.items()}, statuses=single)
     assert single[0] != 0 and lanes[4] == single[0] and not np.delete(lanes, 4).any()
