@@ -58,7 +58,8 @@ def made(scene=None, **options):
     return st.build(*([scene] if scene else []), compiled=False, **options)
 
 
-def test_a_model_is_made_once_and_anew_for_what_shapes_its_code(generations):
+def test_a_model_is_made_once_and_anew_for_what_shapes_its_code(generations, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     first, again = made(**TINY), made(**TINY, torso_mass=0.05)
     assert len(generations) == 1 and again.parameters["torso_mass"] == 0.05
     assert first.checked.manifest == again.checked.manifest
@@ -74,10 +75,7 @@ def test_a_model_is_made_once_and_anew_for_what_shapes_its_code(generations):
     tilted = made(**TINY, mount_angles=[0.1, 0.2, 0.3])
     assert tilted.parameters["mount_angles"] == (0.1, 0.2, 0.3)
     assert len(generations) == 7
-
-
-def test_a_scene_file_is_built_by_its_content(generations, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+    generations.clear()  # a file is one of its content
     scene = tmp_path / "own.toml"
     text = 'kind = "articulated"\nsegments = 1\nlinks = 1\nfunctions = ["energy"]\n'
     for duration in (1, 2):

@@ -35,7 +35,7 @@ def test_a_library_works_and_is_found_again_without_a_process(model, cache, tmp_
             assert compiler.compile_library(*place, profile=profile) == library
 
 
-def test_every_input_reaches_the_key(model):
+def test_all_that_matters_reaches_the_key_and_nothing_else(model, cache, monkeypatch):
     (source,), include = model
     renamed = source.with_name("renamed.c")
     built = [compiler.compile_library(*model, profile=p) for p in ("fast", "reproducible")]
@@ -51,23 +51,19 @@ def test_every_input_reaches_the_key(model):
         built.append(compiler.compile_library([renamed], include, flags=flags))
     assert len({library.parent for library in built}) == len(built)
     assert [call_twice(library) for library in built] == [42.0] * 3 + [63.0] + [64.0] * 3
-
-
-def test_surroundings_that_matter_reach_the_key_and_no_others(model, cache, monkeypatch):
-    """Those that matter reach the key of what is known about the compiler, too."""
-    first, (source,) = compiler.compile_library(*model), model[0]
+    # of the environment, also the key of what is known about the compiler
     matter = ("MACOSX_DEPLOYMENT_TARGET", "LD_LIBRARY_PATH", "CCACHE_DIR", "NIX_CFLAGS")
     for name in (*matter, "CPATH", "LIBRARY_PATH", "TMPDIR", "LANG"):
         with monkeypatch.context() as changed, row(name):
             changed.setenv(name, "/tmp")
-            found = compiler.compile_library(*model)
-            assert (found.parent != first.parent) == (name in matter)
-    assert len(list((cache / "compilers").iterdir())) == 1 + len(matter)
+            found = compiler.compile_library([renamed], include)
+            assert (found.parent != built[-2].parent) == (name in matter)
+    assert len(list((cache / "compilers").iterdir())) == 2 + len(matter)  # of two profiles
     # arguments of CC reach the compiler, too
-    source.write_text(TWICE.replace("SCALE", "(SCALE + MORE)"))
+    renamed.write_text(TWICE.replace("SCALE", "(SCALE + MORE)"))
     for more in (1.0, 2.0):
         monkeypatch.setenv("CC", f"cc -DMORE={more}")
-        assert call_twice(compiler.compile_library(*model)) == 21 * (2 + more)
+        assert call_twice(compiler.compile_library([renamed], include)) == 21 * (3 + more)
 
 
 def test_c_library_processor_and_version_reach_the_key(model, monkeypatch, script, tmp_path):

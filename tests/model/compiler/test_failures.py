@@ -152,7 +152,7 @@ def started(text, *arguments, **options):
     return subprocess.Popen([sys.executable, "-c", text, *map(str, arguments)], **pipes, **options)
 
 
-def test_processes_with_a_cold_cache_compile_once(cache, script):
+def test_of_processes_one_compiles_and_a_killed_one_frees_the_lock(model, cache, script):
     calls, count = script(), 6
     crowd = [started(LOAD, zoo.folder("bare")) for _ in range(count)]
     answers = [process.communicate() for process in crowd]
@@ -162,9 +162,7 @@ def test_processes_with_a_cold_cache_compile_once(cache, script):
     sources = [line.split(" -c ")[1].split()[0] for line in lines if " -c " in line]
     assert len(sources) == len({*sources}) and sum(" -shared " in line for line in lines) == 1
     assert sum("--version" in line for line in lines) == 1
-
-
-def test_killed_holder_frees_the_lock_and_leaves_no_library(model, cache, script):
+    shutil.rmtree(cache)
     (source,), include = model
     made = 'for word; do case $word in *.part) echo half > $word; touch "$0.busy"; sleep 60;; esac;'
     script(f"{made} done")

@@ -128,14 +128,13 @@ def test_a_run_that_fails_leaves_its_neighbours(model):
 
 
 def test_floats_and_baked_parameters_serve():
-    values = runs_of(zoo.model(AIR))
-    found = stepped(zoo.model("single"), {n: a.astype(np.float32) for n, a in values.items()})
-    expected = stepped(zoo.model(AIR), values)
-    assert found.dtype == np.float32
-    assert (np.abs(found - expected) < 2e-4 * (1 + np.abs(expected))).all()
-    values = runs_of(zoo.model("m1_n3"))
-    found, expected = (stepped(zoo.model(name), values) for name in ("baked", "m1_n3"))
-    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
+    for name, like, most in (("single", AIR, 2e-4), ("baked", "m1_n3", 1e-12)):
+        model, other = zoo.model(name), zoo.model(like)
+        values, dtype = runs_of(other), model.parameter_vector.dtype
+        found = stepped(model, {key: array.astype(dtype) for key, array in values.items()})
+        expected = stepped(other, values)
+        assert found.dtype == dtype == (np.float32 if name == "single" else np.float64)
+        assert (np.abs(found - expected) < most * (1 + np.abs(expected))).all()
 
 
 @pytest.fixture
@@ -198,7 +197,6 @@ ERRORS |= {"parameters": st.ModelError}  # all others: StateError
 REFUSED = [
     *(("h", value, f"h: value {value}") for value in (0.0, -1e-3, np.nan, np.inf)),
     ("h", "1 ms", "h: value '1 ms'"),
-    ("h", [1e-3] * 9, "h: value [0.001, "),
     *(("steps", value, f"steps: value {value}") for value in (0, 2.0, True, 10_001)),
     ("threads", 0, "threads: value 0"),
     ("method", "rk5", "method: value 'rk5': did you mean 'rk4'?"),
@@ -215,7 +213,6 @@ REFUSED = [
     ("bristles", np.zeros(4), "bristles: this model has none"),
     ("legs", np.zeros(8), "legs: this model has none"),
     ("parameters", {"tail_mass": [1.0]}, "tail_mass: value [1.0]"),
-    ("parameters", {"tail_mas": [1.0]}, "tail_mas: no such parameter"),
     ("parameters", 3, "parameters: value 3"),
     ("out", np.zeros((2, 9, 11)), "out: needs 2 arrays, for q, v"),
     ("out", [np.zeros((9, 11))], "out: needs 2 arrays"),
