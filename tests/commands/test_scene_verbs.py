@@ -30,12 +30,11 @@ def run(tmp_path, monkeypatch, capfd):
     return invoke
 
 
-def test_examples_are_the_scenes_of_the_checkout_and_stand_for_models(run):
+def test_examples_are_the_scenes_of_the_checkout_and_stand_for_models(run, capfd):
     status, out, err = run("examples", "--json", "-")
     assert (status, err) == (0, "")
     assert sorted(json.loads(out)) == sorted(path.stem for path in SCENES.glob("*.toml"))
-    lines = run("examples")[1].splitlines()
-    ends = {line.split()[0]: line.rpartition(" (")[2] for line in lines}
+    ends = {text.split()[0]: text.rpartition(" (")[2] for text in run("examples")[1].splitlines()}
     for path in SCENES.glob("*.toml"):
         assert ("simulate" in ends[path.stem]) == ("simulate" in tomllib.loads(path.read_text()))
     assert ends["contact_m1_n3"] == "model only)"
@@ -49,6 +48,7 @@ def test_examples_are_the_scenes_of_the_checkout_and_stand_for_models(run):
     subprocess.run(["bash", "-n"], input=out.encode(), check=True)
     with pytest.raises(SystemExit, match=r"^0$"):
         run("--version")
+    assert capfd.readouterr().out == f"serpentail {st.__version__}\n"
 
 
 NEW = [  # options, what the scene then is, and a model of the zoo that suits it

@@ -52,18 +52,6 @@ def test_intact_copy_and_settings_of_load(folder):
     assert st.load(folder, profile="fast").profile == "fast"
 
 
-def larger(manifest):
-    """A segment more: what C then reads lies beyond the arrays it is given."""
-    sizes = manifest["dimensions"]
-    more = {"segments": 2, "nq": sizes["nq"] + 2, "nv": sizes["nv"] + 2}
-    return manifest | {"dimensions": sizes | more}
-
-
-def heavier(manifest):
-    manifest["parameters"][1]["default"] *= 2
-    return manifest
-
-
 def test_damaged_stale_and_changed_manifests_are_named(folder):
     path = folder / "manifest.json"
     whole, changed = path.read_text(), f"{path} was changed after it was generated"
@@ -79,8 +67,7 @@ def test_damaged_stale_and_changed_manifests_are_named(folder):
         ({"generator": "0.0.9"}, (*now, "format 2, generator 0.0.9")),
         ({"format": 1}, (*now, "format 1, ")),
         ({"generator": "0.9", "parameters": None}, now),
-        ({"change": larger}, (changed, "parameters=...")),
-        ({"change": heavier}, (changed, "parameters=...")),
+        ({"dimensions": {"segments": 2}}, (changed, "parameters=...")),
         ({"work": {"x": 1}}, (changed, "parameters=...")),
     ]
     for changes, words in rows:

@@ -30,12 +30,6 @@ def manifest():
     return zoo.model("m2_n2").manifest
 
 
-@pytest.fixture(scope="module")
-def given():
-    """The zoo's "bare" with parameters in its scene, which no model of the zoo has."""
-    return st.load(folder_of(zoo.scene("bare", parameters=GIVEN)))
-
-
 def refusal(manifest, changes):
     with pytest.raises(st.ModelError) as caught:
         resolve(manifest, changes)
@@ -62,7 +56,8 @@ def test_scene_and_caller_agree_bit_for_bit(manifest):
             attempt({"gravity": 1.6})
 
 
-def test_link_inertia_and_what_it_follows_from_replace_each_other(manifest, given):
+def test_link_inertia_and_what_it_follows_from_replace_each_other(manifest):
+    given = st.load(folder_of(zoo.scene("bare", parameters=GIVEN)))  # as the zoo has none
     before = resolve(manifest, None)
     for name in ("tail_mass", "tail_length", "link_radius"):
         after = resolve(manifest, {name: 0.1})

@@ -29,7 +29,6 @@ model = st.build(tail="articulated", segments=1, links=2, functions=wanted)
 flight = st.simulate(model, [0, 0, 1, 1, 0, 0, 0, 0, 0], np.zeros(8), t_span=0.1)
 assert abs(flight.q[-1, 2] - (1 - 9.8 / 2 * 0.1**2)) < 1e-9, flight.q[-1, 2]
 """
-TINY = ["generate", "--tail", "articulated", "--segments", "1", "--links", "1"]
 MADE = ("generated/articulated_m1_n1/articulated_m1_n1_casadi.py", "kick.html")
 WORKS = (  # without any extra
     ["serpentail", "--version"],
@@ -38,7 +37,7 @@ WORKS = (  # without any extra
     ["serpentail", "view", "kick.npz"],
     ["serpentail", "verify", "kick"],
     ["serpentail", "info", "righting_m1_n3"],
-    ["serpentail", *TINY],
+    ["serpentail", "generate", "--tail", "articulated", "--segments", "1", "--links", "1"],
     ["python", "-c", PROGRAM],
 )
 REFUSED = {  # what names the extra that it needs

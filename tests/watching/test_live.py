@@ -1,7 +1,6 @@
 """A live view, served by a real viser: its nodes are where the model says."""
 
 import socket
-import sys
 
 import numpy as np
 import pytest
@@ -68,6 +67,8 @@ def test_a_run_is_shown_where_it_has_come_to(view):
     for news in (3, None, "run", other):
         with pytest.raises(st.ViewError, match=r"news: value .*Trajectory or a Plan.* q has 9"):
             view(news)
+    with pytest.raises(st.ModelError, match="without 'tail_points'"):
+        st.live(zoo.model("bare"))
     assert repr(view) == f"<serpentail live view of feet at {view.url}>"
     assert view.url.startswith("http://127.0.0.1:")
 
@@ -99,11 +100,3 @@ def test_rods_lie_between_their_points():
     begins = found.positions - along * found.scales[:, 2:] / 2
     np.testing.assert_allclose(begins, points[:, :-1].reshape(-1, 3), atol=1e-12)
     assert np.isfinite(found.wxyzs).all() and (found.scales[:, :2] == 0.1).all()
-
-
-def test_what_is_missing_is_named_before_anything_is_served(monkeypatch):
-    with pytest.raises(st.ModelError, match="without 'tail_points'"):
-        st.live(zoo.model("bare"))
-    monkeypatch.setitem(sys.modules, "viser", None)
-    with pytest.raises(st.ExtraMissing, match=r'pip install "serpentail\[live\]"'):
-        st.live(zoo.model("feet"))

@@ -12,6 +12,7 @@ import sys
 import time
 from pathlib import Path
 
+import filelock
 import pytest
 
 import serpentail as st
@@ -24,8 +25,6 @@ from tests.support.file_faults import age, at, before_calls, fault
 
 from ...support.rows import row
 from .conftest import call_twice, forbid_processes, libraries, program
-
-OTHER = 12345  # user id of somebody else
 
 
 def refusal(model, error=st.SerpentailError):
@@ -99,7 +98,8 @@ def test_failures_show_the_compilers_words_without_the_middle_of_long_ones(model
         assert not libraries(cache) and not list(cache.rglob("*.o"))
 
 
-def test_cache_folder_by_precedence(model, monkeypatch, tmp_path):
+def test_place_of_the_cache_and_what_cannot_be_one(model, monkeypatch, tmp_path):
+    """One below /tmp serves; /tmp itself does not, and nobody is told to close it."""
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.setenv("XDG_CACHE_HOME", "/xdg")
     assert cache_folder(tmp_path / "argument") == tmp_path / "argument"
@@ -110,15 +110,13 @@ def test_cache_folder_by_precedence(model, monkeypatch, tmp_path):
     assert cache_folder(None) == tmp_path / ".cache" / "serpentail"
     monkeypatch.setenv("SERPENTAIL_CACHE", "/dev/null/cache")
     assert re.search("/dev/null.*SERPENTAIL_CACHE", refusal(model))
-
-
-def test_what_others_own_or_may_write_is_refused(model, cache, monkeypatch):
-    """A cache below /tmp serves; /tmp itself does not, and nobody is told to close it."""
-    cache.mkdir()
-    cache.chmod(0o1777)
+    cache = tmp_path / "all" / "mine"
+    cache.parent.mkdir()
+    cache.parent.chmod(0o1777)
+    monkeypatch.setenv("SERPENTAIL_CACHE", str(cache.parent))
     message = refusal(model)
     assert "is writable by others" in message and "chmod" not in message
-    monkeypatch.setenv("SERPENTAIL_CACHE", str(cache := cache / "mine"))
+    monkeypatch.setenv("SERPENTAIL_CACHE", str(cache))
     library = compiler.compile_library(*model)
     (note,) = (cache / "compilers").iterdir()
     places = (cache, library.parents[1], library.parent, library)
@@ -133,9 +131,9 @@ def test_what_others_own_or_may_write_is_refused(model, cache, monkeypatch):
     # root alone may give files to others
     for path in (*places, note.parent, note) if os.geteuid() == 0 else ():
         with row(path):
-            os.chown(path, OTHER, OTHER)
+            os.chown(path, 12345, 12345)
             message = refusal(model)
-            assert f"{path} belongs to user {OTHER}" in message and "SERPENTAIL_CACHE" in message
+            assert f"{path} belongs to user 12345" in message and "SERPENTAIL_CACHE" in message
             os.chown(path, 0, 0)
     assert compiler.compile_library(*model) == library
 
@@ -182,8 +180,6 @@ def test_of_processes_one_compiles_and_a_killed_one_frees_the_lock(model, cache,
 
 
 def test_without_locks_or_patience_it_compiles_anyway(model, cache, monkeypatch):
-    import filelock
-
     (source,), include = model
     with monkeypatch.context() as changed:
         for code in (errno.ENOLCK, errno.ENOTSUP, errno.EIO):

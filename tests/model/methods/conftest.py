@@ -47,10 +47,8 @@ SIZES |= {"x": 4 + 2 * NT, "angular": 3, "weights": 7 + 2 * NT, "given": 4 + 3 *
 
 
 def shapes(name):
-    def shape(words):
-        return () if words == "-" else tuple(SIZES.get(n) or int(n) for n in words.split("*"))
-
-    return [shape(words) for words in CALLS[name][1].split()]
+    words = [text.split("*") for text in CALLS[name][1].split()]
+    return [() if each == ["-"] else tuple(SIZES.get(n) or int(n) for n in each) for each in words]
 
 
 def states(count, seed=1):

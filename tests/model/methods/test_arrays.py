@@ -45,7 +45,7 @@ def test_outputs_are_plain_arrays_of_the_callers_own_and_arguments_are_left_alon
                 assert_same(given.values(), before.values())
 
 
-def test_batch_is_its_states_one_by_one(model):
+def test_batch_is_its_states_one_by_one_in_any_layout_and_type(model):
     for name in CALLS:
         for count, apart in ((1, 1), (500, 97)):
             batch = states(count)
@@ -61,9 +61,7 @@ def test_batch_is_its_states_one_by_one(model):
                 mixed = one | {varied: batch[varied]}
                 repeated = {key: np.broadcast_to(mixed[key], (5, SIZES[key])) for key in arguments}
                 assert_same(call(model, name, mixed), call(model, name, repeated))
-
-
-def test_neither_layout_nor_type_matters(model):
+    # neither layout nor type matters: every kind for one function, one kind for every function
     types = (np.float32, np.float16, np.int64, np.int8, np.uint16)
     whole = {key: np.arange(1.0, 1 + size) % 5 for key, size in SIZES.items()}
     ways = [(form, SOUND[form], given) for form in SOUND for given in (state(), states(3))]
@@ -204,8 +202,7 @@ def test_names_of_the_field_and_loads_by_name(model):
     load = model.external_force(every[:3], moment=[4, 5, 6], tail=every[6:].reshape(-1, 3))
     np.testing.assert_array_equal(load, every)
     np.testing.assert_array_equal(model.external_force(), np.zeros(SIZES["f_ext"]))
-    wrong = [("force", (1, 2)), ("force", "xyz"), ("moment", 1.0), ("tail", every[6:])]
-    for name, value in wrong:
+    for name, value in (("force", (1, 2)), ("force", "xyz"), ("moment", 1.0), ("tail", every[6:])):
         with pytest.raises(st.StateError, match=name):
             model.external_force(**{name: value})
 
