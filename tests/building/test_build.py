@@ -126,9 +126,8 @@ def test_a_built_model_is_the_generated_one_and_nothing_else_is_imported(cache, 
         f"import sys, serpentail as st; st.build(**{options}, compiled=False)\n"
         "print([name for name in ('sympy', 'jinja2', 'serpentail_codegen') if name in sys.modules])"
     )
-    command = [sys.executable, "-P", "-c", program]
-    said = subprocess.run(command, capture_output=True, check=True, cwd=tmp_path).stdout
-    assert said == b"[]\n"
+    found = subprocess.check_output([sys.executable, "-P", "-c", program], cwd=tmp_path)
+    assert found == b"[]\n"
     built, loaded = st.build(**options), st.load(zoo.folder("bare"), {"torso_mass": 0.06})
     assert built.checked.files == loaded.checked.files and built.parameters == loaded.parameters
     state = np.r_[0, 0, 0.3, 1, 0, 0, 0, 0.1, 0.2], np.linspace(-1, 1, 8), np.ones(2)

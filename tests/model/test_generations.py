@@ -80,9 +80,8 @@ def test_pickle_is_of_the_model_that_was_pickled_and_takes_its_folder_or_none(
     assert (twin.folder, twin.profile, twin.batch_library.threads) == (folder, "reproducible", 3)
     assert twin.parameters == model.parameters
     text = f"import pickle; print(pickle.loads({pickled!r}).mass_matrix({Q}).tobytes().hex())"
-    command = [sys.executable, "-c", text]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd="/")
-    assert done.stdout.strip() == expected.tobytes().hex()
+    found = subprocess.check_output([sys.executable, "-c", text], text=True, cwd="/")
+    assert found.strip() == expected.tobytes().hex()
     # without its snapshot
     put(folder, 1)
     (snapshot,) = (cache / "models").iterdir()

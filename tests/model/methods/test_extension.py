@@ -53,10 +53,8 @@ def test_both_ways_give_the_same_bits_and_words(model):
             for given in givens:
                 for form, change in FORMS.items():
                     changed = {key: change(array) for key, array in given.items()}
-                    tried = [changed]
-                    if given["q"].ndim == 1:
-                        tried += [given | {one: changed[one]} for one in ARGUMENTS[name]]
-                    for arguments in tried:
+                    alone = ARGUMENTS[name] if given["q"].ndim == 1 else []
+                    for arguments in (changed, *(given | {one: changed[one]} for one in alone)):
                         with row(each, name, given["q"].shape, form):
                             assert answer(each, name, arguments) == answer(plain, name, arguments)
 
