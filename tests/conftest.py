@@ -7,7 +7,7 @@ from importlib.util import find_spec
 
 import pytest
 
-from tests.support.models import QUICK, choose_compiler
+from tests.support.models import choose_compiler
 
 # of extras that `make test` does not install
 LIBRARIES = (
@@ -53,10 +53,3 @@ def pytest_terminal_summary(terminalreporter):
             f"not tested: {len(lacking)} tests, files and folders that need {', '.join(names)}; "
             "`make setup` installs them"
         )
-
-
-@pytest.fixture
-def users_compiler(monkeypatch):
-    """Compile models as for a user, even if other tests compile faster."""
-    if os.environ.get("CC") == QUICK:
-        monkeypatch.delenv("CC")

@@ -1,7 +1,4 @@
-"""`build` makes a model once, whoever asks and however often, and never imports the generator.
-
-Its tables survive the way through a scene file, and its options are those of the generator.
-"""
+"""`build` makes a model once, whoever asks, by a text, and never imports the generator."""
 
 import math
 import os
@@ -61,24 +58,13 @@ def made(scene=None, **options):
     return st.build(*([scene] if scene else []), compiled=False, **options)
 
 
-def test_a_built_model_is_the_generated_one(cache):
-    options = {"functions": ["forward_dynamics"], "name": "bare"}
-    built = st.build(**TINY | options, torso_mass=0.06)
-    loaded = st.load(zoo.folder("bare"), {"torso_mass": 0.06})
-    assert built.checked.files == loaded.checked.files and built.parameters == loaded.parameters
-    state = np.r_[0, 0, 0.3, 1, 0, 0, 0, 0.1, 0.2], np.linspace(-1, 1, 8), np.ones(2)
-    assert np.array_equal(built.forward_dynamics(*state), loaded.forward_dynamics(*state))
-
-
-def test_the_second_call_generates_nothing(generations):
+def test_a_model_is_made_once_and_anew_for_what_shapes_its_code(generations, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     first, again = made(**TINY), made(**TINY, torso_mass=0.05)
     assert len(generations) == 1 and again.parameters["torso_mass"] == 0.05
     assert first.checked.manifest == again.checked.manifest
     assert first.name == "articulated_m1_n1"
     assert made(**TINY | {"links": 2}).name == "articulated_m1_n2" and len(generations) == 2
-
-
-def test_parameters_that_shape_the_code_make_another_model(generations):
     light, heavy = (made(**TINY, baked=True, torso_mass=mass) for mass in (0.05, 0.1))
     assert [m.parameters["torso_mass"] for m in (light, heavy)] == [0.05, 0.1]
     assert light.manifest["content_hash"] != heavy.manifest["content_hash"]
@@ -88,11 +74,8 @@ def test_parameters_that_shape_the_code_make_another_model(generations):
     assert own.parameters["tail_mass"] == pytest.approx(3e-3)
     tilted = made(**TINY, mount_angles=[0.1, 0.2, 0.3])
     assert tilted.parameters["mount_angles"] == (0.1, 0.2, 0.3)
-    assert len(generations) == 5
-
-
-def test_a_scene_file_is_built_by_its_content(generations, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+    assert len(generations) == 7
+    generations.clear()  # a file is one of its content
     scene = tmp_path / "own.toml"
     text = 'kind = "articulated"\nsegments = 1\nlinks = 1\nfunctions = ["energy"]\n'
     for duration in (1, 2):
@@ -112,15 +95,12 @@ def test_a_scene_file_is_built_by_its_content(generations, tmp_path, monkeypatch
 REFUSED = [
     (None, {"segmens": 3}, "segmens: value 3: .*'segments'"),
     (None, {"m": 2}, "m: value 2.*'segments'"),
-    (None, {"n": 2}, "n: value 2.*'links'"),
     (None, {**TINY, "torso_mas": 1}, "torso_mas: .*'torso_mass'"),
-    (None, {**TINY, "torso_mass": -1}, "torso_mass: value -1"),
     (None, {**TINY, "mu": 1}, "mu: no such parameter"),
     (None, {"tail": "articulatd", "segments": 0}, "(?s)kind: .*segments: .*links: "),
     (None, {**TINY, "links": 10**30}, "links: value 1000.*64 bits"),
     (None, {**TINY, "contacts": {1j}}, "contacts: value {1j}"),
     (None, {**TINY, "name": "../x"}, "name: value '../x'"),
-    (None, {**TINY, "threads": 0}, "threads: value 0"),
     ("kik", {}, "'kik': .*'kick'"),
     ("none.toml", {}, "none.toml.*cannot be read"),
     (3, {}, "scene file: value 3"),
@@ -136,19 +116,22 @@ def test_what_cannot_be_built_is_refused_by_name(cache, monkeypatch):
         made(**TINY)
 
 
-def test_neither_the_generator_nor_what_lies_in_the_working_folder_is_imported(cache, tmp_path):
+def test_a_built_model_is_the_generated_one_and_nothing_else_is_imported(cache, tmp_path):
+    options = TINY | {"functions": ["forward_dynamics"], "name": "bare", "torso_mass": 0.06}
     fake = tmp_path / "serpentail_codegen"
     fake.mkdir()
+    (fake / "__init__.py").touch()
     (fake / "__main__.py").write_text("raise SystemExit('taken')")
-    (fake / "__init__.py").write_text("")
     program = (
-        "import sys, serpentail as st\n"
-        f"st.build(**{TINY}, compiled=False)\n"
+        f"import sys, serpentail as st; st.build(**{options}, compiled=False)\n"
         "print([name for name in ('sympy', 'jinja2', 'serpentail_codegen') if name in sys.modules])"
     )
-    command = [sys.executable, "-P", "-c", program]
-    said = subprocess.run(command, capture_output=True, check=True, cwd=tmp_path).stdout
-    assert said == b"[]\n"
+    found = subprocess.check_output([sys.executable, "-P", "-c", program], cwd=tmp_path)
+    assert found == b"[]\n"
+    built, loaded = st.build(**options), st.load(zoo.folder("bare"), {"torso_mass": 0.06})
+    assert built.checked.files == loaded.checked.files and built.parameters == loaded.parameters
+    state = np.r_[0, 0, 0.3, 1, 0, 0, 0, 0.1, 0.2], np.linspace(-1, 1, 8), np.ones(2)
+    assert np.array_equal(built.forward_dynamics(*state), loaded.forward_dynamics(*state))
 
 
 DAMAGES = {
@@ -160,19 +143,16 @@ DAMAGES = {
 }
 
 
-def test_a_damaged_cache_costs_another_generation_only(cache, generations, capsys):
+def test_a_damaged_cache_costs_another_generation_and_one_of_others_is_told(
+    cache, generations, monkeypatch
+):
     for name, damage in DAMAGES.items():
         with row(name):
             model, before = made(**TINY), len(generations)
             (note,) = (cache / "builds").iterdir()
             damage(model, note)
-            assert made(**TINY).generated == ("energy",) and len(generations) == before + 1
-            made(**TINY)
-            assert len(generations) == before + 1
-
-
-def test_a_cache_that_others_write_or_nobody_can_is_told(cache, generations, monkeypatch):
-    made(**TINY)
+            for _ in range(2):
+                assert made(**TINY).generated == ("energy",) and len(generations) == before + 1
     (cache / "builds").chmod(0o777)
     with pytest.raises(st.SerpentailError, match="is writable by others"):
         made(**TINY)
@@ -181,23 +161,17 @@ def test_a_cache_that_others_write_or_nobody_can_is_told(cache, generations, mon
         made(**TINY)
 
 
-def _built(wanted):
-    links, mass = wanted
-    model = made(**TINY | {"links": links}, torso_mass=mass)
-    return model.name, model.parameters["torso_mass"]
+def _mass(links, mass):
+    return made(**TINY | {"links": links}, torso_mass=mass).parameters["torso_mass"]
 
 
 def test_processes_build_each_model_once(cache):
-    wanted = [(1 + k % 2, 0.05 + 1e-3 * k) for k in range(8)]
+    links, masses = [1, 2] * 4, [0.05 + 1e-3 * k for k in range(8)]
     with ProcessPoolExecutor(4, get_context("fork")) as pool:
-        found = list(pool.map(_built, wanted))
-    assert found == [(f"articulated_m1_n{links}", mass) for links, mass in wanted]
-    assert len(list((cache / "builds").iterdir())) == len(list((cache / "models").iterdir())) == 2
-    locks = [path.name for path in (cache / "locks").iterdir()]
-    assert len(locks) == 2 and not list((cache / "parts").iterdir())
+        assert list(pool.map(_mass, links, masses)) == masses
+    for kind, count in {"builds": 2, "models": 2, "locks": 2, "parts": 0}.items():
+        assert len(list((cache / kind).iterdir())) == count, kind
 
-
-# The text of a scene
 
 TEXTS = some.text(some.characters(codec="utf-8"))
 VALUES = some.recursive(
@@ -242,19 +216,17 @@ def test_options_are_what_the_generator_knows():
 def test_a_robot_file_serves_with_fewer_contacts():
     path = SCENES / "contact_m1_n3.toml"
     tables = tomllib.loads(path.read_text())
-    tables["functions"] = [*NEEDS, "energy"]
-    tables["functions"].remove("contact_rates")
+    tables["functions"] = [name for name in (*NEEDS, "energy") if name != "contact_rates"]
     for contacts in ([], ["feet"], ["tail"], ["torso"], ["feet", "tail", "torso"]):
         with row(contacts):
             scene = parse_scene(with_contacts(tables, contacts), "robot")
+            names = {*dict(scene.parameters), *scene.functions}
             assert list(scene.contacts) == contacts
-            assert ("mu" in dict(scene.parameters)) == bool(contacts)
-            assert ("hip" in dict(scene.parameters)) == ("feet" in contacts)
-            assert ("torso_semi_axes" in dict(scene.parameters)) == ("torso" in contacts)
-            assert ("contact_points" in scene.functions) == bool(contacts)
-            assert ("leg_points" in scene.functions) == ("feet" in contacts)
+            assert ("mu" in names) == ("contact_points" in names) == bool(contacts)
+            assert ("hip" in names) == ("leg_points" in names) == ("feet" in contacts)
+            assert ("torso_semi_axes" in names) == ("torso" in contacts)
     assert with_contacts(tables, 3)["contacts"] == 3  # which the generator refuses
-    options = {"contacts": [], "functions": ["energy"], "compiled": False}
-    assert not st.build(path, **options).contacts
+    options = {"contacts": [], "functions": ["energy"]}
+    assert not made(path, **options).contacts
     with pytest.raises(st.ModelError, match="mu: no such parameter"):
-        st.build(path, **options, mu=0.5)
+        made(path, **options, mu=0.5)

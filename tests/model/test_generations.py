@@ -1,6 +1,4 @@
-"""The model that was checked is the model that runs, whatever becomes of its folder: it is compiled
-from a private copy in the cache.
-"""
+"""The model that was checked is the model that runs, whatever becomes of its folder."""
 
 import copy
 import json
@@ -35,12 +33,6 @@ def put(folder, links):
     return folder
 
 
-def agree(model):
-    """Check that CasADi and C are of one model."""
-    found = model.casadi.mass_matrix(Q).full()
-    np.testing.assert_allclose(found, model.mass_matrix(Q), rtol=1e-12, atol=1e-18)
-
-
 @pytest.fixture
 def cache(tmp_path, monkeypatch):
     monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path / "cache"))
@@ -49,7 +41,6 @@ def cache(tmp_path, monkeypatch):
 
 @pytest.fixture
 def folder(tmp_path):
-    """Where models called tail come and go."""
     return tmp_path / "tail"
 
 
@@ -72,41 +63,34 @@ def test_late_code_is_of_the_model_and_needs_nothing_of_the_cache(folder, cache,
     alone = st.simulate(model, Q, 0.1 * v[8], **settings)
     np.testing.assert_allclose(runs.q[8], alone.q, rtol=0, atol=1e-9)
     for each in (model, model.with_parameters(tail_mass=0.005), copy.deepcopy(model)):
-        agree(each)
+        of_casadi = each.casadi.mass_matrix(Q).full()
+        np.testing.assert_allclose(of_casadi, each.mass_matrix(Q), rtol=1e-12, atol=1e-18)
 
 
-UNPICKLE = (
-    "import pathlib, pickle, sys; model = pickle.loads(pathlib.Path(sys.argv[1]).read_bytes()); "
-    f"print(model.mass_matrix({Q}).tobytes().hex())"
-)
-
-
-def test_pickle_is_of_the_model_that_was_pickled(folder, cache, tmp_path, monkeypatch):
-    """Elsewhere, too, although it was loaded by a relative path."""
+def test_pickle_is_of_the_model_that_was_pickled_and_takes_its_folder_or_none(
+    folder, cache, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     put(folder, 1)
     model = st.load("tail", {"tail_mass": 0.005}, profile="reproducible", threads=3)
-    (tmp_path / "pickled").write_bytes(pickle.dumps(model))
+    pickled, expected = pickle.dumps(model), model.mass_matrix(Q)
     put(folder, 2)
-    twin = pickle.loads((tmp_path / "pickled").read_bytes())
-    np.testing.assert_array_equal(twin.mass_matrix(Q), model.mass_matrix(Q))
+    twin = pickle.loads(pickled)
+    np.testing.assert_array_equal(twin.mass_matrix(Q), expected)
     assert (twin.folder, twin.profile, twin.batch_library.threads) == (folder, "reproducible", 3)
     assert twin.parameters == model.parameters
-    command = [sys.executable, "-c", UNPICKLE, str(tmp_path / "pickled")]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd="/")
-    assert done.stdout.strip() == model.mass_matrix(Q).tobytes().hex()
-
-
-def test_pickle_without_its_snapshot_takes_the_same_folder_and_no_other(folder, cache):
-    model = st.load(put(folder, 1))
-    pickled = pickle.dumps(model)
+    text = f"import pickle; print(pickle.loads({pickled!r}).mass_matrix({Q}).tobytes().hex())"
+    found = subprocess.check_output([sys.executable, "-c", text], text=True, cwd="/")
+    assert found.strip() == expected.tobytes().hex()
+    # without its snapshot
+    put(folder, 1)
     (snapshot,) = (cache / "models").iterdir()
     (snapshot / "src" / "tail.c").write_text("int other;\n")
     assert pickle.loads(pickled).checked.files == model.checked.files
     put(snapshot, 2)
     assert pickle.loads(pickled).checked.files == model.checked.files
     shutil.rmtree(cache / "models")
-    np.testing.assert_array_equal(pickle.loads(pickled).mass_matrix(Q), model.mass_matrix(Q))
+    np.testing.assert_array_equal(pickle.loads(pickled).mass_matrix(Q), expected)
     shutil.rmtree(cache)
     put(folder, 2)
     with pytest.raises(st.ModelError, match="generated again since the model was pickled"):
@@ -116,28 +100,6 @@ def test_pickle_without_its_snapshot_takes_the_same_folder_and_no_other(folder, 
         pickle.loads(pickled)
 
 
-def test_models_without_c_need_no_cache(monkeypatch, tmp_path):
-    (tmp_path / "file").touch()
-    monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path / "file" / "cache"))
-    model = st.load(zoo.folder("bare"), compiled=False)
-    found = pickle.loads(pickle.dumps(model)).casadi.forward_dynamics(Q, V, TAU)
-    np.testing.assert_array_equal(found, model.casadi.forward_dynamics(Q, V, TAU))
-
-
-def test_snapshots_are_for_the_user_alone_and_see_no_planted_header(cache, tmp_path):
-    folder = shutil.copytree(zoo.folder("bare"), tmp_path / "bare")
-    for place in ("include", "src"):
-        (folder / place / "math.h").write_text("#error planted\n")
-    before = os.umask(0)
-    try:
-        st.load(folder)
-    finally:
-        os.umask(before)
-    assert not list(cache.rglob("math.h"))
-    (snapshot,) = (cache / "models").iterdir()
-    assert snapshot.stat().st_mode & 0o777 == 0o700
-
-
 DAMAGES = [  # of the whole, of a file, and beside it
     *(("", lambda path: path.write_text("")), ("", os.mkfifo)),
     *(("src/bare.c", lambda path: path.write_text("int other;\n")), ("src/bare.c", os.mkfifo)),
@@ -145,17 +107,24 @@ DAMAGES = [  # of the whole, of a file, and beside it
 ]
 
 
-def test_damaged_snapshot_is_replaced(cache):
-    model, expected = st.load(zoo.folder("bare")), zoo.model("bare").forward_dynamics(Q, V, TAU)
+def test_snapshots_are_for_the_user_alone_and_a_damaged_one_is_replaced(cache, tmp_path):
+    folder = shutil.copytree(zoo.folder("bare"), tmp_path / "bare")
+    for place in ("include", "src"):
+        (folder / place / "math.h").write_text("#error planted\n")
+    before = os.umask(0)
+    try:
+        model, expected = st.load(folder), zoo.model("bare").forward_dynamics(Q, V, TAU)
+    finally:
+        os.umask(before)
     (snapshot,) = (cache / "models").iterdir()
+    assert snapshot.stat().st_mode & 0o777 == 0o700 and not list(cache.rglob("math.h"))
     for k, (name, put_in_place) in enumerate(DAMAGES):
         with row(k, name):
             shutil.rmtree(cache / "libraries")
             path = snapshot / name
             shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
             put_in_place(path)
-            found = st.load(zoo.folder("bare")).forward_dynamics(Q, V, TAU)
-            np.testing.assert_array_equal(found, expected)
+            np.testing.assert_array_equal(st.load(folder).forward_dynamics(Q, V, TAU), expected)
             files = {p.relative_to(snapshot).as_posix() for p in snapshot.rglob("*") if p.is_file()}
             assert files == {*model.checked.files, "manifest.json"}
             assert not list((cache / "parts").iterdir())

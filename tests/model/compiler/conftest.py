@@ -16,7 +16,6 @@ def call_twice(library):
 
 
 def program(path, body):
-    """Write a shell script, and return its path as a text."""
     path.write_text(f"#!/bin/sh\n{body}\n")
     path.chmod(0o755)
     return str(path)
@@ -28,8 +27,6 @@ def libraries(cache):
 
 
 def forbid_processes(monkeypatch):
-    """Make every attempt to start a process fail the test."""
-
     def refuse(*_args, **_options):
         raise AssertionError("a process was started")
 
@@ -38,7 +35,6 @@ def forbid_processes(monkeypatch):
 
 @pytest.fixture(autouse=True)
 def cache(tmp_path, monkeypatch):
-    """An empty cache and no $CC."""
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path / "cache"))
     return tmp_path / "cache"
@@ -46,7 +42,6 @@ def cache(tmp_path, monkeypatch):
 
 @pytest.fixture
 def model(tmp_path):
-    """The sources and the header folder of a library with one function, twice."""
     include = tmp_path / "model" / "include"
     source = tmp_path / "model" / "src" / "twice.c"
     include.mkdir(parents=True)

@@ -1,15 +1,17 @@
-"""Every function takes any array of numbers, alone or in batches, and leaves arguments alone; what
-none takes is refused by the function's name, the argument and the place.
-"""
+"""Every function takes any array of numbers and leaves it alone; what none takes is named."""
 
 import copy
+import gc
 import re
+import weakref
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import serpentail as st
 from serpentail_codegen.scene.signatures.table import ALL, NEEDS
+from tests.fuzz import strange
 from tests.support import zoo
 
 from ...support.rows import row
@@ -21,23 +23,29 @@ ONE = "forward_dynamics_external"  # on which every form and every wrong value i
 
 def test_every_function_is_called_here(model):
     assert {*CALLS, *ELSEWHERE} == {*ALL, "contact_rates"}  # which no scene names
-    assert (model.segments, model.links, model.nq, model.nv) == (2, 2, 11, 10)
     assert repr(model) == "<serpentail.Model m2_n2: 2 x 2 links, nv = 10>"
 
 
-def test_outputs_are_plain_arrays(model):
+def test_outputs_are_plain_arrays_of_the_callers_own_and_arguments_are_left_alone(model):
     for name in CALLS:
         for lead in ((), (0,), (1,), (3,)):
             with row(name, lead):
-                outputs = call(model, name, states(*lead) if lead else state())
-                for output, shape in zip(outputs, shapes(name), strict=True):
+                given, other = (states(*lead, seed) if lead else state(seed) for seed in (1, 2))
+                before, kept = copy.deepcopy(given), call(model, name, given)
+                for output, shape in zip(kept, shapes(name), strict=True):
                     assert output.shape == lead + shape
                     assert output.dtype == np.float64 and np.isfinite(output).all()
-                    assert output.ndim == 0 or output.flags.c_contiguous
+                    assert not output.ndim or (output.flags.carray and output.flags.writeable)
+                copies = copy.deepcopy(kept)
+                for output in call(model, name, other):
+                    if output.ndim:
+                        output[...] = np.nan
+                assert_same(kept, copies)
+                assert_same(call(model, name, given), copies)
+                assert_same(given.values(), before.values())
 
 
-def test_batch_is_its_states_one_by_one(model):
-    """And single states are repeated over a batch."""
+def test_batch_is_its_states_one_by_one_in_any_layout_and_type(model):
     for name in CALLS:
         for count, apart in ((1, 1), (500, 97)):
             batch = states(count)
@@ -53,10 +61,7 @@ def test_batch_is_its_states_one_by_one(model):
                 mixed = one | {varied: batch[varied]}
                 repeated = {key: np.broadcast_to(mixed[key], (5, SIZES[key])) for key in arguments}
                 assert_same(call(model, name, mixed), call(model, name, repeated))
-
-
-def test_neither_layout_nor_type_matters(model):
-    """Every kind for one function, one kind for every function."""
+    # neither layout nor type matters: every kind for one function, one kind for every function
     types = (np.float32, np.float16, np.int64, np.int8, np.uint16)
     whole = {key: np.arange(1.0, 1 + size) % 5 for key, size in SIZES.items()}
     ways = [(form, SOUND[form], given) for form in SOUND for given in (state(), states(3))]
@@ -69,31 +74,6 @@ def test_neither_layout_nor_type_matters(model):
                 assert_same(call(model, name, changed), call(model, name, given))
 
 
-def test_arguments_are_left_alone_and_outputs_are_the_callers_own(model):
-    for name in CALLS:
-        for given, other in ((state(1), state(2)), (states(3, 1), states(3, 2))):
-            with row(name):
-                before, kept = copy.deepcopy(given), call(model, name, given)
-                copies = copy.deepcopy(kept)
-                assert all(not np.ndim(o) or o.flags.writeable for o in kept)
-                for output in call(model, name, other):
-                    if output.ndim:
-                        output[...] = np.nan
-                assert_same(kept, copies)
-                assert_same(call(model, name, given), copies)
-                assert_same(given.values(), before.values())
-
-
-# What is refused
-
-
-class Foreign:
-    """An array of another package that NumPy cannot read, as casadi.SX is."""
-
-    def __array__(self, *_args, **_options):
-        raise Exception("no numbers in here")
-
-
 def of_arguments(rows):
     """Yield function, argument and value: the first on every argument of all, others on ONE's."""
     for k, value in enumerate(rows):
@@ -103,7 +83,6 @@ def of_arguments(rows):
 
 
 def refuse(model, name, arguments, words):
-    """Check that arguments are refused with words after the function's name."""
     with pytest.raises(st.StateError, match=f"^{name}: {words}"):
         call(model, name, arguments)
 
@@ -112,19 +91,14 @@ def test_other_things_than_real_numbers_are_refused(model):
     kinds = (bool, complex, np.complex64, object, "datetime64[s]")
     values = [np.ones(11, kind) for kind in kinds]
     values += [["1.0"] * 11, [None] * 11, None, "upright", {1.0, 2.0}, [[1.0], [1.0, 2.0]]]
-    for name, argument, value in of_arguments([*values, Foreign()]):
+    for name, argument, value in of_arguments([*values, strange.Foreign()]):
         if argument == "f_ext" and value is None:
             continue  # no load
         with row(name, argument, value):
             refuse(model, name, state() | {argument: value}, f"{argument}: type .*real numbers")
-
-
-def test_masked_entries_are_refused_and_counted(model):
     for name, argument, given in of_arguments([state(), states(5)]):
         with row(name, argument):
             masked = np.ma.masked_array(given[argument], np.zeros(given[argument].shape, bool))
-            whole = call(model, name, given | {argument: masked})
-            assert_same(whole, call(model, name, given))
             masked[..., 2] = np.ma.masked
             words = f"{argument}: {masked.size // masked.shape[-1]} masked entries"
             refuse(model, name, given | {argument: masked}, words)
@@ -148,7 +122,7 @@ def test_wrong_shape_is_named_with_the_right_one(model):
             model.kernel("forward_dynamics")(*arguments)
 
 
-def test_not_finite_entry_is_named_with_its_place(model):
+def test_what_gives_no_finite_result_is_named_with_its_place(model):
     for name, argument, bad in of_arguments([np.nan, np.inf, -np.inf]):
         one, batch = state(), states(9)
         one[argument][1], batch[argument][6, 2] = bad, bad
@@ -161,9 +135,6 @@ def test_not_finite_entry_is_named_with_its_place(model):
     for name in ("bias_force", "forward_dynamics", "energy"):
         for arguments, where in ((one, ""), (batch, " of state 6")):
             refuse(model, name, arguments, f"the result{where} is not finite")
-
-
-def test_quaternion_without_direction_is_named(model):
     norms = {0.0: "is zero", 1e-160: "has norm 1e-160", 1e200: r"has norm 1e\+200"}
     for norm, words in norms.items():
         for name in ARGUMENTS if norm == 0 else ["energy", "airborne_rates"]:
@@ -185,3 +156,129 @@ def test_indefinite_inertia_is_named():
     for arguments, where in ((state(), ""), (states(2), " of state 0")):
         words = f"the inertia matrix{where} is not positive definite"
         refuse(endless, "forward_dynamics", arguments, words)
+
+
+def assert_close(found, expected, rtol, atol):
+    """Compare outputs; atol is a part of the largest number of each."""
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_allclose(one, other, rtol=rtol, atol=atol * np.abs(other).max())
+
+
+def test_float_model(model):
+    single = zoo.model("single")
+    for arguments in (state(), states(3)):
+        floats = {key: np.float32(a) for key, a in arguments.items()}
+        for name in CALLS:
+            with row(name):
+                exact = call(single, name, floats)
+                assert_same(call(single, name, arguments), exact)
+                assert {found.dtype for found in exact} == {np.dtype(np.float32)}
+                rounded = {key: a.astype(float) for key, a in floats.items()}
+                assert_close(exact, call(model, name, rounded), 2e-2, 1e-3)
+    with pytest.raises(st.StateError, match=r"v\[0\]: value inf"):
+        single.bias_force(state()["q"], [1e39] + [0] * (SIZES["v"] - 1))
+
+
+def test_quaternion_may_have_any_norm(model):
+    arguments = state()
+    unit = arguments["q"].copy()
+    unit[3:7] /= np.linalg.norm(unit[3:7])
+    for factor in (-1.0, 2.0**-40, 3.7, 1e-100, 1e100):
+        scaled = np.r_[unit[:3], factor * unit[3:7], unit[7:]]
+        for name in CALLS:
+            with row(name, factor):
+                found, expected = (call(model, name, arguments | {"q": q}) for q in (scaled, unit))
+                assert_close(found, expected, 1e-11, 1e-13)
+
+
+def test_names_of_the_field_and_loads_by_name(model):
+    q, v, v_dot, tau, f_ext = map(state().get, ("q", "v", "v_dot", "tau", "f_ext"))
+    assert_same(model.crba(q), model.mass_matrix(q))
+    assert_same(model.nle(q, v), model.bias_force(q, v))
+    assert_same(model.rnea(q, v, v_dot), model.inverse_dynamics(q, v, v_dot))
+    for load in (None, f_ext):
+        assert_same(model.aba(q, v, tau, load), model.forward_dynamics(q, v, tau, load))
+    every = np.arange(1.0, 1 + SIZES["f_ext"])
+    load = model.external_force(every[:3], moment=[4, 5, 6], tail=every[6:].reshape(-1, 3))
+    np.testing.assert_array_equal(load, every)
+    np.testing.assert_array_equal(model.external_force(), np.zeros(SIZES["f_ext"]))
+    for name, value in (("force", (1, 2)), ("force", "xyz"), ("moment", 1.0), ("tail", every[6:])):
+        with pytest.raises(st.StateError, match=name):
+            model.external_force(**{name: value})
+
+
+def test_function_left_out_is_named_with_the_remedy():
+    bare = zoo.model("bare")
+    for name in CALLS.keys() - {"forward_dynamics"}:
+        with pytest.raises(st.ModelError, match=f"bare .*'{name}'.*forward_dynamics.*`functions`"):
+            call(bare, name, state())
+    with pytest.raises(st.ModelError, match=r"bare .*'energy'"):
+        _ = bare.casadi.energy
+    assert not hasattr(bare.casadi, "_repr_html_")
+
+
+def test_kernel_keeps_what_it_needs():
+    whole = st.load(zoo.folder("m2_n2"), {"tail_mass": 0.05})
+    expected, kernel = whole.mass_matrix(state()["q"]), whole.kernel("mass_matrix")
+    gone, *kept = map(weakref.ref, (whole, whole.parameter_vector, whole.library))
+    del whole
+    gc.collect()
+    assert gone() is None
+    assert all(reference() is not None for reference in kept)
+    np.testing.assert_array_equal(kernel(state()["q"]), expected)
+    del kernel
+    gc.collect()
+    assert kept[0]() is None
+
+
+@pytest.fixture(params=["m1_n3", "arcs2"])
+def moving(request):
+    model, rng = zoo.model(request.param), np.random.default_rng(1)
+    x = rng.normal(size=model.nq + model.nv)
+    x[3:7] /= np.linalg.norm(x[3:7])
+    return model, x, 1e-3 * rng.normal(size=model.layout.nt)
+
+
+def test_x_dot_is_of_turns_and_accelerations_and_mends_the_norm(moving):
+    """The square s of the norm follows s_dot = 2 (1 - s) s; states may be in rows."""
+    (model, x, u), h = moving, 1e-6
+    nq, omega, x_dot = model.nq, x[model.nq + 3 : model.nq + 6], model.x_dot(x, u)
+    assert np.array_equal(x_dot[:3], x[nq : nq + 3])
+    assert np.array_equal(x_dot[7:nq], x[nq + 6 :])
+    assert np.array_equal(x_dot[nq:], model.forward_dynamics(x[:nq], x[nq:], u))
+    turns = Rotation.from_quat(np.roll(x[3:7], -1)) * Rotation.from_rotvec(np.outer([h, -h], omega))
+    after, before = (np.roll(q, 1) * np.sign(np.roll(q, 1) @ x[3:7]) for q in turns.as_quat())
+    assert np.allclose(x_dot[3:7], (after - before) / (2 * h), rtol=0, atol=1e-9)
+    x[3:7] *= 1.1
+    expected = 1.1 * x_dot[3:7] + (1 - 1.21) * x[3:7]
+    assert np.allclose(model.x_dot(x, u)[3:7], expected, rtol=1e-13, atol=1e-13)
+    assert np.array_equal(model.x_dot(np.stack([x, 2 * x]), u)[0], model.x_dot(x, u))
+    A, B = model.x_dot_derivatives(x, np.stack([u, 3 * u]))
+    assert np.array_equal(A[1], model.x_dot_derivatives(x, 3 * u)[0])
+    assert B.shape == (2, len(x), len(u))
+    for wrong, words in (
+        (x[1:], rf"x has shape \({len(x) - 1},\).*{len(x)}.*\({nq}\).*\({model.nv}\)"),
+        (np.float64(1), r"x has shape \(\)"),
+        (x * np.nan, r"x\[0\]: value nan"),
+        (0 * x, "quaternion"),
+    ):
+        for method in (model.x_dot, model.x_dot_derivatives):
+            with row(words), pytest.raises(st.StateError, match=words):
+                method(wrong, u)
+
+
+def test_values_and_derivatives_are_casadis_interpreted_and_compiled(moving):
+    model, x, u = moving
+    p, f = model.casadi.parameter_vector, model.casadi.x_dot
+    compiled = model.casadi.external("x_dot", derivatives=1)
+    folded = model.casadi.external("x_dot", derivatives=1, folded=True)
+    assert (compiled.name_in(), folded.name_in()) == (["x", "u", "p"], ["x", "u"])
+    jacobian = f.factory("J", ["x", "u", "p"], ["jac:x_dot:x", "jac:x_dot:u"])
+    for norm in (1.0, 0.7):
+        x[3:7] *= norm
+        for found, rtol in ((f(x, u, p), 1e-9), (compiled(x, u, p), 1e-13), (folded(x, u), 1e-13)):
+            assert np.allclose(found.full()[:, 0], model.x_dot(x, u), rtol=rtol, atol=rtol)
+        for own, other in zip(model.x_dot_derivatives(x, u), jacobian(x, u, p), strict=True):
+            assert np.abs(own - other.full()).max() < 1e-12 * np.abs(own).max()
+    by_x = folded.factory("J", ["x", "u"], ["jac:x_dot:x"])(x, u).full()
+    assert np.allclose(by_x, model.x_dot_derivatives(x, u)[0], rtol=1e-11, atol=1e-11)

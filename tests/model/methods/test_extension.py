@@ -7,6 +7,7 @@ import subprocess
 import sys
 import sysconfig
 import tracemalloc
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,6 @@ from ...support.rows import row
 from .conftest import ARGUMENTS, CALLS, FORMS, assert_same, call, state, states
 
 HEADERS = Path(sysconfig.get_path("include"))
-WARNINGS = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
 
 
 def by_ctypes(model):
@@ -41,6 +41,11 @@ def answer(model, name, arguments):
 
 
 def test_both_ways_give_the_same_bits_and_words(model):
+    """The fast one takes matching arrays and no others."""
+    s = state()
+    model.energy(s["q"], s["v"])
+    fast, there = model.kernels["energy"].fast, calls.extension() is not None
+    assert (fast(s["q"], s["v"]) is not None) == there and fast(s["q"], [0] * 10) is None
     single, floats = st.load(zoo.folder("single")), {k: np.float32(a) for k, a in state().items()}
     for each, givens in ((model, (state(), states(1), states(3))), (single, (state(), floats))):
         plain = by_ctypes(each)
@@ -48,10 +53,8 @@ def test_both_ways_give_the_same_bits_and_words(model):
             for given in givens:
                 for form, change in FORMS.items():
                     changed = {key: change(array) for key, array in given.items()}
-                    tried = [changed]
-                    if given["q"].ndim == 1:
-                        tried += [given | {one: changed[one]} for one in ARGUMENTS[name]]
-                    for arguments in tried:
+                    alone = ARGUMENTS[name] if given["q"].ndim == 1 else []
+                    for arguments in (changed, *(given | {one: changed[one]} for one in alone)):
                         with row(each, name, given["q"].shape, form):
                             assert answer(each, name, arguments) == answer(plain, name, arguments)
 
@@ -68,17 +71,21 @@ def test_calls_hold_neither_results_nor_arguments_and_leave_nothing_in_memory(mo
     s, other = state(), state()["q"].astype("datetime64[s]")
 
     def work(times):
-        for _ in range(times):
+        for k in range(times):
             model.forward_dynamics(s["q"], s["v"], s["tau"])
             model.energy(s["q"], s["v"])
-            model.momentum(s["q"], FORMS["strided"](s["v"]))
-        for _ in range(times // 100):
-            with pytest.raises(st.StateError):
-                model.energy(other, s["v"])
-            with pytest.raises(st.StateError):
-                model.mass_matrix(0 * s["q"])
+            model.momentum(s["q"], FORMS["spread"](s["v"]))
+            if k % 100 == 0:
+                for wrong in (other, 0 * s["q"]):
+                    with pytest.raises(st.StateError):
+                        model.energy(wrong, s["v"])
+        return now()
+
+    def now():
+        """Bytes that Python holds, and pages of the process."""
         gc.collect()
-        return np.array([tracemalloc.get_traced_memory()[0], pages()])
+        pages = Path("/proc/self/statm").read_text().split()[1]
+        return np.array([tracemalloc.get_traced_memory()[0], int(pages)])
 
     tracemalloc.start()
     try:
@@ -86,35 +93,26 @@ def test_calls_hold_neither_results_nor_arguments_and_leave_nothing_in_memory(mo
         grown = -work(1000) + work(15_000)
     finally:
         tracemalloc.stop()
-    assert grown[0] < 15_000  # bytes: of each call less than one
-    before = pages()
+    assert grown[0] < 15_000  # of each call less than one
+    grown -= now()
     for _ in range(300):
         copy.copy(model).energy(s["q"], s["v"])
-    gc.collect()
-    assert (grown[1] + pages() - before) * os.sysconf("SC_PAGE_SIZE") < 1_000_000
+    assert (grown + now())[1] * os.sysconf("SC_PAGE_SIZE") < 1_000_000
 
 
-def pages():
-    return int(Path("/proc/self/statm").read_text().split()[1])
+def test_a_call_keeps_what_it_works_on_and_may_run_within_a_call(model):
+    """Threads that make a kernel's first call at once each make what calls; one of them stays.
 
-
-def test_a_call_keeps_what_it_works_on(model):
-    """Threads that make a kernel's first call at once each make what calls; one of them stays."""
-    s = state()
-    expected = model.energy(s["q"], s["v"])
-    function = copy.copy(model).kernel("energy")
+    Garbage that is collected while outputs are copied may run a call of the same function.
+    """
+    (a, b), function = (state(1), state(2)), copy.copy(model).kernel("energy")
+    outer, inner = (model.energy(s["q"], s["v"]) for s in (a, b))
     first, second = function._prepared(), function._prepared()
     assert first is not second and function.fast is second
     del function
     gc.collect()
     filler = [np.full(size, np.nan) for size in range(1, 40) for _ in range(200)]
-    assert first(s["q"], s["v"]) == second(s["q"], s["v"]) == expected and filler
-
-
-def test_a_call_within_a_call(model):
-    """Garbage that is collected while outputs are copied may run a call of the same function."""
-    a, b = state(1), state(2)
-    expected = {k: model.energy(s["q"], s["v"]) for k, s in enumerate((a, b))}
+    assert first(a["q"], a["v"]) == second(a["q"], a["v"]) == outer and filler
     found, within = [], []
 
     def collected(phase, _):
@@ -127,11 +125,25 @@ def test_a_call_within_a_call(model):
     gc.callbacks.append(collected)
     gc.set_threshold(1)
     try:
-        outer = [model.energy(a["q"], a["v"]) for _ in range(200)]
+        around = {model.energy(a["q"], a["v"]) for _ in range(200)}
     finally:
         gc.set_threshold(*thresholds)
         gc.callbacks.remove(collected)
-    assert found and set(found) == {expected[1]} and set(outer) == {expected[0]}
+    assert {*found} == {inner} and around == {outer}
+
+
+def test_threads_share_a_model(model):
+    """By ctypes other threads run while C does."""
+    rows = list(zip(*map(states(300).get, ("q", "v", "tau")), strict=True))
+    expected, usual = [model.forward_dynamics(*each) for each in rows], sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)  # as often as can be
+    try:
+        for function in (each.forward_dynamics for each in (model, by_ctypes(model))):
+            with ThreadPoolExecutor(8) as pool:
+                found = pool.map(function, *zip(*(8 * rows), strict=True))
+                np.testing.assert_array_equal(list(found), 8 * expected)
+    finally:
+        sys.setswitchinterval(usual)
 
 
 def test_where_it_cannot_be_had_or_calls_are_long_ctypes_serves(model, monkeypatch, tmp_path):
@@ -146,20 +158,18 @@ def test_where_it_cannot_be_had_or_calls_are_long_ctypes_serves(model, monkeypat
             change(changed)
             assert calls.extension.__wrapped__() is None
     for owner, name, lack in ((calls, "extension", lambda: None), (kernel, "MOST_HELD", 0)):
-        with monkeypatch.context() as changed:
-            changed.setattr(owner, name, lack)
-            other = copy.copy(model)
-            for function in CALLS:
-                with row(name, function):
-                    found = call(other, function, state())
-                    call(other, function, state(2))
-                    assert_same(found, call(model, function, state()))
-                    assert other.kernels[function].fast in (calls.declined, None)
-
-
-def test_it_compiles_without_warnings(tmp_path):
-    made = str(tmp_path / "calls.o")
-    headers = ("-isystem", str(HEADERS))
-    command = (*next(iter(candidates())), *WARNINGS, *headers, "-c", str(calls.SOURCE), "-o", made)
+        monkeypatch.setattr(owner, name, lack)
+        other = copy.copy(model)
+        for function in CALLS:
+            with row(name, function):
+                found = call(other, function, state())
+                call(other, function, state(2))
+                assert_same(found, call(model, function, state()))
+                assert other.kernels[function].fast in (calls.declined, None)
+        monkeypatch.undo()
+    # it compiles without warnings
+    flags = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror", "-c")
+    places = ("-isystem", HEADERS, calls.SOURCE, "-o", tmp_path / "calls.o")
+    command = [*next(iter(candidates())), *flags, *places]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
