@@ -116,11 +116,23 @@ DESIGNS = {
 }
 
 
-def refused(words, **changes):
+STOPS = {
+    r"start: tail coordinate 0 is 1\.": {
+        "start": (np.eye(11)[3] + 1.5 * np.eye(11)[7], np.zeros(10))
+    },
+    r"goal\.tail: tail coordinate 1 is -1\.2": {"goal": Goal(tail=[0.0, -1.2, 0, 0])},
+    "duration: value -1": {"goal": Goal(tail=[0.0, None, 0, 0]), "duration": -1},
+    "free_start.tail: tail coordinate 0": {"free_start": {"tail": (-1.5, 0.1)}},
+    "design.tail_stop_lower": {"design": {"tail_stop_lower": (-1.0, -0.5)}},
+}
+
+
+def refused(words, model=None, **changes):
     """Check what the error of a problem with something wrong says."""
-    given = {"start": start(rat()), "duration": DURATION} | changes
+    model = model or rat()
+    given = {"start": start(model), "duration": DURATION} | changes
     with row(words), pytest.raises(st.PlanningError, match=words):
-        st.plan(rat(), **given)
+        st.plan(model, **given)
 
 
 def test_what_is_wrong_is_named():
@@ -144,6 +156,8 @@ def test_wrong_ranges_are_named():
         refused(words, free_start=ranges, bounds=bounds)
     for words, ranges in DESIGNS.items():
         refused(words, design=ranges)
+    for words, changes in STOPS.items():
+        refused(words, zoo.model("elastic"), **changes)
 
 
 def test_parameters_that_do_nothing_are_refused():
