@@ -29,7 +29,7 @@ USUAL = {"objective": "effort", "smoothing": 0.0, "damping": 0.0, "path": (), "c
 USUAL |= {"legs": None, "formulation": "airborne", "attitude": "quaternion"}
 VALUES = {"start": 3, "duration": 0, "bounds": 0.02, "goal": 3, "objective": "least"}
 VALUES |= {"formulation": "euler", "attitude": "matrix", "damping": -1e-3, "smoothing": "none"}
-VALUES |= {"path": None, "rule": "radaw", "degree": 12, "intervals": 0, "most_intervals": 0}
+VALUES |= {"path": None, "rule": "radaw", "intervals": 0, "most_intervals": 0}
 VALUES |= {"controls": 2.5, "rounds": -1, "multi_start": 0, "retries": True, "seed": -1}
 VALUES |= {"tolerance": 0.0, "tail_tolerance": 0.0, "rate_tolerance": "x", "time_limit": 0}
 VALUES |= {"guess": 3, "guess_damping": -1, "track": 1, "dynamics": "c", "watch": 3}
@@ -70,6 +70,10 @@ PROBLEM = {
     r"path\[0\]: the start has .*entry": {"path": [(lambda p: p.tail, 0.5, 1)]},
     r"path\[0\]: the start has 0.3, ": {"path": [(lambda p: p.position[2], 0, 0.2)]},
     r"path\[1\]: the start has 0, ": {"path": [(first, -9, 9), (lambda p: p.time, 0.1, 1)]},
+    "degree: value 0": {"rule": "radau", "degree": 0},
+    "degree: value 6": {"rule": "radau", "degree": 6},  # one too many
+    "degree: value 2.0": {"rule": "radau", "degree": 2.0},
+    "degree: value 3": {"rule": "trapezoidal", "degree": 3},
     "setting: value 'num_nodes': .*'intervals'": {"num_nodes": 59},
     "setting: value 'interval': .*'intervals'": {"interval": 20},
     "solver: value 'ipotp': .*'ipopt'": {"solver": "ipotp"},

@@ -200,6 +200,8 @@ def test_wrong_settings_are_refused(plan, tmp_path):
         mpc.write_c(3)
     with pytest.raises(OSError, match="is not a folder"):
         mpc.write_c(mpc.write_c(tmp_path / "made" / "here")[0])
+    first, again = (st.Mpc(rat(), plan).write_c(tmp_path / name) for name in "ab")
+    assert [path.read_bytes() for path in first] == [path.read_bytes() for path in again]
 
 
 def test_models_and_plans_that_do_not_fit_are_refused(plan):
