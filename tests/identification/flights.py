@@ -29,33 +29,20 @@ def elastic(name="elastic"):
 
 def start(model, seed=0):
     """Return a tumbling state with a bent tail."""
-    rng = np.random.default_rng(seed)
-    q = np.zeros(model.nq)
-    q[2] = 0.5
+    rng, nt = np.random.default_rng(seed), model.nq - 7
     quaternion = np.array([1.0, 0, 0, 0]) + 0.2 * rng.standard_normal(4)
-    q[3:7] = quaternion / np.linalg.norm(quaternion)
-    q[7:] = 0.25 * rng.standard_normal(model.nq - 7)
-    v = np.concatenate(
-        [[0.3, 0.5, 1.5], 3 * rng.standard_normal(3), 4 * rng.standard_normal(model.nq - 7)]
-    )
-    return np.concatenate([q, v])
+    quaternion /= np.linalg.norm(quaternion)
+    q = np.concatenate([[0, 0, 0.5], quaternion, 0.25 * rng.standard_normal(nt)])
+    turning = [3 * rng.standard_normal(3), 4 * rng.standard_normal(nt)]
+    return np.concatenate([q, [0.3, 0.5, 1.5], *turning])
 
 
 def flown(model, times, x0, torque=None, rtol=1e-10):
     """Return states (F, nx) of a flight under torques, a function of the time."""
-    nt = model.nq - 7
-    tau = torque or (lambda _t: np.zeros(nt))
-    solution = solve_ivp(
-        lambda t, x: model.x_dot(x, tau(t)),
-        (times[0], times[-1]),
-        x0,
-        method="DOP853",
-        t_eval=times,
-        rtol=rtol,
-        atol=1e-2 * rtol,
-        max_step=0.02,
-    )
-    return solution.y.T
+    tau = torque or (lambda _t: np.zeros(model.nq - 7))
+    how = {"rtol": rtol, "atol": 1e-2 * rtol, "max_step": 0.02, "t_eval": times}
+    ends = times[0], times[-1]
+    return solve_ivp(lambda t, x: model.x_dot(x, tau(t)), ends, x0, "DOP853", **how).y.T
 
 
 def seen(model, states):
@@ -75,8 +62,7 @@ def placed(model):
 
 def tracks(model, times, states, noise=0.0, seed=1, gaps=0.0):
     """Return tracks of a flight, with noise (m) and a share of gaps."""
-    rng = np.random.default_rng(seed)
-    positions = seen(model, states)
+    rng, positions = np.random.default_rng(seed), seen(model, states)
     positions = positions + noise * rng.standard_normal(positions.shape)
     positions[rng.random(positions.shape[:2]) < gaps] = np.nan
     return st.marker_tracks(times, positions, list(placed(model)), unit="m")

@@ -15,7 +15,6 @@ from tests.identification.flights import flown, placed, scene, start, tracks
 from tests.support import zoo
 from tests.support.rows import row
 
-TIMES = np.linspace(0, 0.05, 11)
 SCENE = front.ROOT / "scenes" / "identify_tail.toml"
 
 
@@ -60,13 +59,6 @@ def test_wrong_tables_are_told(tmp_path, capsys):
             assert re.search(words, capsys.readouterr().err)
 
 
-@pytest.fixture(scope="module")
-def found():
-    model = zoo.model("m1_n3")
-    data = tracks(model, TIMES, flown(model, TIMES, start(model)), 3e-4, gaps=0.1)
-    return st.identify(model, data, placed(model), torques=st.TorquePrior(1e-3, 0.05))
-
-
 def unpacked(text, rows):
     """Columns of floats, as viewer/src/data.js reads them."""
     planes = np.frombuffer(gzip.decompress(base64.b64decode(text)), np.uint8).reshape(4, -1)
@@ -75,28 +67,24 @@ def unpacked(text, rows):
     return bits.view(np.float32).T
 
 
-def test_the_page_has_the_measured_markers_and_their_gaps(found, tmp_path):
-    page = found.view(tmp_path / "page.html").read_text()
-    data = json.loads(re.search(r'<script[^>]*id="data"[^>]*>(.*?)</script>', page, re.DOTALL)[1])
-    (run,) = data["runs"]
-    assert run["markers"] == 7
+def test_page_and_figure_have_what_was_measured_and_its_gaps(tmp_path):
+    model, times, page = zoo.model("m1_n3"), np.linspace(0, 0.05, 11), tmp_path / "page.html"
+    data = tracks(model, times, flown(model, times, start(model)), 3e-4, gaps=0.1)
+    found = st.identify(model, data, placed(model), torques=st.TorquePrior(1e-3, 0.05))
+    text = found.view(page).read_text()
+    text = re.search(r'<script[^>]*id="data"[^>]*>(.*?)</script>', text, re.DOTALL)[1]
+    (run,) = json.loads(text)["runs"]
     seen = found.trials[0].tracks.positions
-    assert np.isnan(seen).any()
+    assert run["markers"] == 7 and np.isnan(seen).any()
     columns = unpacked(run["arrays"]["markers"], run["rows"])
-    np.testing.assert_allclose(columns, seen.reshape(len(TIMES), -1), rtol=1e-6)
-
-
-def test_markers_that_do_not_fit_a_page_are_refused(found, tmp_path):
-    """Of another shape, and of more motions than there are."""
+    np.testing.assert_allclose(columns, seen.reshape(len(times), -1), rtol=1e-6)
     for words, markers in (
         (r"markers: shape \(3, 2\): needs \(11, M, 3\)", [np.zeros((3, 2))]),
         ("markers: 2 entries: needs one of each of 1", [np.zeros((11, 1, 3))] * 2),
     ):
         with row(words), pytest.raises(st.ViewError, match=words):
-            st.view(found.trajectory, tmp_path / "page.html", markers=markers)
+            st.view(found.trajectory, page, markers=markers)
 
-
-def test_the_figure_has_residuals_torques_and_power(found, tmp_path):
     _, axes = found.plot(tmp_path / "residuals.png")
     assert [each.get_ylabel() for each in axes] == ["residual [mm]", "torque [mN m]", "power [mW]"]
     curves = [line.get_ydata() for line in axes[0].lines[:-1]]

@@ -9,57 +9,54 @@ from tests.support.rows import row
 STEP = 0.005  # s
 
 
-def some(frames=6):
-    positions = np.random.default_rng(0).normal(size=(frames, 2, 3))
-    positions[2, 1] = np.nan
-    return st.marker_tracks(STEP * np.arange(frames), positions, ["nose", "tip"], unit="m")
+T, NAMES = np.arange(6.0), ["nose", "tip"]
+X = np.random.default_rng(0).normal(size=(6, 2, 3))
 
 
-def arrays():
-    positions = np.random.default_rng(0).normal(size=(6, 2, 3))
-    return np.arange(6.0), positions, ["a", "b"]
+def some():
+    """Tracks with a gap."""
+    positions = np.where(np.arange(12).reshape(6, 2, 1) == 5, np.nan, X)
+    return st.marker_tracks(STEP * T, positions, NAMES, unit="m")
 
 
 def test_arrays_that_are_no_tracks_are_refused():
-    t, x, n = arrays()
     for words, times, positions, names, how in (
-        ("unit: none is stated", t, x, n, {"unit": None}),
-        ("unit: value 'inch'", t, x, n, {"unit": "inch"}),
-        ("unit: value 3", t, x, n, {"unit": 3}),
-        ("frame 3 .* has 2 s, repeated", np.r_[t[:3], t[2:-1]], x, n, {}),
-        ("frame 1 .* before", t[::-1], x, n, {}),
-        (r"times have shape \(6, 1\)", t[:, None], x, n, {}),
-        (r"shape \(6, 1, 3\): needs \(6, 2, 3\)", t, x[:, :1], n, {}),
-        ("two markers are called 'a'", t, x, ["a", "a"], {}),
-        ("names: value", t, x, "ab", {}),
-        ("names: value", t, x, ["a", " "], {}),
-        ("'b' is at exactly .* in 6 frames", t, x * [[[1], [0]]], n, {}),
-        ("never seen: b", t, x * [[[1], [np.nan]]], n, {}),
-        ("infinite", t, x * np.inf, n, {}),
-        (r"\(3,\): needs 4 frames", t[:3], x[:3], n, {}),
-        ("axes: value 'xzy'", t, x, n, {"axes": "xzy"}),
-        ("axes: value '--xyz'", t, x, n, {"axes": "--xyz"}),
-        ("axes: value 'xyzx'", t, x, n, {"axes": "xyzx"}),
-        ("zeros: value 'maybe'", t, x, n, {"zeros": "maybe"}),
+        ("unit: none is stated", T, X, NAMES, {"unit": None}),
+        ("unit: value 'inch'", T, X, NAMES, {"unit": "inch"}),
+        ("frame 3 .* has 2 s, repeated", np.r_[T[:3], T[2:-1]], X, NAMES, {}),
+        ("frame 1 .* before", T[::-1], X, NAMES, {}),
+        (r"times have shape \(6, 1\)", T[:, None], X, NAMES, {}),
+        (r"shape \(6, 1, 3\): needs \(6, 2, 3\)", T, X[:, :1], NAMES, {}),
+        ("two markers are called 'a'", T, X, ["a", "a"], {}),
+        ("names: value", T, X, "ab", {}),
+        ("names: value", T, X, ["a", " "], {}),
+        ("'tip' is at exactly .* in 6 frames", T, X * [[[1], [0]]], NAMES, {}),
+        ("never seen: tip", T, X * [[[1], [np.nan]]], NAMES, {}),
+        ("infinite", T, X * np.inf, NAMES, {}),
+        (r"\(3,\): needs 4 frames", T[:3], X[:3], NAMES, {}),
+        ("axes: value 'xzy'", T, X, NAMES, {"axes": "xzy"}),
+        ("axes: value '--xyz'", T, X, NAMES, {"axes": "--xyz"}),
+        ("axes: value 'xyzx'", T, X, NAMES, {"axes": "xyzx"}),
+        ("zeros: value 'maybe'", T, X, NAMES, {"zeros": "maybe"}),
     ):
         with row(words), pytest.raises(st.IdentificationError, match=words):
             st.marker_tracks(times, positions, names, **({"unit": "m"} | how))
-    assert len(st.marker_tracks(t[:4], x[:4], n, unit="m").times) == 4
+    assert len(st.marker_tracks(T[:4], X[:4], NAMES, unit="m").times) == 4
     with pytest.raises(st.IdentificationError, match="arrays: value 'c'"):
         some().of(["nose", "c"])
 
 
 def test_units_gaps_and_axes_of_arrays():
-    t, x, names = arrays()
+    x = X.copy()
     x[2, 1] = 0
     x[3, 0, 1] = np.nan
-    found = st.marker_tracks(t, x, names, unit="mm", zeros="gap")
+    found = st.marker_tracks(T, x, NAMES, unit="mm", zeros="gap")
     assert np.argwhere(~found.seen).tolist() == [[2, 1], [3, 0]]
     assert np.isnan(found.positions[3, 0]).all()
     np.testing.assert_allclose(found.positions[4], 1e-3 * x[4], rtol=1e-15)
     for axes, columns, signs in (("zxy", [2, 0, 1], 1), ("-yxz", [1, 0, 2], [-1, 1, 1])):
-        turned = st.marker_tracks(t, x, names, unit="m", zeros="gap", axes=axes).positions
-        np.testing.assert_array_equal(turned[4:], (x[..., columns] * signs)[4:], axes)
+        turned = st.marker_tracks(T, X, NAMES, unit="m", axes=axes).positions
+        np.testing.assert_array_equal(turned, X[..., columns] * signs, axes)
 
 
 def test_written_tracks_are_read_again(tmp_path):
@@ -136,8 +133,16 @@ def test_damaged_files_are_refused_by_line(tmp_path):
             path.write_text("\n".join(change(lines)))
             with row(suffix, words), pytest.raises(st.IdentificationError, match=words):
                 st.read_markers(path, unit)
-    with pytest.raises(st.IdentificationError, match="unit: none is stated"):
-        st.read_markers(st.write_markers(some(), tmp_path / "run.csv"))
+    (tmp_path / "run.trc").write_bytes(b"\x00\xff" * 300)
+    for words, path in (
+        ("unit: none is stated", st.write_markers(some(), tmp_path / "run.csv")),
+        ("data: value 3", 3),
+        (r"tracks.xlsx: needs .*\.trc, \.csv, \.c3d", tmp_path / "tracks.xlsx"),
+        (r"none.trc: cannot be read", tmp_path / "none.trc"),
+        ("is not a text file", tmp_path / "run.trc"),
+    ):
+        with row(words), pytest.raises(st.IdentificationError, match=words):
+            st.read_markers(path)
 
 
 def test_harmless_oddities_of_files_are_read(tmp_path):
@@ -151,15 +156,3 @@ def test_harmless_oddities_of_files_are_read(tmp_path):
     ):
         path.write_text("\n".join(change(lines)))
         np.testing.assert_array_equal(st.read_markers(path).positions, wanted)
-
-
-def test_what_is_no_file_of_tracks_is_refused(tmp_path):
-    (tmp_path / "run.trc").write_bytes(b"\x00\xff" * 300)
-    for path, words in (
-        (3, "data: value 3"),
-        (tmp_path / "tracks.xlsx", r"tracks.xlsx: needs .*\.trc, \.csv, \.c3d"),
-        (tmp_path / "none.trc", r"none.trc: cannot be read"),
-        (tmp_path / "run.trc", "is not a text file"),
-    ):
-        with row(words), pytest.raises(st.IdentificationError, match=words):
-            st.read_markers(path)

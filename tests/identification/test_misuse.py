@@ -65,11 +65,19 @@ def test_models_that_cannot_be_identified_are_refused():
         ("single", [], st.ModelError, "float"),
         ("baked", ["tail_mass"], st.IdentificationError, "baked"),
         ("fixed", [], st.ModelError, "fixed"),
+        (None, [], st.IdentificationError, "model: value 3"),
     ):
         with row(name), pytest.raises(error, match=words):
-            st.identify(zoo.model(name), data, {"a": st.Marker(tail=1)}, names)
-    with pytest.raises(st.IdentificationError, match="model: value 3"):
-        st.identify(3, data, {"a": st.Marker(tail=1)})
+            st.identify(zoo.model(name) if name else 3, data, {"a": st.Marker(tail=1)}, names)
+    for words, given, cutoff in (
+        ("cutoff: value 0", data, 0),
+        ("tracks: type str", "x.trc", 10),
+        ("too few markers", data, 10),
+    ):
+        with row(words), pytest.raises(st.IdentificationError, match=words):
+            st.joint_torques(zoo.model("m1_n3"), given, {"a": st.Marker(tail=1)}, cutoff=cutoff)
+    with pytest.raises(st.ModelError, match="fixed"):
+        st.joint_torques(zoo.model("fixed"), data, {"a": st.Marker(tail=1)}, cutoff=10)
 
 
 def test_too_few_markers_are_refused(flight):

@@ -17,7 +17,6 @@ from serpentail.identification.points import body_points, geometry_of
 from serpentail.identification.trial import world_points
 from tests.identification.flights import flown, placed, start, tracks
 from tests.support import zoo
-from tests.support.rows import row
 
 MODELS = ("m2_n2", "arcs2", "own_links", "own_arcs")  # the last two on a tilted mount
 OFFSET = (0.001, -0.002, 0.003)
@@ -187,17 +186,3 @@ def test_torques_power_and_the_residual_wrench_are_those_of_the_flight():
             off = (found.power - wanted * rates)[INNER]
             np.testing.assert_allclose(off, 0, atol=3e-5 * np.abs(rates).max())
             assert np.abs(found.residual_moment[INNER]).max() < 1e-4
-
-
-def test_bad_arguments_are_refused():
-    model, marker = zoo.model("m1_n3"), {"a": st.Marker(tail=1)}
-    data = st.marker_tracks(np.arange(5.0), np.ones((5, 1, 3)), ["a"], unit="m")
-    for words, given, cutoff in (
-        ("cutoff: value 0", data, 0),
-        ("tracks: type str", "x.trc", 10),
-        ("too few markers", data, 10),
-    ):
-        with row(words), pytest.raises(st.IdentificationError, match=words):
-            st.joint_torques(model, given, marker, cutoff=cutoff)
-    with pytest.raises(st.ModelError, match="fixed"):
-        st.joint_torques(zoo.model("fixed"), data, marker, cutoff=10)

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.checks import Refusals
-from serpentail.planning.problem import checked_problem
+from serpentail.planning.paths_at_start import refuse_violated
 from tests.support import zoo
 from tests.support.models import model_folder
+from tests.support.posed import posed
 from tests.support.rows import row
 from tests.support.tumbling import AGAIN, DURATION, rat, start
 
@@ -25,8 +25,6 @@ NAN, INF = float("nan"), float("inf")
 Goal, Bounds = st.Goal, st.Bounds
 RANGE = {"tail_length": (0.08, 0.25)}
 FATROP = {"solver": "fatrop"}
-USUAL = {"objective": "effort", "smoothing": 0.0, "damping": 0.0, "path": (), "clearance": None}
-USUAL |= {"legs": None, "formulation": "airborne", "attitude": "quaternion"}
 VALUES = {"start": 3, "duration": 0, "bounds": 0.02, "goal": 3, "objective": "least"}
 VALUES |= {"formulation": "euler", "attitude": "matrix", "damping": -1e-3, "smoothing": "none"}
 VALUES |= {"path": None, "rule": "radaw", "intervals": 0, "most_intervals": 0}
@@ -93,24 +91,20 @@ LACKS = {  # what FATROP's stages do not have
     "fatrop.*free_start is given": {"free_start": {"tail": (-0.5, 0.5)}},
     "fatrop.*design is given": {"design": RANGE},
 }
+FREE_VALUES = {"tail": 0.1, "tail_rate": (1, 0), "velocity": (1, 1)}
 FREE = {
     "free_start: value 3": 3,
     "free_start: part: value 'tails': .*'tail'": {"tails": (0, 1)},
-    "free_start.tail: value 0.1": {"tail": 0.1},
-    r"free_start.tail: value \(1, 0\)": {"tail": (1, 0)},
-    r"free_start.tail: value \(1, 1\)": {"tail": (1, 1)},
-    r"free_start.tail: value \(0, 0, 0\)": {"tail": ((0, 0, 0), 1)},
+    "free_start.position: value .0, 0, 0, 0.": {"position": ((0, 0, 0, 0), 1)},
     "free_start.torso_rate: value inf": {"torso_rate": (0, INF)},
     "free_start.attitude: ": {"attitude": (0, 1)},
     "bounds.angle: the start's tail coordinate 0": {"tail": (1.2, 1.3)},
 }
 SMALL, LARGE = (1e-5, 1e-5, 1e-5), (1e-5, 1e-5, 3e-5)
+DESIGN_VALUES = {"tail_length": 0.1, "tail_mass": (0.2, 0.1), "torso_mass": (0.2, 0.2)}
 DESIGNS = {
     "design: value 3": 3,
     "design.tail_lenght: .*'tail_length'": {"tail_lenght": (0.1, 0.2)},
-    "design.tail_length: value 0.1": {"tail_length": 0.1},
-    r"design.tail_length: value \(0.2, 0.1\)": {"tail_length": (0.2, 0.1)},
-    r"design.tail_length: value \(0.2, 0.2\)": {"tail_length": (0.2, 0.2)},
     "design.tail_mass: value -0.1": {"tail_mass": (-0.1, 0.1)},
     "design.tail_mass: value nan": {"tail_mass": (0.1, NAN)},
     "design.tail_mass: value '1 m'": {"tail_mass": ("1 m", "2 m")},
@@ -118,8 +112,6 @@ DESIGNS = {
     "design.link_inertia: value 1e-08": {"link_inertia": (1e-8, 1e-7)},
     "link_radius and link_inertia": {"link_radius": (1, 2), "link_inertia": (SMALL, [2e-5] * 3)},
 }
-
-
 STOPS = {
     r"start: tail coordinate 0 is 1\.": {"start": ([*np.eye(7)[3], 1.5, 0, 0, 0], np.zeros(10))},
     r"goal\.tail: tail coordinate 1 is -1\.2": {"goal": Goal(tail=[0.0, -1.2, 0, 0])},
@@ -154,8 +146,12 @@ def test_what_is_wrong_is_named():
 
 def test_wrong_ranges_are_named():
     bounds = Bounds(angle=np.pi / 3)
+    for name, value in FREE_VALUES.items():
+        refused(re.escape(f"free_start.{name}: value {value!r}"), free_start={name: value})
     for words, ranges in FREE.items():
         refused(words, free_start=ranges, bounds=bounds)
+    for name, value in DESIGN_VALUES.items():
+        refused(re.escape(f"design.{name}: value {value!r}"), design={name: value})
     for words, ranges in DESIGNS.items():
         refused(words, design=ranges)
     for words, changes in STOPS.items():
@@ -174,44 +170,42 @@ def test_parameters_that_do_nothing_are_refused():
 
 def test_path_constraints_that_a_start_may_meet_are_not_refused():
     """Torques and a free duration are not known there, nor are free starts."""
-    q, v = start(rat())
+    (q, v), model = start(rat()), rat()
+
+    def check(path, **more):
+        given = {"start": (q, v), "duration": (0.1, 0.5), "path": path} | more
+        refuse_violated(model, posed(model, **given)[0])
+
     path = [(lambda p: p.torque, -1e-4, 0.02), (lambda p: p.duration, 0.3, 0.4)]
     path += [(lambda p: p.tail[0], q[7] - 1e-7, 3.0), (lambda p: p.tail_rate[0], -np.inf, 1e3)]
-    given = {"duration": (0.1, 0.5), "rounds": 0, "retries": 0, "intervals": 3, "track": False}
-    given |= {"options": {"ipopt.max_iter": 2}, "tolerance": None, "start": (q, v)}
-    assert not st.plan(rat(), path=path, **given).success
+    check(path)
     path = [(lambda p: p.tail[0], q[7] + 0.01, 3.0)]
+    check(path, free_start={"tail": (q[7:] - 0.1, q[7:] + 0.1)})
     with pytest.raises(st.PlanningError, match=r"path\[0\]: the start has"):
-        st.plan(rat(), path=path, **given)
-    free = {"tail": (q[7:] - 0.1, q[7:] + 0.1)}
-    assert not st.plan(rat(), path=path, free_start=free, **given).success
+        check(path)
 
 
-def posed(duration, bounds, model=None):
-    task = (start(rat()), None, duration, bounds)
-    return checked_problem(model or rat(), task, USUAL, Refusals(ValueError))
+def test_bounds_and_durations_may_have_units_and_slips_of_units_give_a_warning():
+    def asked(duration, bounds, model=None):
+        model = model or rat()
+        return posed(model, start=start(model), duration=duration, bounds=bounds)[0]
 
-
-def test_bounds_and_durations_may_have_units():
-    numbers = posed(0.4, Bounds(angle=np.pi / 3, torque=(0.02, 0.01), rate=np.radians(500)))
-    texts = posed("400 ms", Bounds("60 deg", "500 deg/s", ["20 mN m", "10 N mm"]))
+    numbers = asked(0.4, Bounds(angle=np.pi / 3, torque=(0.02, 0.01), rate=np.radians(500)))
+    texts = asked("400 ms", Bounds("60 deg", "500 deg/s", ["20 mN m", "10 N mm"]))
     assert numbers.duration == texts.duration == (0.4, 0.4)
     for name in ("angle", "rate", "torque"):
         wanted = getattr(numbers.bounds, name)
         np.testing.assert_allclose(getattr(texts.bounds, name), wanted, rtol=1e-15)
-
-
-def test_slips_of_units_give_a_warning():
     for words, duration, bounds in (
         ('duration: value 6 s: .*"6 ms"', 6.0, Bounds()),
         ('torque: value 20 N m: .*"20 mN m"', 0.4, Bounds(torque=20)),
         ('angle: value 60 rad: .*"60 deg"', 0.4, Bounds(angle=60)),
     ):
         with row(words), pytest.warns(st.UnusualSize, match=words):
-            posed(duration, bounds)
-    posed(5.0, Bounds(angle=1e3, torque=None))  # the longest fall; nobody means 1000 degrees
+            asked(duration, bounds)
+    asked(5.0, Bounds(angle=1e3, torque=None))  # the longest fall; nobody means 1000 degrees
     weightless = rat().with_parameters(gravity=0.0)
-    assert posed(580.0, Bounds(torque=None), weightless).duration == (580, 580)
+    assert asked(580.0, Bounds(torque=None), weightless).duration == (580, 580)
 
 
 def test_models_that_lack_functions_are_refused():

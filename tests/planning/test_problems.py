@@ -8,14 +8,13 @@ import pytest
 
 import serpentail as st
 from serpentail.attitude import angle_deg, from_angles, rotation_matrix
-from serpentail.checks import Refusals
 from serpentail.planning.momentum import refuse_impossible
 from serpentail.planning.nlp.coordinates import Attitude
 from serpentail.planning.nlp.node import PARAMETERS, _point, variables_of
 from serpentail.planning.nlp.start import shared_of
-from serpentail.planning.problem import SETTINGS, checked_problem
 from serpentail.planning.result.full_state import com_at_start, full_state
 from tests.support import zoo
+from tests.support.posed import posed
 from tests.support.rows import row
 from tests.support.tumbling import AGAIN, DURATION, integrated, planned, rat, start
 
@@ -95,13 +94,14 @@ def test_goals_of_the_tail_and_of_a_whole_attitude():
 def test_effort_counts_rates_as_torques_of_a_damper():
     fine = {"tolerance": None, "intervals": 20}
     # Of several optima, which one is found from afar hangs on rounding: compare two of one valley.
-    for plan in (planned(**fine), planned(**fine, smoothing=0.0, guess=planned(**fine))):
+    smooth = planned(**fine)
+    for plan in (smooth, planned(**fine, smoothing=0.0, guess=smooth)):
         flight, c = plan.trajectory, plan.problem.smoothing
         integrand = np.sum(flight.tau**2 + (c * flight.v[:, 6:]) ** 2, axis=1)
         total = np.trapezoid(integrand, flight.t)
         assert plan.report["objective"] == pytest.approx(total, rel=1e-2)
     assert plan.report["objective"] == pytest.approx(plan.report["effort"], rel=1e-12)
-    assert plan.report["effort"] < planned(**fine).report["effort"]
+    assert plan.report["effort"] < smooth.report["effort"]
 
 
 def test_own_objectives_see_tail_time_and_parameters():
@@ -174,13 +174,9 @@ def test_points_are_the_models():
 
 def asked(goal, name="m1_n3", **bounds):
     """Refuse a goal, or not."""
-    model, refused = zoo.model(name), Refusals(st.PlanningError)
-    usual = planned(tolerance=None, intervals=8).problem
-    settings = {name: getattr(usual, name) for name in SETTINGS}
-    task = (start(model), goal, DURATION, st.Bounds(**bounds))
-    problem = checked_problem(model, task, settings, refused)
-    refused.tell()
-    refuse_impossible(model, problem)
+    model = zoo.model(name)
+    given = {"start": start(model), "goal": goal, "bounds": st.Bounds(**bounds)}
+    refuse_impossible(model, posed(model, duration=DURATION, **given)[0])
 
 
 def test_goals_that_the_conserved_momentum_forbids_are_refused_and_no_others():

@@ -11,7 +11,6 @@ from serpentail.attitude import angle_deg
 from serpentail.planning.nlp.coordinates import attitude
 from serpentail.planning.result.full_state import full_state
 from serpentail.planning.result.truth import local_errors, open_loop
-from tests.references.passive import PassiveTail
 from tests.support import zoo
 from tests.support.rows import row
 from tests.support.tumbling import AGAIN, DURATION, integrated, planned, rat, rate, start
@@ -193,27 +192,3 @@ def test_a_guess_that_leaves_the_range_of_arcs_serves_until_there():
     settings = {"bounds": st.Bounds(angle=0.7 * most, torque=0.05), "guess_damping": damping}
     plan = st.plan(model, start=(q, v), duration=(0.3, 1.0), track=False, **settings)
     assert plan.success and np.hypot(*plan.trajectory.tail.T).max() < most
-
-
-def test_torques_of_elastic_tails_less_what_springs_and_stops_ask_for_move_one_without():
-    """By SciPy's DOP853, with the reference's forces of springs, damping and stops."""
-    model, bare = zoo.model("elastic"), zoo.model("m2_n2")
-    own, nq = PassiveTail(zoo.ELASTIC, 4), bare.nq
-    plan = st.plan(model, start=start(model), **AGAIN | {"intervals": 16, "track": True})
-    assert plan.report["converged"] and plan.report["dynamics"] == "compiled"
-    assert plan.report["open_loop_attitude_error_deg"] < 0.5
-    assert plan.report["tracked_attitude_error_deg"] < 0.5
-
-    def slope(t, y):
-        q, v = y[:nq], y[nq:]
-        turn = np.concatenate([[-q[4:7] @ v[3:6]], q[3] * v[3:6] + np.cross(q[4:7], v[3:6])]) / 2
-        tau = plan.torque(t)[0] - own.force(q[7:], v[6:])
-        return np.concatenate([v[:3], turn, v[6:], bare.forward_dynamics(q, v, tau)])
-
-    y = np.concatenate([plan.problem.q0, plan.problem.v0])
-    for a, b in zip(plan.curve.ends[:-1], plan.curve.ends[1:], strict=True):
-        y = solve_ivp(slope, (a, np.nextafter(b, a)), y, "DOP853", rtol=1e-8, atol=1e-10).y[:, -1]
-    end = plan.trajectory
-    assert np.abs(end.tail).max() > 0.15  # springs matter
-    np.testing.assert_allclose(y[7:nq], end.tail[-1], atol=2e-2)
-    np.testing.assert_allclose(np.abs(y[3:7]), np.abs(end.q[-1, 3:7]), atol=5e-3)

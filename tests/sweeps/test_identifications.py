@@ -43,45 +43,37 @@ def test_each_row_is_an_identification(recordings, worker, tmp_path):
         estimate = row["parameters"]["tail_mass"]
         assert estimate["value"] == pytest.approx(recordings[row["data"]], rel=1e-4)
         assert estimate["begin"] == row["tail_mass"]
-    page = found.view(1, tmp_path / "page.html")
-    assert '"markers"' in page.read_text(encoding="utf-8")
+    assert '"markers"' in found.view(1, tmp_path / "page.html").read_text(encoding="utf-8")
     columns = found.to_pandas().columns
     assert {"parameters.tail_mass.value", "parameters.tail_mass.std"} < set(columns)
 
 
 def test_rows_depend_on_what_is_in_the_files(recordings, worker, tmp_path):
-    copies = [shutil.copy(path, tmp_path) for path in recordings]
+    copies, gone = [shutil.copy(path, tmp_path) for path in recordings], tmp_path / "gone.csv"
     given = {"store": tmp_path / "rows.db", "executor": worker}
-    assert swept(copies, **given).spent.points == 2
-    assert swept(copies, **given).spent.points == 0
+    assert [swept(copies, **given).spent.points for _ in range(2)] == [2, 0]
     shutil.copy(copies[0], copies[1])
     assert swept(copies, **given).spent.points == 1
-    with pytest.raises(
-        st.SweepError, match=r"data: '.*gone.csv': it cannot be read \(No such file"
-    ):
-        swept([*copies, str(tmp_path / "gone.csv")], **given)
-    (tmp_path / "gone.csv").write_text("nothing")
-    found = swept([str(tmp_path / "gone.csv")], **given)
+    with pytest.raises(st.SweepError, match=r"data: '.*gone.csv': it cannot be read .No such"):
+        swept([*copies, str(gone)], **given)
+    gone.write_text("nothing")
+    found = swept([str(gone)], **given)
     assert found.status().failed == 1 and "IdentificationError" in found[0]["error"]
 
 
 def test_a_scene_asks_for_them(recordings, tmp_path, capsys):
-    markers = placed(zoo.model("m1_n1"))
     for path in recordings:
         shutil.copy(path, tmp_path)
     first, second = (path.rsplit("/", 1)[1] for path in recordings)  # beside the scene
     over = f'data = ["{first}", ["{second}"]]\nnoise = ["1 mm", "0.1 mm"]'
     table = ["[identify]", 'estimate = ["tail_mass"]', 'unit = "m"']
+    text = scene(placed(zoo.model("m1_n1")), *table)
     study = tmp_path / "study.toml"
-    study.write_text(scene(markers, *table) + f'[sweep]\nrun = "identify"\n[sweep.over]\n{over}\n')
+    study.write_text(f'{text}[sweep]\nrun = "identify"\n[sweep.over]\n{over}\n')
     assert cli.main(["sweep", str(study), "--executor", "processes:1"]) == 0
     assert capsys.readouterr().out.startswith("4 of 4 points done, 0 of them failed")
-    rows = st.sweep(
-        study,
-        {"data": st.grid([first, [second]]), "noise": st.grid([1e-3, 1e-4])},
-        "identify",
-        store=study.with_suffix(".db"),
-    )
+    axes = {"data": st.grid([first, [second]]), "noise": st.grid([1e-3, 1e-4])}
+    rows = st.sweep(study, axes, "identify", store=study.with_suffix(".db"))
     assert rows.spent.points == 0
     for k, mass in enumerate(recordings.values()):
         wide, narrow = (rows[2 * k + i]["parameters"]["tail_mass"] for i in (0, 1))

@@ -25,13 +25,9 @@ def model():
     return zoo.model("m1_n1")
 
 
-def over(count=3):
-    return {"tail_mass": st.grid([0.003, 0.005]), "v0": st.sobol(LOW, HIGH)}, count
-
-
 def flights(model, count, **settings):
-    axes, points = over(count)
-    return st.sweep(model, axes, points=points, settings=SETTINGS, **settings)
+    axes = {"tail_mass": st.grid([0.003, 0.005]), "v0": st.sobol(LOW, HIGH)}
+    return st.sweep(model, axes, points=count, settings=SETTINGS, **settings)
 
 
 def close(row, motion):
@@ -96,21 +92,20 @@ class Forgetful(ThreadPoolExecutor):
         return gone
 
 
-def test_a_block_that_a_worker_lost_runs_again():
+def test_a_block_that_a_worker_lost_runs_again_and_an_executor_that_is_gone_is_named(monkeypatch):
     """Three times at most."""
+
+    def squares(executor):
+        return st.sweep(None, {"x": st.grid([3])}, swept.square, executor=executor, limit=60)
+
     with Forgetful(3) as executor:
-        found = st.sweep(None, {"x": st.grid([3])}, swept.square, executor=executor, limit=60)
-    assert [row["square"] for row in found.rows()] == [9]
+        assert [row["square"] for row in squares(executor).rows()] == [9]
     with Forgetful(4) as executor, pytest.raises(st.SweepError, match="the worker has died"):
-        st.sweep(None, {"x": st.grid([3])}, swept.square, executor=executor, limit=60)
-
-
-def test_an_executor_that_is_gone_is_named_in_one_line(model, monkeypatch):
+        squares(executor)
     with ThreadPoolExecutor(1) as executor:
         pass  # it takes no more work
-    told = r"its workers are gone.*after shutdown"
-    with pytest.raises(st.SweepError, match=told):
-        flights(model, 2, executor=executor, limit=60)
+    with pytest.raises(st.SweepError, match=r"its workers are gone.*after shutdown"):
+        squares(executor)
 
     def lost():
         raise ConnectionResetError("reset by the scheduler")
@@ -119,7 +114,7 @@ def test_an_executor_that_is_gone_is_named_in_one_line(model, monkeypatch):
         place = Place(executor.submit, lost)
         monkeypatch.setattr(driver, "place_of", lambda _: nullcontext(place))
         with pytest.raises(st.SweepError, match=r"are gone.*reset by the scheduler"):
-            flights(model, 2, limit=60)
+            squares(None)
 
 
 def test_a_second_call_runs_what_is_missing_only(model, tmp_path):
@@ -129,10 +124,7 @@ def test_a_second_call_runs_what_is_missing_only(model, tmp_path):
     assert again.spent.points == 0 and again.rows() == first.rows()
     more = flights(model, 4, store=store)  # Sobol's first points stay
     assert more.spent.points == 4 and more.status() == Status(8, 8, 0)
-    other = st.sweep(
-        model.with_parameters(torso_mass=0.2), over()[0], points=2, settings=SETTINGS, store=store
-    )
-    assert other.spent.points == 4  # the model is another
+    assert flights(model.with_parameters(torso_mass=0.2), 2, store=store).spent.points == 4
 
 
 def test_failures_are_rows_and_can_be_run_again(model, tmp_path):
@@ -148,8 +140,14 @@ def test_failures_are_rows_and_can_be_run_again(model, tmp_path):
 
 
 def test_functions_are_run_with_and_without_a_model(model, worker, tmp_path):
-    found = st.sweep(None, {"x": st.grid([3, 4])}, swept.square, executor=worker)
-    assert [row["square"] for row in found.rows()] == [9, 16]
+    """What their rows depend on is part of their keys."""
+    given = {"store": tmp_path / "s.db", "executor": worker}
+    for of, points in (("1", 2), ("1", 0), ("2", 2)):
+        found = st.sweep(None, {"x": st.grid([3, 4])}, swept.square, of=of, **given)
+        assert found.spent.points == points
+        assert [row["square"] for row in found.rows()] == [9, 16]
+    with pytest.raises(st.SweepError, match="returned no motion"):
+        found.motion(0)
     axes = {"tail_mass": st.grid([0.002]), "span": st.grid([0.1, 0.2])}
     found = st.sweep(model, axes, swept.fly, executor=worker)
     for row in found.rows():
@@ -158,23 +156,12 @@ def test_functions_are_run_with_and_without_a_model(model, worker, tmp_path):
         assert row["fallen"] == pytest.approx(9.81 * row["span"] ** 2 / 2, rel=0.1)
     page = found.view(1, tmp_path / "page.html")
     assert page.read_text(encoding="utf-8").startswith("<!")
-    with pytest.raises(st.SweepError, match="returned no motion"):
-        st.sweep(None, {"x": st.grid([3])}, swept.square, executor=worker).motion(0)
-
-
-def test_what_function_rows_depend_on_is_part_of_their_keys(worker, tmp_path):
-    given = {"store": tmp_path / "s.db", "executor": worker}
-    for of, points in (("1", 1), ("1", 0), ("2", 1)):
-        assert (
-            st.sweep(None, {"x": st.grid([1])}, swept.square, of=of, **given).spent.points == points
-        )
 
 
 def test_plans_are_rows(model, worker):
-    axes = {"duration": st.grid([0.4, 0.5])}
     settings = {"q0": Q0, "v0": [0, 0, 1, 2, 0, 0, 0, 0], "goal": st.Goal(torso_rate=None)}
-    settings["intervals"] = 4
-    settings |= {"track": False, "tolerance": None}
+    settings |= {"track": False, "tolerance": None, "intervals": 4}
+    axes = {"duration": st.grid([0.4, 0.5])}
     found = st.sweep(model, axes, "plan", settings=settings, executor=worker)
     assert [row["duration_s"] for row in found.rows()] == [0.4, 0.5]
     assert all(row["error"] is None and "success" in row for row in found.rows())
@@ -183,20 +170,19 @@ def test_plans_are_rows(model, worker):
 def test_what_cannot_be_is_refused_in_one_line(model):
     usual = {"model": model, "over": {"tail_mass": st.grid([0.003])}, "run": "simulate"}
     usual |= {"settings": SETTINGS | {"v0": LOW}}
+    for name, value in {"run": "fly", "settings": 3, "limit": 0, "executor": "slurm"}.items():
+        with named(name), pytest.raises(st.SweepError, match=f"{name}: value {value!r}"):
+            st.sweep(**usual | {name: value})
     for words, changes in {
-        "run: value 'fly'": {"run": "fly"},
         "run: value .*simulate": {"run": lambda point: {}, "settings": None},
         "settings: no v0: ": {"settings": {"q0": Q0}},
         "settings: no q0 and no v0: ": {"settings": {}},
         "settings: watch": {"settings": {"watch": print}},
-        "settings: value 3": {"settings": 3},
         "settings: q0: value .*nan": {"settings": {"q0": float("nan")}},
         "outputs: value 'height'": {"outputs": ["height"]},
         "outputs: value 'end_s'": {"outputs": "end_s"},
         r"outputs: value \[\]": {"outputs": []},
         r"outputs: value \['end_s'\]": {"outputs": ["end_s"], "run": "plan"},
-        "limit: value 0": {"limit": 0},
-        "executor: value 'slurm'": {"executor": "slurm"},
         "executor: processes: value 0": {"executor": "processes:0"},
         "over: segments: ": {"over": {"segments": st.grid([1, 2])}},
         "point 1 occurs twice": {"over": {"tail_mass": st.grid([0.003, 0.003])}},
