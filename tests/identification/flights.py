@@ -28,7 +28,6 @@ def elastic(name="elastic"):
 
 
 def start(model, seed=0):
-    """Return a tumbling state with a bent tail."""
     rng, nt = np.random.default_rng(seed), model.nq - 7
     quaternion = np.array([1.0, 0, 0, 0]) + 0.2 * rng.standard_normal(4)
     quaternion /= np.linalg.norm(quaternion)
@@ -38,7 +37,6 @@ def start(model, seed=0):
 
 
 def flown(model, times, x0, torque=None, rtol=1e-10):
-    """Return states (F, nx) of a flight under torques, a function of the time."""
     tau = torque or (lambda _t: np.zeros(model.nq - 7))
     how = {"rtol": rtol, "atol": 1e-2 * rtol, "max_step": 0.02, "t_eval": times}
     ends = times[0], times[-1]
@@ -54,14 +52,12 @@ def seen(model, states):
 
 
 def placed(model):
-    """Return where those markers are."""
     points = len(model.tail_points(np.eye(1, model.nq, 3)[0])) - 1
     tail = {f"tail{k}": st.Marker(tail=k / points) for k in range(1, points + 1)}
     return {name: st.Marker(torso=place) for name, place in TORSO.items()} | tail
 
 
 def tracks(model, times, states, noise=0.0, seed=1, gaps=0.0):
-    """Return tracks of a flight, with noise (m) and a share of gaps."""
     rng, positions = np.random.default_rng(seed), seen(model, states)
     positions = positions + noise * rng.standard_normal(positions.shape)
     positions[rng.random(positions.shape[:2]) < gaps] = np.nan
@@ -69,7 +65,6 @@ def tracks(model, times, states, noise=0.0, seed=1, gaps=0.0):
 
 
 def scene(markers, *more):
-    """Return the text of a scene with a table [identify] of markers, and further lines."""
     head = 'kind = "articulated"\nsegments = 1\nlinks = 1\nfunctions = ["energy"]\n'
     rows = "".join(
         f'[[identify.marker]]\nname = "{name}"\n'

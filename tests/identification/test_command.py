@@ -41,7 +41,6 @@ def test_it_finds_what_the_recording_was_made_with(tmp_path, capsys):
 
 
 def test_wrong_tables_are_told(tmp_path, capsys):
-    """Before the recording is read."""
     text, study = SCENE.read_text(), tmp_path / "scene.toml"
     for words, old, new in (
         ("identify.torques: value 'some'", 'torques = "none"', 'torques = "some"'),

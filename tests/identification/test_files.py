@@ -14,7 +14,6 @@ X = np.random.default_rng(0).normal(size=(6, 2, 3))
 
 
 def some():
-    """Tracks with a gap."""
     positions = np.where(np.arange(12).reshape(6, 2, 1) == 5, np.nan, X)
     return st.marker_tracks(STEP * T, positions, NAMES, unit="m")
 
@@ -97,7 +96,6 @@ def test_c3d_is_read_as_ezc3d_writes_it(tmp_path):
 
 
 def header(old, new):
-    """Change the values of a TRC file's header."""
     return lambda x: [*x[:2], x[2].replace(old, new), *x[3:]]
 
 

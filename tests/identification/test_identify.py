@@ -25,7 +25,6 @@ ALL_MASSES = ["torso_mass", "torso_inertia", "tail_mass"]
 
 
 def waves(t):
-    """Torques, N m."""
     return 2e-3 * np.array([np.sin(40 * t), np.cos(30 * t)])
 
 
@@ -209,7 +208,6 @@ def test_errors_are_as_large_as_told_and_intervals_cover_the_truth(model, names,
 
 
 def motion(model, torque=None):
-    """A motion under torques, and its states."""
     states = flown(model, LATER, start(model), torque)
     tau = np.array([torque(t) if torque else np.zeros(model.nq - 7) for t in LATER])
     return trajectory_of(model, LATER, states, tau), states

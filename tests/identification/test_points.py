@@ -101,7 +101,6 @@ def test_ends_of_intervals_are_those_of_scipy():
 
 
 def interval(model, x, torques, span=0.004):
-    """End of one interval with torques at both ends."""
     nodes = stages.NODES[:, None]
     over = ((1 - nodes) * torques[0] + nodes * torques[1])[None]
     guess = np.tile(x, (1, 3, 1))
@@ -118,7 +117,6 @@ def test_derivatives_of_intervals_are_central_differences(name):
     found = stages.differentiated(model, np.array([0.004]), x[None], over, parts)
 
     def change(h, end_at):
-        """Differences of an interval's end by a function of a step."""
         ahead, behind = (interval(*end_at(sign * h))[0][-1] for sign in (1, -1))
         return stages.difference(model, ahead, behind) / (2 * h)
 

@@ -27,7 +27,6 @@ ENDLESS = {
 
 
 def again(model=None, **settings) -> st.Plan:
-    """A plan of one round."""
     return st.plan(model or rat(), **AGAIN | {"start": start(rat())} | settings)
 
 
@@ -106,7 +105,6 @@ def test_several_guesses_are_as_good_as_one_and_the_solver_uses_one_thread():
 
 
 def endless(name, **settings):
-    """A solve that would take a million iterations."""
     return again(solver=name, options=ENDLESS[name], intervals=20, **settings)
 
 
@@ -138,7 +136,6 @@ def test_what_is_raised_while_a_solve_goes_on_is_raised_after_it(monkeypatch):
 
 
 def test_a_stop_between_rounds_keeps_the_best_round(monkeypatch):
-    """It is good for all but the tolerance."""
     finer, settings = rounds.Search._finer, {"intervals": 6, "tolerance": 1e-12, "rounds": 30}
 
     def interrupted(search, last):

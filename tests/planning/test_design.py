@@ -28,18 +28,15 @@ SETTINGS = {"tolerance": 0.01, "intervals": 12}  # of plans that are true enough
 
 @cache
 def planned() -> st.Plan:
-    """The plan of the rat's own tail and start."""
     return st.plan(rat(), start=start(rat()), **AGAIN, intervals=12)
 
 
 def again(model=None, **settings) -> st.Plan:
-    """A plan of one round, from the plan of the rat's own start."""
     given = AGAIN | {"start": start(rat()), "guess": planned()} | settings
     return st.plan(model or rat(), **given)
 
 
 def ordinary(plan, **parameters):
-    """The least effort of an ordinary plan on a plan's mesh, for other parameters."""
     found = again(rat().with_parameters(**parameters), start=plan.start, guess=plan)
     assert found.report["converged"]
     return found.report["objective"]
@@ -47,18 +44,15 @@ def ordinary(plan, **parameters):
 
 @cache
 def chosen() -> st.Plan:
-    """The tail length of least effort, on a mesh that is fine enough."""
     return again(**LENGTH, **SETTINGS)
 
 
 @cache
 def freed() -> st.Plan:
-    """The start of least effort, on a mesh that is fine enough."""
     return again(guess=None, **FREE, **SETTINGS)
 
 
 def test_parameters_follow_as_in_the_model():
-    """Also mass and length of a tail whose links have their own."""
     own = zoo.model("own_links")
     for model, values in (
         (rat(), {"tail_length": 0.12, "tail_mass": 0.005}),
@@ -79,7 +73,6 @@ def test_parameters_follow_as_in_the_model():
 
 
 def check_derivatives(formulation, attitude, rule):
-    """Those of the program are those of CasADi's differentiation of objective and constraints."""
     model = zoo.model("m1_n1")
     path = ((lambda point: point.tip[2] - point.parameters["tail_length"] * point.time, -1, 1),)
     free = {"tail": ((-0.4, -0.1), (0.4, 0.2)), "tail_rate": (-8, 8), "torso_rate": (-4, 4)}

@@ -42,7 +42,6 @@ SLOW = pytest.mark.slow
 
 
 def planned(problem: dict, seed: int = 0, model: st.Model | None = None, **settings) -> st.Plan:
-    """Return FATROP's plan of a problem for a start, of one round."""
     model = model or rat()
     given = AGAIN | {"solver": "fatrop", "intervals": 12, "start": start(model, seed)}
     return st.plan(model, **given | problem | settings)

@@ -122,7 +122,6 @@ STOPS = {
 
 
 def refused(words, model=None, **changes):
-    """Check what the error of a problem with something wrong says."""
     model = model or rat()
     given = {"start": start(model), "duration": DURATION} | changes
     with row(words), pytest.raises(st.PlanningError, match=words):
@@ -159,7 +158,6 @@ def test_wrong_ranges_are_named():
 
 
 def test_parameters_that_do_nothing_are_refused():
-    """Those of contacts: a plan flies."""
     model = zoo.model("ground_m1_n1")
     name = next(name for name in model.parameters if name.startswith("K_"))
     value, upright = model.parameters[name], np.r_[0, 0, 1, 1, np.zeros(model.nq - 4)]

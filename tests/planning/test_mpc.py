@@ -48,7 +48,6 @@ def test_quadratic_programs_are_solved_as_by_scipy():
 
 
 def disturbed(size: float = 1.0, seed: int = 1):
-    """A start that turns and is bent otherwise than planned."""
     q, v = start(rat(), seed)
     q[7:] += 0.05 * size
     v[3:6] += size * np.array([0.3, -0.2, 0.4])
@@ -227,7 +226,6 @@ def test_models_and_plans_that_do_not_fit_are_refused(plan):
 
 
 def test_a_phase_of_a_sequence_is_controlled_predictively():
-    """From a state that nobody planned for, as by the plan of that state and its controller."""
     right = {"intervals": 11, "duration": 0.3, "goal": st.Goal(torso_rate=None)}
     right |= {"tolerance": None, "track": False}
     tracking = st.Tracking(mpc={"rate": 50, "intervals": 4})

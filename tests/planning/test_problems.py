@@ -36,7 +36,6 @@ def test_damping_is_part_of_the_motion():
 
 
 def test_plans_of_least_time_and_energy_from_passive_flight():
-    """A plan of least effort comes before."""
     settings = {"start": start(rat()), "duration": (0.1, DURATION), "bounds": SOFT, "track": False}
     plan, calm = (st.plan(rat(), objective=name, **settings) for name in ("time", "effort"))
     assert plan.success and plan.duration < 0.95 * calm.duration
@@ -58,7 +57,6 @@ def test_plans_of_least_time_and_energy_from_passive_flight():
 
 
 def test_rate_bounds_hold_at_the_nodes():
-    """Half the rate that the plan would like."""
     given = AGAIN | COARSE | {"goal": st.Goal(torso_rate=None), "guess": planned(**COARSE)}
     given |= {"bounds": st.Bounds(angle=np.pi / 3, rate=2.5)}
     plan = st.plan(rat(), start=start(rat()), **given)
@@ -67,7 +65,6 @@ def test_rate_bounds_hold_at_the_nodes():
 
 
 def test_torques_are_one_polynomial_in_a_control_interval():
-    """However fine the mesh of the states is."""
     for objective, degree in (("effort", 2), ("time", 1)):
         plan = planned(objective=objective, controls=4, intervals=16, tolerance=None)
         assert plan.report["converged"] and plan.mesh.intervals == 16
@@ -173,7 +170,6 @@ def test_points_are_the_models():
 
 
 def asked(goal, name="m1_n3", **bounds):
-    """Refuse a goal, or not."""
     model = zoo.model(name)
     given = {"start": start(model), "goal": goal, "bounds": st.Bounds(**bounds)}
     refuse_impossible(model, posed(model, duration=DURATION, **given)[0])

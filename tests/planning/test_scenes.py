@@ -66,7 +66,6 @@ def test_a_scaled_scene_scales_its_ranges():
 
 
 def test_command_line_prints_one_object(tmp_path, capsys):
-    """Of a plan as usual, and of one that chooses parameters and parts of the start."""
     q, v = (part.tolist() for part in start(rat()))
     usual = f"[plan]\nduration = {DURATION}\nintervals = 8\nstart = {{ q = {q}, v = {v} }}\n"
     free = 'bounds.angle = 1.0\ndesign.tail_length = ["16 cm", 0.24]\n'

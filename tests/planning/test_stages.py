@@ -35,7 +35,6 @@ LIMIT = 30  # s, of a test that waits for a thread
 
 
 def state(nt: int) -> np.ndarray:
-    """A state in units: the quaternion not of norm 1."""
     random = np.random.default_rng(1)
     tail, rate = 0.2 * random.normal(size=nt), 0.3 * random.normal(size=nt)
     return np.concatenate([[0.9, 0.3, 0.2, -0.1], tail, rate])
@@ -47,13 +46,11 @@ def variables(stage, x: np.ndarray) -> np.ndarray:
 
 
 def differences(function, v, step=1e-5):
-    """Central differences (.., v) of a function."""
     rows = [(function(v + step * e) - function(v - step * e)) / (2 * step) for e in np.eye(len(v))]
     return np.stack(rows, axis=-1)
 
 
 def test_derivatives_are_central_differences():
-    """Slopes of the results, and Hessians of the weighted results."""
     for tail, settings in CASES:
         model = rat(*tail)
         x = state(model.layout.nt)
@@ -137,7 +134,6 @@ def program(**settings):
 
 
 def slopes(code, stage, w):
-    """Jacobians of the results of all six stages."""
     code.program_slopes(stage.program, w.ctypes.data)
     stages = stage.all[:6]
     assert all(own.sloped for own in stages)
@@ -146,7 +142,6 @@ def slopes(code, stage, w):
 
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
 def test_stages_have_the_numbers_of_one_thread():
-    """Also in a forked child, which evaluates alone."""
     with program() as (code, stage, w):
         wanted = slopes(code, stage, w)
     for crew in (1, 2, 5):
@@ -206,7 +201,6 @@ def test_rules_are_exact_up_to_their_order_and_no_further():
 
 
 def test_attitude_coordinates_agree():
-    """Rates of both coordinates turn the same matrix."""
     random = np.random.default_rng(0)
     angles, omega, step = random.uniform(-1, 1, 3), random.normal(size=3), 1e-6
     quaternion = from_angles(angles)

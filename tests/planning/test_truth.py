@@ -15,16 +15,11 @@ from tests.support import zoo
 from tests.support.rows import row
 from tests.support.tumbling import AGAIN, DURATION, integrated, planned, rat, rate, start
 
-FORMS = [
-    ("airborne", "quaternion"),
-    ("translation-free", "quaternion"),
-    ("full", "euler"),
-]
+FORMS = [("airborne", "quaternion"), ("translation-free", "quaternion"), ("full", "euler")]
 WEAK = st.Bounds(angle=np.pi / 3, torque=1.5e-3)  # N m: an eighth of what the plan would like
 
 
 def dense(plan, count=4001):
-    """Times and torques of a plan, far more than it has nodes."""
     times = np.linspace(0, plan.duration, count)
     return times, plan.torque(times)
 
@@ -50,7 +45,6 @@ def test_plans_of_all_formulations_reach_the_goal_in_truth():
 
 
 def test_airborne_plans_conserve_momentum_and_move_as_fast_as_they_say():
-    """Between their nodes, too."""
     flight, curve, problem, h = planned().trajectory, planned().curve, planned().problem, 1e-6
     assert np.ptp(flight.angular_momentum, axis=0).max() < 1e-15
     fall = flight.linear_momentum - flight.linear_momentum[0]
@@ -121,7 +115,6 @@ def test_bounds_and_paths_hold_between_nodes():
 
 
 def test_torques_are_never_steeper_than_their_bound():
-    """Between nodes, and from interval to interval."""
     given = AGAIN | {"start": start(rat())}
     given |= {"bounds": st.Bounds(angle=np.pi / 3, torque_rate=0.04)}
     for rule, degree, intervals in (("radau", 3, 12), ("radau", 1, 30), ("lobatto", 3, 12)):
@@ -136,7 +129,6 @@ def test_torques_are_never_steeper_than_their_bound():
 
 
 def test_success_asks_for_attitude_tail_and_rates():
-    """A plan that cannot be refined is flagged where it is not as true as was asked."""
     again = {"guess": planned(), "rounds": 0}
     assert planned(**again).success
     for name in ("tolerance", "tail_tolerance", "rate_tolerance"):

@@ -81,7 +81,6 @@ def driver(folder, executor, **settings):
 
 
 def rows(folder):
-    """The rows of a store, which any process may read meanwhile."""
     path = folder / "s.db"
     if not path.exists():
         return []
@@ -93,7 +92,6 @@ def rows(folder):
 
 
 def wait_for(count, folder, process):
-    """Wait until a store has so many rows, or the process is over."""
     end = time.monotonic() + PATIENCE
     while len(rows(folder)) < count and process.poll() is None:
         assert time.monotonic() < end, process.args
@@ -102,12 +100,10 @@ def wait_for(count, folder, process):
 
 
 def number_of(point):
-    """The number in the text of a point."""
     return int(point.split(":")[1][:-1])
 
 
 def logged(folder):
-    """How often each point was begun."""
     return Counter(map(int, (folder / "log").read_text().split()))
 
 
