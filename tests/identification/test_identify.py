@@ -154,9 +154,6 @@ def test_damping_that_is_not_there_is_at_its_bound():
     assert any(bound) and not all(bound)
 
 
-# Whether errors are as large as the covariance says: e^T C^-1 e of many trials is chi-squared.
-
-
 def drawn(prior, count, rng):
     """Torques of the prior, an exact Ornstein-Uhlenbeck process, as a function of time."""
     fine = np.linspace(FEW[0], FEW[-1], 121)
@@ -202,9 +199,6 @@ def test_errors_are_as_large_as_told_and_intervals_cover_the_truth(model, names,
     assert chi2.ppf(RARE, freedom) < total < chi2.ppf(1 - RARE, freedom)
     least, most = binom.ppf([RARE, 1 - RARE], trials, 0.95)
     assert (covered.sum(axis=0) >= least).all() and (covered.sum(axis=0) <= most).all()
-
-
-# The information of a motion that is yet to be recorded.
 
 
 def motion(model, torque=None):

@@ -86,9 +86,6 @@ def test_derivatives_of_points_are_central_differences():
         np.testing.assert_allclose(slopes, np.stack(wanted, axis=-1), atol=1e-9, err_msg=name)
 
 
-# Intervals.
-
-
 def test_ends_of_intervals_are_those_of_scipy():
     times = np.linspace(0, 0.05, 41)
     for name in ("m1_n3", "elastic", "arcs2"):
@@ -139,8 +136,6 @@ def test_derivatives_of_intervals_are_central_differences(name):
         own = found.by_parameters[0, :, column]
         np.testing.assert_allclose(own, wanted, atol=1e-5 * np.abs(wanted).max() + 1e-9)
 
-
-# Inverse dynamics.
 
 INNER = slice(20, -20)  # frames away from the ends
 

@@ -72,7 +72,15 @@ def test_parameters_follow_as_in_the_model():
             assert float(body.parameters["tail_length"]) == wanted.parameters["tail_length"]
 
 
-def check_derivatives(formulation, attitude, rule):
+@pytest.mark.parametrize(
+    ("formulation", "attitude", "rule"),
+    [
+        ("airborne", "quaternion", "radau"),
+        ("translation-free", "quaternion", "trapezoidal"),
+        ("full", "euler", "radau"),
+    ],
+)
+def test_derivatives_are_casadis(formulation, attitude, rule):
     model = zoo.model("m1_n1")
     path = ((lambda point: point.tip[2] - point.parameters["tail_length"] * point.time, -1, 1),)
     free = {"tail": ((-0.4, -0.1), (0.4, 0.2)), "tail_rate": (-8, 8), "torso_rate": (-4, 4)}
@@ -86,7 +94,7 @@ def check_derivatives(formulation, attitude, rule):
         return ca.sumsqr(point.torque) * point.parameters["torso_inertia"][1]
 
     plan = again(model, guess=None, objective=objective, **settings)
-    problem, found = plan.problem, plan.solution
+    problem = plan.problem
     equations = equations_of_motion(model, design=problem.design)
     nlp = transcription_of(model, problem, uniform(2), collocation_rule(rule, None), equations)
     w, p, lam_f, lam_g = (nlp.functions["hess_lag"].mx_in(k) for k in range(4))
@@ -95,27 +103,14 @@ def check_derivatives(formulation, attitude, rule):
     parts = [ca.gradient(f, w), ca.jacobian(g, w), ca.triu(ca.hessian(total, w)[0])]
     wanted = ca.Function("wanted", [w, p, lam_f, lam_g], parts)
     random = np.random.default_rng(1)
-    point = found.w + random.uniform(-0.05, 0.05, found.w.size)
+    point = plan.solution.w + random.uniform(-0.05, 0.05, plan.solution.w.size)
     parameters, multipliers = np.r_[np.zeros(9), 1.0], random.normal(size=nlp.rows)
-    own = [
-        nlp.functions["grad_f"](point, parameters)[1],
-        nlp.functions["jac_g"](point, parameters)[1],
-        nlp.functions["hess_lag"](point, parameters, 0.7, multipliers),
-    ]
+    own = [nlp.functions[name](point, parameters)[1] for name in ("grad_f", "jac_g")]
+    own.append(nlp.functions["hess_lag"](point, parameters, 0.7, multipliers))
     for ours, casadis in zip(own, wanted(point, parameters, 0.7, multipliers), strict=True):
         atol = 1e-10 * np.abs(casadis.full()).max()
         np.testing.assert_allclose(ours.full(), casadis.full(), atol=atol, rtol=1e-9)
     assert np.abs(own[1].full()[:, 1]).max() > 0  # the length's column
-
-
-def test_derivatives_are_casadis():
-    for row_of in (
-        ("airborne", "quaternion", "radau"),
-        ("translation-free", "quaternion", "trapezoidal"),
-        ("full", "euler", "radau"),
-    ):
-        with row(*row_of):
-            check_derivatives(*row_of)
 
 
 def test_plans_are_true_for_what_they_chose():

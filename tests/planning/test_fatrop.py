@@ -13,6 +13,7 @@ from examples import righting
 from serpentail.attitude import tilt_deg
 from serpentail.planning.condensed import fatrop
 from serpentail.planning.condensed.stages import stages_of
+from serpentail.planning.found import start_blocks
 from serpentail.planning.nlp.bounds import limits
 from serpentail.planning.nlp.equations import equations_of_motion
 from serpentail.planning.nlp.solver import solve, solver
@@ -47,11 +48,6 @@ def planned(problem: dict, seed: int = 0, model: st.Model | None = None, **setti
     return st.plan(model, **given | problem | settings)
 
 
-def blocks(plan: st.Plan) -> dict:
-    q, v = plan.problem.q0, plan.problem.v0
-    return {"attitude": q[3:7], "tail": q[7:], "tail_rate": v[6:]}
-
-
 def conserved(plan: st.Plan) -> np.ndarray:
     h = plan.model.momentum(plan.problem.q0, plan.problem.v0)[1]
     return np.concatenate([h, np.zeros(7)])
@@ -65,13 +61,13 @@ def check_optimum(near: st.Plan, seed: int = 0, rel: float = 1e-8) -> None:
     mesh = replace(near.mesh, guarded=np.ones(near.mesh.intervals, bool))
     nlp = transcription_of(model, near.problem, mesh, near.rule, equations_of_motion(model))
     engine = solver(nlp, "ipopt", {"ipopt.tol": 1e-11}, "close")
-    bounds = limits(nlp, blocks(near), np.zeros(3))
+    bounds = limits(nlp, start_blocks(near.problem), np.zeros(3))
     wanted = solve(engine, bounds, near.solution.w, conserved(near))
     assert near.report["converged"] and wanted.success
     stages = stages_of(model, near.problem, near.mesh, near.rule)
     w = wanted.w * (1 + 1e-6 * np.random.default_rng(seed).normal(size=wanted.w.size))
     engine = fatrop.engine_of({}, "close")
-    found = fatrop.solve_stages(stages, blocks(near), w, conserved(near), engine)
+    found = fatrop.solve_stages(stages, start_blocks(near.problem), w, conserved(near), engine)
     assert found.success, found.status
     assert found.value == pytest.approx(wanted.value, rel=rel)
     np.testing.assert_allclose(found.w, wanted.w, atol=1e-4)
@@ -111,7 +107,7 @@ def test_plans_are_true_keep_their_bounds_between_nodes_and_are_guesses():
     p, engine = conserved(fresh), fatrop.engine_of({}, "close")
     p[:3] = 1e6
     stages = stages_of(rat(), fresh.problem, fresh.mesh, fresh.rule)
-    found = fatrop.solve_stages(stages, blocks(fresh), fresh.solution.w, p, engine)
+    found = fatrop.solve_stages(stages, start_blocks(fresh.problem), fresh.solution.w, p, engine)
     assert (found.success, found.status) == (False, "No_Collocation_Of_Guess")
     np.testing.assert_array_equal(found.w, fresh.solution.w)
 

@@ -153,9 +153,9 @@ def test_runs_that_share_a_controller_have_memories_of_their_own(plan):
 
 
 def test_a_tick_that_fails_is_counted_and_changes_nothing(plan):
+    q, v = disturbed()
     for wrong in (np.nan, np.inf, 1e200):
         mpc = st.Mpc(rat(), plan)
-        q, v = disturbed()
         assert mpc.tick(0.0, q, v)
         before = mpc.torque(0.2)
         assert not mpc.tick(0.01, q, np.where(np.arange(len(v)) == 4, wrong, v))
@@ -166,11 +166,7 @@ def test_a_tick_that_fails_is_counted_and_changes_nothing(plan):
         mpc.begin()
         assert mpc.info["ticks"] == mpc.info["failed"] == 0
         np.testing.assert_allclose(mpc.torque(0.2), plan.torque(0.2)[0], rtol=1e-12)
-
-
-def test_called_by_hand_it_ticks_by_its_clock(plan):
-    mpc = st.Mpc(rat(), plan, rate=50)
-    q, v = disturbed()
+    mpc = st.Mpc(rat(), plan, rate=50)  # called by hand it ticks by its clock
     for t in (0.0, 0.001, 0.0199, 0.02, 0.021, 0.3795, 0.3801, 0.39, 0.45):
         tau = mpc(t, q, v)
     assert mpc.info["ticks"] == 3  # none in the last 20 ms

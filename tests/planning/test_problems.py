@@ -208,9 +208,6 @@ def test_goals_that_the_conserved_momentum_forbids_are_refused_and_no_others():
     asked(st.Goal(**goal))
 
 
-# Models that may touch the ground: as their twins without contacts do.
-
-
 def footed(height, up=2.4, **settings):
     """The model with feet, and the settings of a plan from a height."""
     model = zoo.model("feet_tail")
@@ -227,7 +224,7 @@ def heights(model, plan, first=0):
     return model.contact_points(q, v, np.tile(legs, (len(q), 1)))[0][:, first:, 2].min(axis=1)
 
 
-def test_a_flight_is_that_of_the_twin_without_contacts():
+def test_a_flight_of_a_model_with_feet_is_that_of_its_twin_without_contacts():
     model, settings = footed(0.01)  # in the ground after some ms
     one, other = (st.plan(each, **settings) for each in (rat(), model))
     assert one.success and other.success

@@ -17,22 +17,16 @@ from tests.support.told import besides_progress
 from tests.support.tumbling import DURATION, rat, start
 
 SCENE = Path(__file__).parents[2] / "scenes" / "righting_m1_n3.toml"
+TABLE = tomllib.loads(SCENE.read_text())["plan"]
 NUMBERS = {"iterations", "solve_cpu_s", "objective", "dyn_err", "energy_J"}
 
 
-def table() -> dict:
-    return tomllib.loads(SCENE.read_text())["plan"]
-
-
-def test_scene_has_the_arguments_of_plan():
+def test_scene_has_the_arguments_of_plan_and_errors_name_the_key(tmp_path):
     goal = {"attitude": "free", "tail": ["free", 0.1]}
-    arguments = plan_arguments(table() | {"tolerance": "free", "goal": goal})
+    arguments = plan_arguments(TABLE | {"tolerance": "free", "goal": goal})
     assert arguments["tolerance"] is None
     assert arguments["goal"] == st.Goal(attitude=None, tail=(None, 0.1))
     assert np.linalg.norm(arguments["start"][0][3:7]) == pytest.approx(1, abs=1e-15)
-
-
-def test_scene_errors_name_the_key(tmp_path):
     for words, changes in {
         r"plan.start: value {'q': \[\]}": {"start": {"q": []}},
         r"\[plan.goal\]": {"goal": 3},
@@ -42,9 +36,9 @@ def test_scene_errors_name_the_key(tmp_path):
         "plan.guess: value 3": {"guess": 3},
     }.items():
         with row(words), pytest.raises(st.PlanningError, match=words):
-            plan_arguments(table() | changes)
+            plan_arguments(TABLE | changes)
     for name in ("start", "duration"):
-        rest = {key: value for key, value in table().items() if key != name}
+        rest = {key: value for key, value in TABLE.items() if key != name}
         with pytest.raises(st.PlanningError, match=f"plan.{name}: no value"):
             plan_arguments(rest)
     for text, words in (("kind = ", "scene file"), ('kind = "articulated"\n', "has no table")):

@@ -114,9 +114,6 @@ def test_linear_equations_are_solved_and_singular_ones_refused():
         assert code.factorise(len(singular), singular.ctypes.data, pivots.ctypes.data) == 1
 
 
-# Threads.
-
-
 @contextmanager
 def program(**settings):
     """Yield the code and a program of six stages, and variables at which it can be evaluated."""
@@ -171,8 +168,6 @@ def test_plans_have_as_many_threads_as_the_model_allows_and_do_not_depend_on_the
     assert found[0].report["iterations"] == found[1].report["iterations"]
     np.testing.assert_array_equal(found[0].solution.w, found[1].solution.w)
 
-
-# Rules and meshes.
 
 SCHEMES = [("trapezoidal", None), ("hermite-simpson", None)]
 SCHEMES += [(name, d) for name in ("lobatto", "radau") for d in range(1, MOST_DEGREE + 1)]

@@ -1,5 +1,8 @@
-"""Rows of sweeps are what the runs themselves return, however and wherever they are made."""
+"""Points of sweeps: grids, and points that fill what they are spread in. Rows are what the runs
+themselves return, however and wherever they are made.
+"""
 
+import math
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import nullcontext
 from functools import partial
@@ -7,9 +10,11 @@ from multiprocessing import get_context
 
 import numpy as np
 import pytest
+from scipy.stats import kstest
 
 import serpentail as st
 from serpentail.sweeps import driver, supervision
+from serpentail.sweeps.axes import axes_of
 from serpentail.sweeps.executors import Place
 from serpentail.sweeps.result import Status
 from tests.support import swept, zoo
@@ -77,11 +82,9 @@ def test_points_that_hang_crash_or_raise_are_rows(worker, tmp_path):
 
 
 class Forgetful(ThreadPoolExecutor):
-    """Loses the first `lost` blocks that it gets."""
+    """Loses the first blocks that it gets."""
 
-    def __init__(self, lost):
-        super().__init__(1)
-        self.lost = lost
+    lost = 0
 
     def submit(self, *work):
         if not self.lost:
@@ -98,10 +101,12 @@ def test_a_block_that_a_worker_lost_runs_again_and_an_executor_that_is_gone_is_n
     def squares(executor):
         return st.sweep(None, {"x": st.grid([3])}, swept.square, executor=executor, limit=60)
 
-    with Forgetful(3) as executor:
+    with Forgetful(1) as executor:
+        executor.lost = 3
         assert [row["square"] for row in squares(executor).rows()] == [9]
-    with Forgetful(4) as executor, pytest.raises(st.SweepError, match="the worker has died"):
-        squares(executor)
+        executor.lost = 4
+        with pytest.raises(st.SweepError, match="the worker has died"):
+            squares(executor)
     with ThreadPoolExecutor(1) as executor:
         pass  # it takes no more work
     with pytest.raises(st.SweepError, match=r"its workers are gone.*after shutdown"):
@@ -207,3 +212,88 @@ def test_progress_tells_how_many_are_left(worker):
     told = [each for each in told if each.stage == "sweep"]
     assert told[-1].ended and any("of 40" in each.what for each in told)
     assert any(each.left is not None for each in told[:-1])
+
+
+LAWS = {"random": st.random, "latin": st.latin, "sobol": st.sobol}
+
+
+def points(over, count=None, seed=0):
+    return list(axes_of(over, count, seed))
+
+
+def test_grids_give_all_combinations_in_order():
+    over = {"a": st.grid([1, 2]), ("b", "c"): st.grid([(3, "x"), (4, "y")])}
+    wanted = [(1, 3, "x"), (1, 4, "y"), (2, 3, "x"), (2, 4, "y")]
+    assert points(over) == [dict(zip("abc", values, strict=True)) for values in wanted]
+    assert len(axes_of(over, None, 0)) == 4
+    assert points({"b, c": st.grid([(3, 4)])}) == [{"b": 3, "c": 4}]
+
+
+def test_units_become_those_of_the_names_that_have_one():
+    axes = axes_of({"m, word": st.grid([("2 g", "2nd"), (0.1, "3 s")])}, None, 0)
+    found = [{"m": 0.002, "word": "2nd"}, {"m": 0.1, "word": "3 s"}]
+    assert list(axes.measured({"m": "kg"})) == found
+    spread = axes_of({"m": st.random("2 g", "3 g")}, 4, 0)
+    for unit in ("kg", None):
+        assert all(0.002 <= p["m"] <= 0.003 for p in spread.measured({"m": unit}))
+    for wrong in ({"word": "s"}, {"word": None}):
+        with pytest.raises(st.SweepError, match="over: word: value '2nd'"):
+            axes.measured(wrong)
+    with pytest.raises(st.SweepError, match="over: m: value '2 g': a mass where a length"):
+        spread.measured({"m": "m"})
+    found = points({"p": st.random("-30 deg", "30 deg")}, 50)
+    assert all(abs(each["p"]) <= math.pi / 6 for each in found)
+    assert max(each["p"] for each in found) > 0.4
+
+
+def test_points_are_uniform_and_the_same_again():
+    for name, way in LAWS.items():
+        over = {"a": way([0, 10], [1, 30]), "b": way(1e-3, 1e3, "log"), "c": st.grid([1, 2])}
+        found = points(over, 256, 3)
+        with named(name):
+            assert len(found) == 512 and found == points(over, 256, 3) != points(over, 256, 4)
+            # the points that are spread are the same at each place of the grid
+            assert [{**p, "c": 0} for p in found[:256]] == [{**p, "c": 0} for p in found[256:]]
+            columns = [
+                [p["a"][0] for p in found[:256]],
+                [(p["a"][1] - 10) / 20 for p in found[:256]],
+                [(math.log10(p["b"]) + 3) / 6 for p in found[:256]],
+            ]
+            for column in columns:
+                assert kstest(column, "uniform").pvalue > 1e-3
+                if name != "random":  # each of 256 equal parts has one point
+                    assert sorted(int(256 * x) for x in column) == list(range(256))
+            assert abs(np.corrcoef(columns) - np.eye(3)).max() < 0.2
+    for count in (1, 2, 5):  # Sobol's points may be any number
+        assert len(points({"a": st.sobol(0, 1)}, count)) == count
+
+
+def test_points_that_cannot_be_are_refused_in_one_line():
+    one = {"a": st.random(0, 1)}
+    for words, make in {
+        "grid: value 3": lambda: st.grid(3),
+        "grid: value 'ab'": lambda: st.grid("ab"),
+        "grid: no values": lambda: st.grid([]),
+        "grid: value nan": lambda: st.grid([float("nan")]),
+        "random: low: value '2 apples'": lambda: st.random("2 apples", 3),
+        "random: low: value 1": lambda: st.random(1, 0),
+        "random: low: value 0: .*above 0": lambda: st.random(0, 1, "log"),
+        "latin: law: value 'normal'": lambda: st.latin(0, 1, "normal"),
+        r"low is \(2,\), high is \(\)": lambda: st.sobol([0, 0], 1),
+        "over: value {}": lambda: points({}),
+        "over: value 3": lambda: points({3: st.grid([1])}),
+        r"over\['a'\]: value 3": lambda: points({"a": 3}),
+        r"over\['a, b'\]: value": lambda: points({"a, b": st.random(0, 1)}, 3),
+        "over: a, b: value 1: needs 2": lambda: points({("a", "b"): st.grid([1])}),
+        "'a' twice": lambda: points({"a": st.grid([1]), ("a",): st.grid([2])}),
+        "'b' twice": lambda: points({"a, b": st.grid([[1, 2]]), "b": st.grid([2])}),
+        "latin and random": lambda: points(one | {"b": st.latin(0, 1)}, 3),
+        "points: no value": lambda: points(one),
+        "points: value 3": lambda: points({"a": st.grid([1])}, 3),
+        "points: value 0": lambda: points(one, 0),
+        "seed: value -1": lambda: points(one, 3, -1),
+        "points: value 1000000000": lambda: points(one, 10**9),
+    }.items():
+        with named(words), pytest.raises(st.SweepError, match=words) as caught:
+            make()
+        assert "\n" not in str(caught.value)
