@@ -11,12 +11,8 @@ from scipy.spatial.transform import Rotation
 import serpentail as st
 from tests.support import zoo
 
-TORSO = {
-    "nose": (0.0, 0.05, 0.015),
-    "left": (-0.025, -0.02, 0.02),
-    "right": (0.025, -0.02, 0.02),
-    "back": (0.0, 0.0, 0.03),
-}
+TORSO = {"nose": (0.0, 0.05, 0.015), "left": (-0.025, -0.02, 0.02)}
+TORSO |= {"right": (0.025, -0.02, 0.02), "back": (0.0, 0.0, 0.03)}
 SPRINGS = {"tail_stiffness": 2e-3, "tail_damping": 5e-5, "tail_rest": 0.0}
 SPRINGS |= {"tail_stop_lower": -3.0, "tail_stop_upper": 3.0}  # never reached
 

@@ -70,6 +70,9 @@ def test_units_gaps_and_axes_of_arrays():
 
 
 def test_written_tracks_are_read_again(tmp_path):
+    """Harmless oddities, too: a rate that is off by a per cent or is none, empty lines, cells of
+    spaces at the end.
+    """
     tracks = some()
     for suffix, unit in ((".trc", None), (".trc", "mm"), (".csv", "m")):
         with row(suffix, unit):
@@ -80,6 +83,15 @@ def test_written_tracks_are_read_again(tmp_path):
             np.testing.assert_allclose(found.positions, tracks.positions, rtol=1e-7)
     with pytest.raises(st.IdentificationError, match=r"path: value .*run\.c3d"):
         st.write_markers(tracks, tmp_path / "run.c3d")
+    path = tmp_path / "run.trc"
+    wanted, lines = st.read_markers(path).positions, path.read_text().splitlines()
+    for change in (
+        *(header("200", rate) for rate in ("198", "202", "nan", "unknown")),
+        lambda x: [*x[:5], "", *x[5:], " "],
+        lambda x: [*x[:-1], x[-1] + "\t \t"],
+    ):
+        path.write_text("\n".join(change(lines)))
+        np.testing.assert_array_equal(st.read_markers(path).positions, wanted)
 
 
 def test_c3d_is_read_as_ezc3d_writes_it(tmp_path):
@@ -154,19 +166,6 @@ def test_damaged_files_are_refused_by_line(tmp_path):
             st.read_markers(path)
 
 
-def test_harmless_oddities_of_files_are_read(tmp_path):
-    """A rate that is off by a per cent or is none, empty lines, cells of spaces at the end."""
-    path = st.write_markers(some(), tmp_path / "run.trc")
-    wanted, lines = st.read_markers(path).positions, path.read_text().splitlines()
-    for change in (
-        *(header("200", rate) for rate in ("198", "202", "nan", "unknown")),
-        lambda x: [*x[:5], "", *x[5:], " "],
-        lambda x: [*x[:-1], x[-1] + "\t \t"],
-    ):
-        path.write_text("\n".join(change(lines)))
-        np.testing.assert_array_equal(st.read_markers(path).positions, wanted)
-
-
 SCENE = front.ROOT / "scenes" / "identify_tail.toml"
 
 
@@ -210,14 +209,6 @@ def test_wrong_tables_are_told(tmp_path, capsys):
             assert re.search(words, capsys.readouterr().err)
 
 
-def unpacked(text, rows):
-    """Columns of floats, as viewer/src/data.js reads them."""
-    planes = np.frombuffer(gzip.decompress(base64.b64decode(text)), np.uint8).reshape(4, -1)
-    steps = sum(planes[k].astype(np.uint32) << np.uint32(8 * k) for k in range(4))
-    bits = np.cumsum(steps.reshape(-1, rows), axis=1, dtype=np.uint32)
-    return bits.view(np.float32).T
-
-
 def test_page_and_figure_have_what_was_measured_and_its_gaps(tmp_path):
     model, times, page = zoo.model("m1_n3"), np.linspace(0, 0.05, 11), tmp_path / "page.html"
     data = tracks(model, times, flown(model, times, start(model)), 3e-4, gaps=0.1)
@@ -227,7 +218,12 @@ def test_page_and_figure_have_what_was_measured_and_its_gaps(tmp_path):
     (run,) = json.loads(text)["runs"]
     seen = found.trials[0].tracks.positions
     assert run["markers"] == 7 and np.isnan(seen).any()
-    columns = unpacked(run["arrays"]["markers"], run["rows"])
+    # columns of floats, as viewer/src/data.js reads them
+    packed = gzip.decompress(base64.b64decode(run["arrays"]["markers"]))
+    planes = np.frombuffer(packed, np.uint8).reshape(4, -1)
+    steps = sum(planes[k].astype(np.uint32) << np.uint32(8 * k) for k in range(4))
+    columns = np.cumsum(steps.reshape(-1, run["rows"]), axis=1, dtype=np.uint32)
+    columns = columns.view(np.float32).T
     np.testing.assert_allclose(columns, seen.reshape(len(times), -1), rtol=1e-6)
     for words, markers in (
         (r"markers: shape \(3, 2\): needs \(11, M, 3\)", [np.zeros((3, 2))]),

@@ -152,13 +152,15 @@ def test_wrong_ranges_are_named():
         refused(words, zoo.model("elastic"), **changes)
 
 
-def test_parameters_that_do_nothing_are_refused():
-    model = zoo.model("ground_m1_n1")
+def test_parameters_that_do_nothing_are_refused_and_errors_of_the_users_own_are_not():
+    model = zoo.model("ground_m1_n1")  # a plan flies: parameters of contacts do nothing
     name = next(name for name in model.parameters if name.startswith("K_"))
     value, upright = model.parameters[name], np.r_[0, 0, 1, 1, np.zeros(model.nq - 4)]
+    given = {"start": (upright, 5 * np.eye(model.nv)[3]), "duration": DURATION}
     with pytest.raises(st.PlanningError, match=f"design: value '{name}'"):
-        given = {"start": (upright, 5 * np.eye(model.nv)[3]), "duration": DURATION}
         st.plan(model, design={name: (value, 2 * value)}, **given)
+    with pytest.raises(AttributeError, match="'NoneType' object has no attribute 'torque'"):
+        st.plan(model, objective=lambda p: None.torque, **given)
 
 
 def test_path_constraints_that_a_start_may_meet_are_not_refused():
@@ -203,9 +205,8 @@ def test_bounds_and_durations_may_have_units_and_slips_of_units_give_a_warning()
 
 def test_models_that_lack_functions_are_refused():
     """A scene without derivatives takes the symbolic dynamics, unless that is refused."""
-    names = "mass_matrix inverse_dynamics forward_dynamics rollout energy momentum"
-    # the list of functions is the point
-    model = st.load(model_folder(1, 1, functions=names.split()))
+    names = ["mass_matrix", "inverse_dynamics", "forward_dynamics", "rollout", "energy", "momentum"]
+    model = st.load(model_folder(1, 1, functions=names))  # the list of functions is the point
     given = AGAIN | {"start": start(model), "intervals": 4}
     plan = st.plan(model, **given)
     assert plan.report["dynamics"] == "symbolic" and plan.report["converged"]
@@ -226,14 +227,9 @@ def test_models_that_lack_functions_are_refused():
 def test_goal_that_cannot_be_reached_is_flagged():
     q, v = start(rat())
     v[3] = 60.0  # rad/s, far too fast for the time and torques given
-    bounds = Bounds(angle=np.pi / 3, torque=1e-4)
     settings = {"retries": 0, "options": {"ipopt.max_iter": 60}, "duration": 0.1}
-    plan = st.plan(rat(), start=(q, v), bounds=bounds, **settings)
+    settings["bounds"] = Bounds(angle=np.pi / 3, torque=1e-4)
+    plan = st.plan(rat(), start=(q, v), **settings)
     assert not plan.success and not plan.report["converged"]
     assert plan.report["status"] != "Solve_Succeeded"
     json.dumps(plan.report, allow_nan=False)
-
-
-def test_an_error_of_the_users_own_is_not_taken_for_a_points():
-    with pytest.raises(AttributeError, match="'NoneType' object has no attribute 'torque'"):
-        st.plan(rat(), start=start(rat()), duration=DURATION, objective=lambda p: None.torque)

@@ -20,31 +20,30 @@ def plan():
     return plan_of(1)
 
 
-def quadratic(H, g, lower, upper):
-    """The minimum of d H d / 2 + g d within bounds, by the controller's C, and what it returned."""
-    n = len(g)
-    d, chosen, memory = np.zeros(n), np.zeros(n, np.intc), np.zeros(n * (n + 3))
-    arrays = [np.ascontiguousarray(a, float) for a in (H, g, lower, upper)]
-    places = [a.ctypes.data for a in (*arrays, d, chosen, memory)]
-    return d, kernel().mpc_quadratic(n, *places)
-
-
 def test_quadratic_programs_are_solved_as_by_scipy():
+    """The minimum of d H d / 2 + g d within bounds, by the controller's C."""
+
+    def solved(H, g, lower, upper):
+        n = len(g)
+        d, chosen, memory = np.zeros(n), np.zeros(n, np.intc), np.zeros(n * (n + 3))
+        arrays = [np.ascontiguousarray(a, float) for a in (H, g, lower, upper)]
+        places = [a.ctypes.data for a in (*arrays, d, chosen, memory)]
+        return d, kernel().mpc_quadratic(n, *places)
+
     for n in (1, 2, 12, 36):
         random, active = np.random.default_rng(n), 0
         for _ in range(30):
             A, b = random.normal(size=(n + 3, n)), random.normal(size=n + 3)
-            size = random.uniform(0.01, 1)
-            lower, upper = -size * random.uniform(0, 1, n), size * random.uniform(0, 1, n)
+            lower, upper = random.uniform(0.01, 1) * random.uniform(0, 1, (2, n)) * [[-1], [1]]
             lower[0] = 0.0
             wanted = lsq_linear(A, b, (lower, upper + 1e-12), method="bvls", tol=1e-15).x
-            found, changes = quadratic(A.T @ A, -A.T @ b, lower, upper)
+            found, changes = solved(A.T @ A, -A.T @ b, lower, upper)
             assert changes >= 0
             np.testing.assert_allclose(found, wanted, atol=1e-8)
             active += int(((found == lower) | (found == upper)).sum())
         assert active > 10
     for H in (-np.eye(2), np.full((2, 2), np.nan), np.zeros((2, 2))):  # without a minimum
-        assert quadratic(H, np.ones(2), -np.ones(2), np.ones(2))[1] == -1
+        assert solved(H, np.ones(2), -np.ones(2), np.ones(2))[1] == -1
 
 
 def disturbed(size: float = 1.0, seed: int = 1):
@@ -174,18 +173,14 @@ def test_a_tick_that_fails_is_counted_and_changes_nothing(plan):
 
 
 def test_wrong_settings_are_refused(plan, tmp_path):
+    values = {"rate": 0, "horizon": -1, "intervals": 0, "iterations": True, "delay": 0.02}
+    values |= {"rest": 0.4, "step": 1e-9}
     for words, settings in {
-        "rate: value 0": {"rate": 0},
+        **{f"{name}: value {value!r}": {name: value} for name, value in values.items()},
         "rate: value 1000000000.0: needs at most 2.5e": {"rate": 1e9},
-        "horizon: value -1": {"horizon": -1},
-        "intervals: value 0": {"intervals": 0},
         "intervals: value 101": {"intervals": 101},
-        "iterations: value True": {"iterations": True},
-        "delay: value 0.02": {"delay": 0.02},
         "delay: value -0.001": {"delay": -1e-3},
-        "rest: value 0.4": {"rest": 0.4},
         "rest: value 0.395": {"rest": 0.395, "delay": 5e-3},
-        "step: value 1e-09": {"step": 1e-9},
         "'intervalls'.*'intervals'": {"intervalls": 3},
     }.items():
         with row(words), pytest.raises(st.PlanningError, match=words):
@@ -210,14 +205,13 @@ def test_models_and_plans_that_do_not_fit_are_refused(plan):
     ):
         with row(words), pytest.raises(st.PlanningError, match=words):
             st.Mpc(model, planned)
-    mpc = st.Mpc(rat(), plan)
+    mpc, legs = st.Mpc(rat(), plan), st.Legs.fixed(3.6, -0.3)
     with pytest.raises(st.SimulationError, match="q: value"):
         mpc(0.0, np.zeros(3), np.zeros(8))
     upright, alone = np.r_[np.zeros(3), 1, np.zeros(7)], {"controller": mpc, "t_span": 0.01}
     with pytest.raises(st.SimulationError, match="tail coordinates: value 4"):
         st.simulate(longer, upright, np.zeros(10), **alone)
     with pytest.raises(st.SimulationError, match=r"Mpc: .* float: needs double"):
-        legs = st.Legs.fixed(3.6, -0.3)
         st.simulate(zoo.model("single_ground"), upright[:9], np.zeros(8), legs=legs, **alone)
 
 

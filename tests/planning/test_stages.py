@@ -1,5 +1,5 @@
 """Stages in C: collocation solved inside, exact derivatives of what they lead to, and threads; and
-what they are of: collocation rules against exact integrals, coordinates of attitudes, and meshes.
+what they are of: collocation rules against exact integrals, and meshes.
 """
 
 import ctypes
@@ -7,16 +7,13 @@ import os
 import threading
 from contextlib import contextmanager
 
-import casadi
 import numpy as np
 import pytest
 from scipy.interpolate import BPoly
 
 import serpentail as st
-from serpentail.attitude import from_angles, rotation_matrix
 from serpentail.planning.condensed import fatrop, helpers
 from serpentail.planning.condensed.fatrop import kernel
-from serpentail.planning.nlp.coordinates import Attitude
 from serpentail.planning.nlp.mesh import Mesh, refined, uniform
 from serpentail.planning.nlp.rules import MOST_DEGREE, collocation_rule
 from tests.support.rows import row
@@ -115,40 +112,39 @@ def test_linear_equations_are_solved_and_singular_ones_refused():
 
 
 @contextmanager
-def program(**settings):
-    """Yield the code and a program of six stages, and variables at which it can be evaluated."""
+def program():
+    """Yield a function that evaluates six stages by a factor, the code and the program."""
     model, x = rat(), state(2)
-    with first_stage(model, x, H, **settings) as stage:
-        code = kernel()
+    with first_stage(model, x, H) as stage:
+        code, own = kernel(), stage.size
         code.program_slopes.argtypes = (ctypes.c_void_p,) * 2
-        w = np.zeros(code.program_variables(stage.program))
-        nu, own = stage.size - len(x) - 1, stage.size
+        w, nu = np.zeros(code.program_variables(stage.program)), own - len(x) - 1
         w[nu] = 0.4
         for k in range(1, 6):
             first = k * own - len(x)
             w[first + nu : first + own] = [*x, 0.4]
-        yield code, stage, w
 
+        def slopes(factor=1.0):
+            code.program_slopes(stage.program, (factor * w).ctypes.data)
+            assert all(each.sloped for each in stage.all[:6])
+            shape = stage.stage.results, own
+            return [np.ctypeslib.as_array(each.Jr, shape).copy() for each in stage.all[:6]]
 
-def slopes(code, stage, w):
-    code.program_slopes(stage.program, w.ctypes.data)
-    stages = stage.all[:6]
-    assert all(own.sloped for own in stages)
-    return [np.ctypeslib.as_array(own.Jr, (own.results, own.variables)).copy() for own in stages]
+        yield slopes, code, stage.program
 
 
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
 def test_stages_have_the_numbers_of_one_thread():
-    with program() as (code, stage, w):
-        wanted = slopes(code, stage, w)
+    with program() as (slopes, *_):
+        wanted = slopes()
     for crew in (1, 2, 5):
-        with program() as (code, stage, w), helpers.helped(code, stage.program, crew):
-            for a, b in zip(wanted, slopes(code, stage, w), strict=True):
+        with program() as (slopes, code, own), helpers.helped(code, own, crew):
+            for a, b in zip(wanted, slopes(), strict=True):
                 np.testing.assert_array_equal(a, b)
             child = os.fork()
-            if child == 0:
-                code.program_slopes(stage.program, (1.001 * w).ctypes.data)
-                pairs = zip(wanted, slopes(code, stage, w), strict=True)
+            if child == 0:  # evaluates alone
+                slopes(1.001)
+                pairs = zip(wanted, slopes(), strict=True)
                 os._exit(0 if all(np.allclose(a, b) for a, b in pairs) else 1)
             assert os.waitpid(child, 0)[1] == 0
 
@@ -193,20 +189,6 @@ def test_rules_are_exact_up_to_their_order_and_no_further():
             coefficients = found.bernstein() @ values  # beyond which no polynomial goes
             inside = BPoly(coefficients[:, None], [0, 1])(s)
             np.testing.assert_allclose(inside, found.basis(s) @ values, atol=1e-11)
-
-
-def test_attitude_coordinates_agree():
-    random = np.random.default_rng(0)
-    angles, omega, step = random.uniform(-1, 1, 3), random.normal(size=3), 1e-6
-    quaternion = from_angles(angles)
-    for kind, c in (("euler", angles), ("quaternion", quaternion)):
-        coordinates = Attitude(kind)
-        slope = np.array(coordinates.rate(casadi.DM(c), casadi.DM(omega))).ravel()
-        R = [rotation_matrix(coordinates.as_quaternion(c + s * slope)) for s in (-step, step)]
-        turn = rotation_matrix(quaternion).T @ (R[1] - R[0]) / (2 * step)
-        np.testing.assert_allclose([turn[2, 1], turn[0, 2], turn[1, 0]], omega, atol=1e-9)
-        found = np.array(coordinates.quaternion(casadi.DM(c))).ravel()
-        np.testing.assert_allclose(found, quaternion)
 
 
 def test_meshes_are_split_refined_and_guarded():

@@ -15,7 +15,6 @@ from tests.support import zoo
 from tests.support.rows import row
 from tests.support.tumbling import AGAIN, DURATION, integrated, planned, rat, rate, start
 
-FORMS = [("airborne", "quaternion"), ("translation-free", "quaternion"), ("full", "euler")]
 WEAK = st.Bounds(angle=np.pi / 3, torque=1.5e-3)  # N m: an eighth of what the plan would like
 
 
@@ -26,7 +25,8 @@ def dense(plan, count=4001):
 
 def test_plans_of_all_formulations_reach_the_goal_in_truth():
     """They are one optimum, and their ends those of an independent integration."""
-    for formulation, coordinates in FORMS:
+    forms = ("airborne", "quaternion"), ("translation-free", "quaternion"), ("full", "euler")
+    for formulation, coordinates in forms:
         plan = planned(formulation=formulation, attitude=coordinates, guess=planned())
         report, end, (q, v) = plan.report, plan.trajectory, integrated(rat(), plan)
         with row(formulation, coordinates):

@@ -7,7 +7,8 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from contextlib import closing
+from contextlib import closing, contextmanager
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -159,55 +160,52 @@ def test_a_full_disk_kills_and_ctrl_c_keep_the_rows(tmp_path):
     assert all(counts[number] == count for number, count in kept.items())
 
 
-class Cluster:
-    """Dask's scheduler and workers, as real processes; a worker is one without a nanny."""
+@contextmanager
+def cluster(folder):
+    """Yield the name of Dask's scheduler, the scheduler and workers, as real processes, and what
+    starts a worker, one without a nanny.
+    """
+    file, parts = folder / f"{time.monotonic_ns()}.json", []
 
-    def __init__(self, folder):
-        self.file, self.parts = folder / f"{time.monotonic_ns()}.json", []
+    def begin(kind, *options):
+        command = [sys.executable, "-m", f"distributed.cli.dask_{kind}", "--no-dashboard", *options]
+        command += ["--scheduler-file", file, "--host", "127.0.0.1"]
+        with file.with_suffix(".log").open("a") as log:
+            parts.append(subprocess.Popen(command, cwd=ROOT, stdout=log, stderr=log))
 
-    def __enter__(self):
-        self.start("scheduler", "--port", "0", "--no-dashboard", "--no-show")
-        for _ in range(2):
-            self.worker()
+    worker = partial(begin, "worker", "--nthreads", "1", "--no-nanny", "--death-timeout", "60")
+    begin("scheduler", "--port", "0", "--no-show")
+    try:
+        worker()
+        worker()
         end = time.monotonic() + PATIENCE
-        while not self.file.exists():
+        while not file.exists():
             assert time.monotonic() < end
             time.sleep(0.05)
-        return self
-
-    def start(self, kind, *options):
-        command = [sys.executable, "-m", f"distributed.cli.dask_{kind}", *options]
-        command += ["--scheduler-file", self.file, "--host", "127.0.0.1"]
-        with self.file.with_suffix(".log").open("a") as log:
-            self.parts.append(subprocess.Popen(command, cwd=ROOT, stdout=log, stderr=log))
-
-    def worker(self):
-        options = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--death-timeout", "60")
-        self.start("worker", *options)
-
-    def __exit__(self, *_):
-        for part in self.parts:
+        yield f"dask:{file}", parts, worker
+    finally:
+        for part in parts:
             part.kill()
             part.wait()
 
 
 @pytest.mark.slow
 def test_dask_survives_kills_of_all_its_parts_and_a_full_disk(tmp_path):
-    with Cluster(tmp_path) as cluster:
-        process = driver(tmp_path, f"dask:{cluster.file}")
+    with cluster(tmp_path) as (name, parts, worker):
+        process = driver(tmp_path, name)
         wait_for(5, tmp_path, process)
-        cluster.parts[1].kill()  # a worker
+        parts[1].kill()  # a worker
         wait_for(15, tmp_path, process)
-        cluster.worker()
+        worker()
         process.kill()
         process.communicate(timeout=PATIENCE)
         kept = set(rows(tmp_path))
-        process = driver(tmp_path, f"dask:{cluster.file}")
+        process = driver(tmp_path, name)
         wait_for(len(kept) + 5, tmp_path, process)
-        cluster.parts[0].kill()  # the scheduler
+        parts[0].kill()  # the scheduler
         _, errors = process.communicate(timeout=PATIENCE)
         assert process.returncode == 1 and "its workers are gone" in errors.splitlines()[-1], errors
         assert kept < set(rows(tmp_path)) and len(rows(tmp_path)) < swept.POINTS
-    with Cluster(tmp_path) as cluster:
-        check_full(tmp_path, f"dask:{cluster.file}")
-        finish(tmp_path, f"dask:{cluster.file}")
+    with cluster(tmp_path) as (name, *_):
+        check_full(tmp_path, name)
+        finish(tmp_path, name)

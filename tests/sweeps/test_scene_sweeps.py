@@ -153,7 +153,6 @@ def test_the_schema_knows_sweeps(capsys):
 
 
 TIMES = np.linspace(0, 0.1, 11)
-ESTIMATE = ["tail_mass"]
 
 
 @pytest.fixture(scope="module")
@@ -172,7 +171,7 @@ def recordings(tmp_path_factory):
 
 def swept(recordings, masses=("4 g",), **more):
     model = zoo.model("m1_n1")
-    settings = {"markers": placed(model), "estimate": ESTIMATE, "unit": "m"}
+    settings = {"markers": placed(model), "estimate": ["tail_mass"], "unit": "m"}
     over = {"data": st.grid(list(recordings)), "tail_mass": st.grid(list(masses))}
     return st.sweep(model, over, "identify", settings=settings, **more)
 
