@@ -64,7 +64,7 @@ def test_planning_again_from_neighbouring_states_derives_nothing(monkeypatch):
     np.testing.assert_allclose(found.trajectory.v[0, 3:], 1.01 * v[3:], atol=1e-9)
 
 
-def test_multipliers_are_carried_to_another_mesh():
+def test_multipliers_are_carried_to_another_mesh(monkeypatch):
     """The solver, given none, finds the same ones there; on the mesh itself they stay."""
     programs, solutions, plan = [], [], None
     for intervals in (24, 36):
@@ -79,9 +79,7 @@ def test_multipliers_are_carried_to_another_mesh():
         for found, wanted in zip(carried_on, solutions[k], strict=True):
             assert np.linalg.norm(found - wanted) <= most * np.linalg.norm(wanted)
 
-
-def test_refinement_goes_on_from_the_multipliers(monkeypatch):
-    iterations = []
+    iterations = []  # refinement goes on from them
     for carry in (carried, lambda *_: None):
         monkeypatch.setattr(ways, "SPARSE", replace(ways.SPARSE, carried=carry))
         plan = again(intervals=8, tolerance=1e-4)
@@ -137,16 +135,7 @@ def test_interrupt_and_time_limit_end_a_solve_inside_and_return_its_iterate(name
         assert each.report["guesses"] == 1 and each.report["status"] == "User_Requested_Stop"
 
 
-def test_what_is_raised_while_a_solve_goes_on_is_raised_after_it(monkeypatch):
-    def interrupted():
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(fatrop, "stop_reason", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        again(solver="fatrop", intervals=12)
-
-
-def test_a_stop_between_rounds_keeps_the_best_round(monkeypatch):
+def test_a_stop_between_rounds_keeps_the_best_round_and_what_is_raised_is_raised(monkeypatch):
     finer, settings = rounds.Search._finer, {"intervals": 6, "tolerance": 1e-12, "rounds": 30}
 
     def interrupted(search, last):
@@ -163,6 +152,13 @@ def test_a_stop_between_rounds_keeps_the_best_round(monkeypatch):
         assert not plan.success and plan.report["converged"]
         assert (plan.report["stopped"], plan.report["intervals"]) == (why, 6)
     assert plan.report["rounds"] == 1
+
+    def raised():
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(fatrop, "stop_reason", raised)  # while a solve goes on
+    with pytest.raises(KeyboardInterrupt):
+        again(solver="fatrop", intervals=12)
 
 
 def test_time_limits_count_the_tracking_and_leave_it_out_without_time(monkeypatch):

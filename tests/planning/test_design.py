@@ -172,7 +172,7 @@ def test_no_ordinary_plan_is_better():
         assert slope == pytest.approx((high - low) / (2 * h), rel=1e-3)
 
 
-def test_attitude_and_torso_rate_may_be_free():
+def test_attitude_torso_rate_and_position_may_be_free():
     """Upright at the end is easier from a start that is nearly upright."""
     free = {"attitude": ((0.2, 0, 0), (0.9, 0, 0)), "torso_rate": (-1, 1)}
     plan = again(attitude="euler", free_start=free, guess=None)
@@ -183,9 +183,7 @@ def test_attitude_and_torso_rate_may_be_free():
     q, _ = integrated(rat(), plan)
     assert angle_deg(q[3:7] / np.linalg.norm(q[3:7]), plan.trajectory.attitude[-1]) < 0.1
 
-
-def test_a_path_holds_from_the_start_on():
-    """The lowest throw begins at the floor, though no node of Radau's rule is at the start."""
+    # the lowest throw begins at the floor, though no node of Radau's rule is at the start
     floor = 0.32
     plan = again(
         path=((lambda point: point.height, floor, np.inf),),

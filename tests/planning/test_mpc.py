@@ -89,8 +89,12 @@ def test_a_tick_is_the_gauss_newton_step_of_casadi_and_scipy():
     np.testing.assert_allclose(wanted, found, atol=1e-5 * TORQUE)
 
 
-def flown(mpc: st.Mpc, body: st.Model, ticks: int, rate: float):
-    """q, v after some ticks, by SciPy, torques asked for one by one."""
+def test_ticks_measure_the_state_at_their_times(plan):
+    """Whatever a method tries in between: as one tick after another, by hand. A phase has a clock
+    of its own.
+    """
+    inertia = 1.15 * np.array(rat().parameters["torso_inertia"])
+    body, mpc = rat().with_parameters(torso_inertia=inertia), st.Mpc(rat(), plan, rate=40)
 
     def slope(t, y):
         q, v = y[: body.nq], y[body.nq :]
@@ -98,21 +102,12 @@ def flown(mpc: st.Mpc, body: st.Model, ticks: int, rate: float):
         q_dot = np.concatenate([v[:3], quaternion_rate(q[3:7], v[3:6]), v[6:]])
         return np.concatenate([q_dot, body.forward_dynamics(q, v, tau)])
 
-    y, sizes = np.concatenate(start(rat(), 1)), [body.nq]
-    for k in range(ticks):
-        mpc.tick(k / rate, *np.split(y, sizes))
-        ends = (k / rate, np.nextafter((k + 1) / rate, 0))
+    y = np.concatenate(start(rat(), 1))
+    for k in range(4):
+        mpc.tick(k / 40, *np.split(y, [body.nq]))
+        ends = (k / 40, np.nextafter((k + 1) / 40, 0))
         y = solve_ivp(slope, ends, y, "DOP853", rtol=1e-10, atol=1e-12, max_step=2e-3).y[:, -1]
-    return np.split(y, sizes)
-
-
-def test_ticks_measure_the_state_at_their_times(plan):
-    """Whatever a method tries in between: as one tick after another, by hand. A phase has a clock
-    of its own.
-    """
-    inertia = 1.15 * np.array(rat().parameters["torso_inertia"])
-    body, mpc = rat().with_parameters(torso_inertia=inertia), st.Mpc(rat(), plan, rate=40)
-    q, v = flown(mpc, body, 4, 40)
+    q, v = np.split(y, [body.nq])
     for method in ("tsit5", "dop853", "rk4"):
         for law, span in ((mpc, 0.1), (st.Phases([(0.1, mpc)]), (0.1, 0.2))):
             settings = {"controller": law, "method": method, "t_span": span}

@@ -63,9 +63,6 @@ def test_derivatives_are_central_differences():
             np.testing.assert_allclose(found, wanted, atol=1e-5 * np.abs(found).max())
 
 
-NODE = ctypes.CFUNCTYPE(ctypes.c_int, *(ctypes.c_void_p,) * 6)
-
-
 def filling(number, status):
     """A function of a node of (1, 3) that gives one number everywhere, and its status."""
 
@@ -74,7 +71,7 @@ def filling(number, status):
         np.ctypeslib.as_array(numbers, (11,))[:] = number
         return status
 
-    return NODE(node)
+    return ctypes.CFUNCTYPE(ctypes.c_int, *(ctypes.c_void_p,) * 6)(node)
 
 
 def test_a_stage_without_numbers_has_no_results_until_it_has_them_again():

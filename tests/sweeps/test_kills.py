@@ -45,7 +45,7 @@ def test_a_row_that_is_there_stays_and_rows_are_written_all_or_none(tmp_path):
         assert len(again.rows(map(str, range(1203)))) == 1203
 
 
-def test_one_process_writes(tmp_path):
+def test_one_process_writes_and_other_files_are_refused(tmp_path):
     with closing(Store(tmp_path / "s.db")) as first, closing(Store(tmp_path / "s.db")) as second:
         with first.writing():
             with pytest.raises(st.SweepError, match="another process is writing"), second.writing():
@@ -54,9 +54,6 @@ def test_one_process_writes(tmp_path):
             assert second.known("k") == {"k": True}  # who reads may
         with second.writing():
             pass
-
-
-def test_other_files_are_refused(tmp_path):
     (tmp_path / "text.db").write_text("no database at all, but a text of some length\n" * 50)
     with closing(sqlite3.connect(tmp_path / "other.db")) as other:
         other.execute("create table t (x)")
