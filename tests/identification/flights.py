@@ -35,8 +35,7 @@ def start(model, seed=0):
 def flown(model, times, x0, torque=None, rtol=1e-10):
     tau = torque or (lambda _t: np.zeros(model.nq - 7))
     how = {"rtol": rtol, "atol": 1e-2 * rtol, "max_step": 0.02, "t_eval": times}
-    ends = times[0], times[-1]
-    return solve_ivp(lambda t, x: model.x_dot(x, tau(t)), ends, x0, "DOP853", **how).y.T
+    return solve_ivp(lambda t, x: model.x_dot(x, tau(t)), times[[0, -1]], x0, "DOP853", **how).y.T
 
 
 def seen(model, states):

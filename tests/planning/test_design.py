@@ -142,19 +142,17 @@ def test_no_ordinary_plan_is_better():
     (q, v), plan = start(rat()), chosen()
     free = again(free_start={"tail_rate": ((-RATES, v[7]), (RATES, v[7]))})
 
-    def of_length(length):
-        return ordinary(plan, tail_length=length)
-
     def of_rate(rate):
         own = np.where(np.arange(8) == 6, rate, v)
         return again(start=(q, own), guess=free).report["objective"]
 
     length, rate = plan.design["tail_length"], free.start[1][6]
     assert free.report["converged"] and abs(rate) < RATES - 0.5
-    for best, function, found, step, ends in (
-        (plan.report["objective"], of_length, length, 0.02 * length, RANGE),
-        (free.report["objective"], of_rate, rate, 0.2, (-RATES, RATES)),
+    for each, function, found, step, ends in (
+        (plan, lambda x: ordinary(plan, tail_length=x), length, 0.02 * length, RANGE),
+        (free, of_rate, rate, 0.2, (-RATES, RATES)),
     ):
+        best = each.report["objective"]
         assert function(found) == pytest.approx(best, rel=1e-6)
         near = [function(found + way * step) for way in (-1, 1)]
         assert min(near) > best * (1 + 1e-6)

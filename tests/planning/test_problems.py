@@ -19,7 +19,6 @@ from tests.support.rows import row
 from tests.support.tumbling import AGAIN, DURATION, integrated, planned, rat, start
 
 COARSE = {"tolerance": None, "intervals": 8}
-SOFT = st.Bounds(angle=np.pi / 3, torque=0.005)
 LEGS = st.Legs.fixed(3.6, -0.3)
 FEET = 6  # points of the feet, which come first
 
@@ -32,7 +31,8 @@ def test_damping_is_part_of_the_motion():
 
 
 def test_plans_of_least_time_and_energy_from_passive_flight():
-    settings = {"start": start(rat()), "duration": (0.1, DURATION), "bounds": SOFT, "track": False}
+    settings = {"start": start(rat()), "duration": (0.1, DURATION), "track": False}
+    settings["bounds"] = st.Bounds(angle=np.pi / 3, torque=0.005)
     plan, calm = (st.plan(rat(), objective=name, **settings) for name in ("time", "effort"))
     assert plan.success and plan.duration < 0.95 * calm.duration
     assert plan.report["objective"] == plan.duration
@@ -244,9 +244,7 @@ def test_paths_and_clearance_keep_points_above_the_ground():
     plan = st.plan(model, clearance=least, guess=free, **settings)
     assert plan.success and heights(model, plan, FEET).min() >= least - 1e-4
 
-
-def test_points_of_contact_are_refused_where_they_cannot_be():
-    model, settings = footed(0.05)
+    model, settings = footed(0.05)  # where the points cannot be, they are refused
     path = ((lambda point: point.contact_points[:, 2], 0.0, np.inf),)
     for words, body, changes in (
         ("contact_points: give the plan `legs`", model, {"path": path}),

@@ -15,8 +15,6 @@ from tests.support import zoo
 from tests.support.rows import row
 from tests.support.tumbling import AGAIN, DURATION, integrated, planned, rat, rate, start
 
-WEAK = st.Bounds(angle=np.pi / 3, torque=1.5e-3)  # N m: an eighth of what the plan would like
-
 
 def dense(plan, count=4001):
     times = np.linspace(0, plan.duration, count)
@@ -95,7 +93,8 @@ def test_bounds_and_paths_hold_between_nodes():
     """The first round goes beyond them, and says so; the last does not."""
     path = {"path": ((lambda point: point.tail_rate[0], -3.7, 9.0),), "intervals": 8}
     given = AGAIN | {"start": start(rat()), "tolerance": 0.01}
-    weak = {"bounds": WEAK, "goal": st.Goal(torso_rate=None)}
+    # an eighth of the torque that the plan would like
+    weak = {"bounds": st.Bounds(np.pi / 3, torque=1.5e-3), "goal": st.Goal(torso_rate=None)}
 
     def beyond(plan, name):
         times, torques = dense(plan)

@@ -20,7 +20,6 @@ from tests.support.rows import row
 
 ROOT = Path(__file__).parents[2]
 PATIENCE = 120  # s
-PAUSE = "0.1"  # s that a point takes
 FAILED = {*swept.HANGS, *swept.CRASHES, *swept.RAISES}
 
 
@@ -69,7 +68,7 @@ def test_one_process_writes_and_other_files_are_refused(tmp_path):
 
 def driver(folder, executor, **settings):
     return subprocess.Popen(
-        [sys.executable, "-m", "tests.support.swept", str(folder), executor, PAUSE],
+        [sys.executable, "-m", "tests.support.swept", str(folder), executor, "0.1"],
         cwd=ROOT,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

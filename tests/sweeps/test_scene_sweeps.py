@@ -108,7 +108,13 @@ def test_shapes_and_parameters_of_links_make_models_of_their_own(study):
 
 
 def test_slips_in_a_scene_are_told(study, capsys):
+    """Some by the schema, too."""
     outputs = 'outputs = ["tilt_end_deg", "q_end"]'
+    assert cli.main(["schema"]) == 0
+    valid = Draft7Validator(json.loads(capsys.readouterr().out)).is_valid
+    assert valid(tomllib.loads(SCENE))
+    for slip in ("points = 0", "pionts = 4"):
+        assert not valid(tomllib.loads(SCENE.replace("points = 4", slip)))
     for words, old, new in (
         ("'points'", "points = 4", "pionts = 4"),
         ("sweep.run: value 'fly'", "seed = 2", 'run = "fly"'),
@@ -144,26 +150,15 @@ def test_what_cannot_be_is_told_before_anything_runs(study, capsys, monkeypatch)
         st.sweep(study, {"tail_lenght": st.grid([0.1])})
 
 
-def test_the_schema_knows_sweeps(capsys):
-    assert cli.main(["schema"]) == 0
-    valid = Draft7Validator(json.loads(capsys.readouterr().out)).is_valid
-    assert valid(tomllib.loads(SCENE))
-    assert not valid(tomllib.loads(SCENE.replace("points = 4", "points = 0")))
-    assert not valid(tomllib.loads(SCENE.replace("points = 4", "pionts = 4")))
-
-
-TIMES = np.linspace(0, 0.1, 11)
-
-
 @pytest.fixture(scope="module")
 def recordings(tmp_path_factory):
     """Two flights of two animals, without noise, as files; their tails' masses, kg."""
-    folder, masses = tmp_path_factory.mktemp("recordings"), {}
+    folder, masses, times = tmp_path_factory.mktemp("recordings"), {}, np.linspace(0, 0.1, 11)
     for k, mass in enumerate((0.003, 0.006)):
         model = zoo.model("m1_n1").with_parameters(tail_mass=mass)
-        x = flown(model, TIMES, start(model, k))
+        x = flown(model, times, start(model, k))
         path = folder / f"{k + 2}nd flight.csv"  # a word that begins as a number does
-        tracks = st.marker_tracks(TIMES, seen(model, x), list(placed(model)), unit="m")
+        tracks = st.marker_tracks(times, seen(model, x), list(placed(model)), unit="m")
         st.write_markers(tracks, path)
         masses[str(path)] = mass
     return masses
