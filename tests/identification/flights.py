@@ -11,12 +11,8 @@ from scipy.spatial.transform import Rotation
 import serpentail as st
 from tests.support import zoo
 
-TORSO = {
-    "nose": (0.0, 0.05, 0.015),
-    "left": (-0.025, -0.02, 0.02),
-    "right": (0.025, -0.02, 0.02),
-    "back": (0.0, 0.0, 0.03),
-}
+TORSO = {"nose": (0.0, 0.05, 0.015), "left": (-0.025, -0.02, 0.02)}
+TORSO |= {"right": (0.025, -0.02, 0.02), "back": (0.0, 0.0, 0.03)}
 SPRINGS = {"tail_stiffness": 2e-3, "tail_damping": 5e-5, "tail_rest": 0.0}
 SPRINGS |= {"tail_stop_lower": -3.0, "tail_stop_upper": 3.0}  # never reached
 
@@ -28,34 +24,18 @@ def elastic(name="elastic"):
 
 
 def start(model, seed=0):
-    """Return a tumbling state with a bent tail."""
-    rng = np.random.default_rng(seed)
-    q = np.zeros(model.nq)
-    q[2] = 0.5
+    rng, nt = np.random.default_rng(seed), model.nq - 7
     quaternion = np.array([1.0, 0, 0, 0]) + 0.2 * rng.standard_normal(4)
-    q[3:7] = quaternion / np.linalg.norm(quaternion)
-    q[7:] = 0.25 * rng.standard_normal(model.nq - 7)
-    v = np.concatenate(
-        [[0.3, 0.5, 1.5], 3 * rng.standard_normal(3), 4 * rng.standard_normal(model.nq - 7)]
-    )
-    return np.concatenate([q, v])
+    quaternion /= np.linalg.norm(quaternion)
+    q = np.concatenate([[0, 0, 0.5], quaternion, 0.25 * rng.standard_normal(nt)])
+    turning = [3 * rng.standard_normal(3), 4 * rng.standard_normal(nt)]
+    return np.concatenate([q, [0.3, 0.5, 1.5], *turning])
 
 
 def flown(model, times, x0, torque=None, rtol=1e-10):
-    """Return states (F, nx) of a flight under torques, a function of the time."""
-    nt = model.nq - 7
-    tau = torque or (lambda _t: np.zeros(nt))
-    solution = solve_ivp(
-        lambda t, x: model.x_dot(x, tau(t)),
-        (times[0], times[-1]),
-        x0,
-        method="DOP853",
-        t_eval=times,
-        rtol=rtol,
-        atol=1e-2 * rtol,
-        max_step=0.02,
-    )
-    return solution.y.T
+    tau = torque or (lambda _t: np.zeros(model.nq - 7))
+    how = {"rtol": rtol, "atol": 1e-2 * rtol, "max_step": 0.02, "t_eval": times}
+    return solve_ivp(lambda t, x: model.x_dot(x, tau(t)), times[[0, -1]], x0, "DOP853", **how).y.T
 
 
 def seen(model, states):
@@ -67,23 +47,19 @@ def seen(model, states):
 
 
 def placed(model):
-    """Return where those markers are."""
     points = len(model.tail_points(np.eye(1, model.nq, 3)[0])) - 1
     tail = {f"tail{k}": st.Marker(tail=k / points) for k in range(1, points + 1)}
     return {name: st.Marker(torso=place) for name, place in TORSO.items()} | tail
 
 
 def tracks(model, times, states, noise=0.0, seed=1, gaps=0.0):
-    """Return tracks of a flight, with noise (m) and a share of gaps."""
-    rng = np.random.default_rng(seed)
-    positions = seen(model, states)
+    rng, positions = np.random.default_rng(seed), seen(model, states)
     positions = positions + noise * rng.standard_normal(positions.shape)
     positions[rng.random(positions.shape[:2]) < gaps] = np.nan
     return st.marker_tracks(times, positions, list(placed(model)), unit="m")
 
 
 def scene(markers, *more):
-    """Return the text of a scene with a table [identify] of markers, and further lines."""
     head = 'kind = "articulated"\nsegments = 1\nlinks = 1\nfunctions = ["energy"]\n'
     rows = "".join(
         f'[[identify.marker]]\nname = "{name}"\n'

@@ -1,68 +1,78 @@
-"""Marker tracks: arrays, and files that are written and read again; faults are told by place."""
+"""Marker tracks: arrays, and files that are written and read again, faults told by place; and the
+verb identify, and what is drawn of an identification: its page, residuals and torques.
+"""
+
+import base64
+import gzip
+import json
+import re
 
 import numpy as np
 import pytest
 
 import serpentail as st
+from examples import front
+from serpentail import cli
+from tests.identification.flights import flown, placed, scene, start, tracks
+from tests.support import zoo
 from tests.support.rows import row
 
 STEP = 0.005  # s
 
 
-def some(frames=6):
-    positions = np.random.default_rng(0).normal(size=(frames, 2, 3))
-    positions[2, 1] = np.nan
-    return st.marker_tracks(STEP * np.arange(frames), positions, ["nose", "tip"], unit="m")
+T, NAMES = np.arange(6.0), ["nose", "tip"]
+X = np.random.default_rng(0).normal(size=(6, 2, 3))
 
 
-def arrays():
-    positions = np.random.default_rng(0).normal(size=(6, 2, 3))
-    return np.arange(6.0), positions, ["a", "b"]
+def some():
+    positions = np.where(np.arange(12).reshape(6, 2, 1) == 5, np.nan, X)
+    return st.marker_tracks(STEP * T, positions, NAMES, unit="m")
 
 
 def test_arrays_that_are_no_tracks_are_refused():
-    t, x, n = arrays()
     for words, times, positions, names, how in (
-        ("unit: none is stated", t, x, n, {"unit": None}),
-        ("unit: value 'inch'", t, x, n, {"unit": "inch"}),
-        ("unit: value 3", t, x, n, {"unit": 3}),
-        ("frame 3 .* has 2 s, repeated", np.r_[t[:3], t[2:-1]], x, n, {}),
-        ("frame 1 .* before", t[::-1], x, n, {}),
-        (r"times have shape \(6, 1\)", t[:, None], x, n, {}),
-        (r"shape \(6, 1, 3\): needs \(6, 2, 3\)", t, x[:, :1], n, {}),
-        ("two markers are called 'a'", t, x, ["a", "a"], {}),
-        ("names: value", t, x, "ab", {}),
-        ("names: value", t, x, ["a", " "], {}),
-        ("'b' is at exactly .* in 6 frames", t, x * [[[1], [0]]], n, {}),
-        ("never seen: b", t, x * [[[1], [np.nan]]], n, {}),
-        ("infinite", t, x * np.inf, n, {}),
-        (r"\(3,\): needs 4 frames", t[:3], x[:3], n, {}),
-        ("axes: value 'xzy'", t, x, n, {"axes": "xzy"}),
-        ("axes: value '--xyz'", t, x, n, {"axes": "--xyz"}),
-        ("axes: value 'xyzx'", t, x, n, {"axes": "xyzx"}),
-        ("zeros: value 'maybe'", t, x, n, {"zeros": "maybe"}),
+        ("unit: none is stated", T, X, NAMES, {"unit": None}),
+        ("unit: value 'inch'", T, X, NAMES, {"unit": "inch"}),
+        ("frame 3 .* has 2 s, repeated", np.r_[T[:3], T[2:-1]], X, NAMES, {}),
+        ("frame 1 .* before", T[::-1], X, NAMES, {}),
+        (r"times have shape \(6, 1\)", T[:, None], X, NAMES, {}),
+        (r"shape \(6, 1, 3\): needs \(6, 2, 3\)", T, X[:, :1], NAMES, {}),
+        ("two markers are called 'a'", T, X, ["a", "a"], {}),
+        ("names: value", T, X, "ab", {}),
+        ("names: value", T, X, ["a", " "], {}),
+        ("'tip' is at exactly .* in 6 frames", T, X * [[[1], [0]]], NAMES, {}),
+        ("never seen: tip", T, X * [[[1], [np.nan]]], NAMES, {}),
+        ("infinite", T, X * np.inf, NAMES, {}),
+        (r"\(3,\): needs 4 frames", T[:3], X[:3], NAMES, {}),
+        ("axes: value 'xzy'", T, X, NAMES, {"axes": "xzy"}),
+        ("axes: value '--xyz'", T, X, NAMES, {"axes": "--xyz"}),
+        ("axes: value 'xyzx'", T, X, NAMES, {"axes": "xyzx"}),
+        ("zeros: value 'maybe'", T, X, NAMES, {"zeros": "maybe"}),
     ):
         with row(words), pytest.raises(st.IdentificationError, match=words):
             st.marker_tracks(times, positions, names, **({"unit": "m"} | how))
-    assert len(st.marker_tracks(t[:4], x[:4], n, unit="m").times) == 4
+    assert len(st.marker_tracks(T[:4], X[:4], NAMES, unit="m").times) == 4
     with pytest.raises(st.IdentificationError, match="arrays: value 'c'"):
         some().of(["nose", "c"])
 
 
 def test_units_gaps_and_axes_of_arrays():
-    t, x, names = arrays()
+    x = X.copy()
     x[2, 1] = 0
     x[3, 0, 1] = np.nan
-    found = st.marker_tracks(t, x, names, unit="mm", zeros="gap")
+    found = st.marker_tracks(T, x, NAMES, unit="mm", zeros="gap")
     assert np.argwhere(~found.seen).tolist() == [[2, 1], [3, 0]]
     assert np.isnan(found.positions[3, 0]).all()
     np.testing.assert_allclose(found.positions[4], 1e-3 * x[4], rtol=1e-15)
     for axes, columns, signs in (("zxy", [2, 0, 1], 1), ("-yxz", [1, 0, 2], [-1, 1, 1])):
-        turned = st.marker_tracks(t, x, names, unit="m", zeros="gap", axes=axes).positions
-        np.testing.assert_array_equal(turned[4:], (x[..., columns] * signs)[4:], axes)
+        turned = st.marker_tracks(T, X, NAMES, unit="m", axes=axes).positions
+        np.testing.assert_array_equal(turned, X[..., columns] * signs, axes)
 
 
 def test_written_tracks_are_read_again(tmp_path):
+    """Harmless oddities, too: a rate that is off by a per cent or is none, empty lines, cells of
+    spaces at the end.
+    """
     tracks = some()
     for suffix, unit in ((".trc", None), (".trc", "mm"), (".csv", "m")):
         with row(suffix, unit):
@@ -73,6 +83,15 @@ def test_written_tracks_are_read_again(tmp_path):
             np.testing.assert_allclose(found.positions, tracks.positions, rtol=1e-7)
     with pytest.raises(st.IdentificationError, match=r"path: value .*run\.c3d"):
         st.write_markers(tracks, tmp_path / "run.c3d")
+    path = tmp_path / "run.trc"
+    wanted, lines = st.read_markers(path).positions, path.read_text().splitlines()
+    for change in (
+        *(header("200", rate) for rate in ("198", "202", "nan", "unknown")),
+        lambda x: [*x[:5], "", *x[5:], " "],
+        lambda x: [*x[:-1], x[-1] + "\t \t"],
+    ):
+        path.write_text("\n".join(change(lines)))
+        np.testing.assert_array_equal(st.read_markers(path).positions, wanted)
 
 
 def test_c3d_is_read_as_ezc3d_writes_it(tmp_path):
@@ -100,7 +119,6 @@ def test_c3d_is_read_as_ezc3d_writes_it(tmp_path):
 
 
 def header(old, new):
-    """Change the values of a TRC file's header."""
     return lambda x: [*x[:2], x[2].replace(old, new), *x[3:]]
 
 
@@ -136,30 +154,90 @@ def test_damaged_files_are_refused_by_line(tmp_path):
             path.write_text("\n".join(change(lines)))
             with row(suffix, words), pytest.raises(st.IdentificationError, match=words):
                 st.read_markers(path, unit)
-    with pytest.raises(st.IdentificationError, match="unit: none is stated"):
-        st.read_markers(st.write_markers(some(), tmp_path / "run.csv"))
-
-
-def test_harmless_oddities_of_files_are_read(tmp_path):
-    """A rate that is off by a per cent or is none, empty lines, cells of spaces at the end."""
-    path = st.write_markers(some(), tmp_path / "run.trc")
-    wanted, lines = st.read_markers(path).positions, path.read_text().splitlines()
-    for change in (
-        *(header("200", rate) for rate in ("198", "202", "nan", "unknown")),
-        lambda x: [*x[:5], "", *x[5:], " "],
-        lambda x: [*x[:-1], x[-1] + "\t \t"],
-    ):
-        path.write_text("\n".join(change(lines)))
-        np.testing.assert_array_equal(st.read_markers(path).positions, wanted)
-
-
-def test_what_is_no_file_of_tracks_is_refused(tmp_path):
     (tmp_path / "run.trc").write_bytes(b"\x00\xff" * 300)
-    for path, words in (
-        (3, "data: value 3"),
-        (tmp_path / "tracks.xlsx", r"tracks.xlsx: needs .*\.trc, \.csv, \.c3d"),
-        (tmp_path / "none.trc", r"none.trc: cannot be read"),
-        (tmp_path / "run.trc", "is not a text file"),
+    for words, path in (
+        ("unit: none is stated", st.write_markers(some(), tmp_path / "run.csv")),
+        ("data: value 3", 3),
+        (r"tracks.xlsx: needs .*\.trc, \.csv, \.c3d", tmp_path / "tracks.xlsx"),
+        (r"none.trc: cannot be read", tmp_path / "none.trc"),
+        ("is not a text file", tmp_path / "run.trc"),
     ):
         with row(words), pytest.raises(st.IdentificationError, match=words):
             st.read_markers(path)
+
+
+SCENE = front.ROOT / "scenes" / "identify_tail.toml"
+
+
+def test_it_finds_what_the_recording_was_made_with(tmp_path, capsys):
+    model, times = zoo.model("m1_n1"), np.linspace(0, 0.15, 31)
+    data = tracks(model, times, flown(model, times, start(model)), 5e-4, gaps=0.1)
+    recording, study = st.write_markers(data, tmp_path / "run.trc"), tmp_path / "study.toml"
+    table = ["[parameters]", 'tail_length = "19 cm"', "[identify]", 'estimate = ["tail_length"]']
+    study.write_text(scene(placed(model), *table))
+    page, motion = tmp_path / "page.html", tmp_path / "motion.npz"
+    words = ["identify", str(study), str(recording)]
+    further = ["--json", "-", "--view", str(page), "--save", str(motion)]
+    assert cli.main([*words, *further]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert report["success"] and report["undetermined"] == []
+    found, truth = report["parameters"]["tail_length"], model.parameters["tail_length"]
+    assert found["begin"] == 0.19 and found["low"] < truth < found["high"]
+    assert found["high"] - found["low"] < 0.1 * truth
+    assert 4e-4 < report["noise_m"] < 6e-4
+    assert '"markers"' in page.read_text() and motion.is_file()
+    assert cli.main([*words, "--folder", str(zoo.folder("m1_n1"))]) == 0
+    out = capsys.readouterr().out
+    assert out.startswith("tail_length") and "95%: " in out and "rms_m, nose" in out
+
+
+def test_wrong_tables_are_told(tmp_path, capsys):
+    text, study = SCENE.read_text(), tmp_path / "scene.toml"
+    for words, old, new in (
+        ("identify.torques: value 'some'", 'torques = "none"', 'torques = "some"'),
+        ("needs std and time", 'torques = "none"', "torques = {std = 1e-3}"),
+        (r"identify.marker\[1\]: ", 'name = "left"', 'name = "nose"'),
+        ("'tail'", "tail = 0.25", "tial = 0.25"),
+        ("a mass where a length", '"-25, -20, 20 mm"', '"-25, -20, 20 g"'),
+        ("'estimate'", "estimate =", "estimates ="),
+        (r"no table \[identify\]", "identify", "plan"),
+    ):
+        assert old in text
+        study.write_text(text.replace(old, new))
+        with row(words):
+            assert cli.main(["identify", str(study), "none.trc"]) == 2
+            assert re.search(words, capsys.readouterr().err)
+
+
+def test_page_and_figure_have_what_was_measured_and_its_gaps(tmp_path):
+    model, times, page = zoo.model("m1_n3"), np.linspace(0, 0.05, 11), tmp_path / "page.html"
+    data = tracks(model, times, flown(model, times, start(model)), 3e-4, gaps=0.1)
+    found = st.identify(model, data, placed(model), torques=st.TorquePrior(1e-3, 0.05))
+    text = found.view(page).read_text()
+    text = re.search(r'<script[^>]*id="data"[^>]*>(.*?)</script>', text, re.DOTALL)[1]
+    (run,) = json.loads(text)["runs"]
+    seen = found.trials[0].tracks.positions
+    assert run["markers"] == 7 and np.isnan(seen).any()
+    # columns of floats, as viewer/src/data.js reads them
+    packed = gzip.decompress(base64.b64decode(run["arrays"]["markers"]))
+    planes = np.frombuffer(packed, np.uint8).reshape(4, -1)
+    steps = sum(planes[k].astype(np.uint32) << np.uint32(8 * k) for k in range(4))
+    columns = np.cumsum(steps.reshape(-1, run["rows"]), axis=1, dtype=np.uint32)
+    columns = columns.view(np.float32).T
+    np.testing.assert_allclose(columns, seen.reshape(len(times), -1), rtol=1e-6)
+    for words, markers in (
+        (r"markers: shape \(3, 2\): needs \(11, M, 3\)", [np.zeros((3, 2))]),
+        ("markers: 2 entries: needs one of each of 1", [np.zeros((11, 1, 3))] * 2),
+    ):
+        with row(words), pytest.raises(st.ViewError, match=words):
+            st.view(found.trajectory, page, markers=markers)
+
+    _, axes = found.plot(tmp_path / "residuals.png")
+    assert [each.get_ylabel() for each in axes] == ["residual [mm]", "torque [mN m]", "power [mW]"]
+    curves = [line.get_ydata() for line in axes[0].lines[:-1]]
+    distance = 1e3 * np.linalg.norm(found.trials[0].residuals, axis=2)
+    np.testing.assert_allclose(np.array(curves).T, distance)
+    np.testing.assert_allclose(axes[2].lines[1].get_ydata(), 1e3 * found.trials[0].power[:, 1])
+    assert (tmp_path / "residuals.png").stat().st_size > 1000
+    with pytest.raises(st.IdentificationError, match="trial: value 1: needs 0 to 0"):
+        found.plot(trial=1)

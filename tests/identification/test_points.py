@@ -1,5 +1,6 @@
-"""Where markers are on the body, against the model's own tail points and SciPy's rotations; and
-integrated intervals against SciPy's integrator, their derivatives against differences.
+"""What is wrong with arguments and doubtful in data is told by name; where markers are on the body,
+against the model's own tail points and SciPy's rotations; derivatives against differences; and
+inverse dynamics against the torques that made the motion.
 """
 
 from dataclasses import replace
@@ -10,15 +11,127 @@ from scipy.spatial.transform import Rotation
 
 import serpentail as st
 from serpentail.identification import stages
+from serpentail.identification.inverse import smoothed
 from serpentail.identification.placement import placements
 from serpentail.identification.points import body_points, geometry_of
 from serpentail.identification.trial import world_points
-from tests.identification.flights import flown, start
+from tests.identification.flights import flown, placed, start, tracks
 from tests.support import zoo
 from tests.support.rows import row
 
+TIMES, TIPS = np.linspace(0, 0.1, 21), ("tail2", "tail3")
+
+
+@pytest.fixture(scope="module")
+def flight():
+    model = zoo.model("m1_n3")
+    return model, flown(model, TIMES, start(model))
+
+
+def test_arguments_are_refused(flight):
+    model, states = flight
+    data = tracks(model, TIMES, states, 1e-4)
+    short = np.linspace(0, 0.05, 2)
+    for words, change in {
+        "estimate: value 'tail_mas'.*'tail_mass'": {"estimate": ["tail_mas"]},
+        "estimate: value 3": {"estimate": [3]},
+        "estimate: marker:nos: .*'nose'": {"estimate": ["marker:nos"]},
+        r"torso_inertia\[3\]: there are entries 0 to 2": {"estimate": ["torso_inertia[3]"]},
+        r"torso_inertia\[same\]: value": {"estimate": ["torso_inertia[same]"]},
+        r"tail_mount\[1\] is named twice": {"estimate": ["tail_mount", "tail_mount[1]"]},
+        "estimate: value 'tail_mass'": {"estimate": "tail_mass"},
+        "estimate.tail_mass: value -1": {"estimate": {"tail_mass": -1.0}},
+        "noise.nose: value 0": {"noise": 0.0},
+        "noise.left: value 2": {"noise": dict.fromkeys(placed(model), 2) | {"nose": 1e-3}},
+        "noise: no value for 'left'": {"noise": {"nose": 1e-3}},
+        "confidence: value 1": {"confidence": 1.0},
+        "confidence: value 0": {"confidence": 0.0},
+        "torques: value .* 2 numbers": {"torques": [1.0, 2.0, 3.0]},
+        "torques.std: value 0": {"torques": st.TorquePrior(0.0, 0.1)},
+        "torques.time: value 0": {"torques": st.TorquePrior(0.1, 0.0)},
+        "torques: known from 0 to 0.05 s": {"torques": (short, np.zeros((2, 2)))},
+        "torques: known from 0.05 to": {"torques": (short + 0.05, np.zeros((2, 2)))},
+        r"torques: times have shape \(2,\)": {"torques": (short, np.zeros((2, 3)))},
+        "torques: times have .* increase": {"torques": (short[::-1], np.zeros((2, 2)))},
+        r"torques\(0.* has shape \(3,\)": {"torques": lambda _t: np.zeros(3)},
+        "torques: 2 entries: needs one of 1": {"torques": [None, None]},
+        "markers: value {}": {"markers": {}},
+        "markers.nose: value .*torso=": {"markers": {"nose": st.Marker()}},
+        "markers.nose.tail: value 1.5": {"markers": {"nose": st.Marker(tail=1.5)}},
+        "markers.nose.torso: value": {"markers": {"nose": st.Marker(torso=(1, 2))}},
+        "markers of arrays: value 'ear'": {"markers": {"ear": st.Marker(tail=0.5)}},
+        "data: none": {"data": []},
+        "wild: no such setting": {"wild": 1},
+    }.items():
+        arguments = {"data": data, "markers": placed(model), "estimate": ["tail_mass"]} | change
+        with row(words), pytest.raises(st.IdentificationError, match=words):
+            st.identify(model, **arguments)
+
+
+def test_models_that_cannot_be_identified_are_refused():
+    data = st.marker_tracks(np.arange(5.0), np.ones((5, 1, 3)), ["a"], unit="m")
+    for name, names, error, words in (
+        ("bare", [], st.ModelError, "without 'forward_dynamics_derivatives'"),
+        ("polar", [], st.ModelError, "polar"),
+        ("single", [], st.ModelError, "float"),
+        ("baked", ["tail_mass"], st.IdentificationError, "baked"),
+        ("fixed", [], st.ModelError, "fixed"),
+        (None, [], st.IdentificationError, "model: value 3"),
+    ):
+        with row(name), pytest.raises(error, match=words):
+            st.identify(zoo.model(name) if name else 3, data, {"a": st.Marker(tail=1)}, names)
+    for words, given, cutoff in (
+        ("cutoff: value 0", data, 0),
+        ("tracks: type str", "x.trc", 10),
+        ("too few markers", data, 10),
+    ):
+        with row(words), pytest.raises(st.IdentificationError, match=words):
+            st.joint_torques(zoo.model("m1_n3"), given, {"a": st.Marker(tail=1)}, cutoff=cutoff)
+    with pytest.raises(st.ModelError, match="fixed"):
+        st.joint_torques(zoo.model("fixed"), data, {"a": st.Marker(tail=1)}, cutoff=10)
+
+
+def test_too_few_markers_are_refused(flight):
+    """Two, three on a line, and those that tell too little of the tail under unknown torques."""
+    model, states = flight
+    data = tracks(model, TIMES, states, 1e-2)
+    two = {name: placed(model)[name] for name in ("nose", "tail3")}
+    with pytest.raises(st.IdentificationError, match=r"too few markers: .* at most 2 at once"):
+        st.identify(model, data, two)
+    names, places = [*"abc"], data.positions[:, :1] + np.arange(3)[:, None]
+    line = st.marker_tracks(TIMES, places, names, unit="m")
+    with pytest.raises(st.IdentificationError, match="at most 3 at once, on a line"):
+        st.identify(model, line, dict.fromkeys(names, st.Marker(torso=(0, 0, 0))))
+    torso = {name: placed(model)[name] for name in ("nose", "left", "right")}
+    data = tracks(model, TIMES[:8], states[:8])
+    prior = st.TorquePrior(0.5, 0.02)
+    assert st.identify(model, data, torso, torques=prior, noise=1e-5).success
+    with pytest.raises(st.IdentificationError, match="do not determine tail coordinate"):
+        st.identify(model, data, torso, torques=prior, noise=3e-5)
+
+
+def swapped(data, a, b, frames=slice(None)):
+    positions = data.positions.copy()
+    i, j = data.names.index(a), data.names.index(b)
+    positions[frames, [i, j]] = data.positions[frames, [j, i]]
+    return st.marker_tracks(data.times, positions, data.names, unit="m")
+
+
+def test_doubtful_markers_are_named(flight):
+    model, states = flight
+    data, markers = tracks(model, TIMES[:15], states[:15], 2e-4), placed(model)
+    some, elsewhere = np.arange(8, 12)[:, None], {"nose": st.Marker(torso=(0, 0.06, 0.015))}
+    for words, given, places in (
+        (r"'tail2' .* 'tail3' .* 4 frames from 0.04 to 0.055", swapped(data, *TIPS, some), markers),
+        ("'left' and 'right' .* throughout", swapped(data, "left", "right"), markers),
+        ("marker 'nose' is off by", data, markers | elsewhere),
+    ):
+        with row(words), pytest.warns(st.DoubtfulMarkers, match=words):
+            st.identify(model, given, places, noise=2e-4)
+
+
 MODELS = ("m2_n2", "arcs2", "own_links", "own_arcs")  # the last two on a tilted mount
-OFFSET = (0.001, 0.002, 0.003)
+OFFSET = (0.001, -0.002, 0.003)
 
 
 def shapes(model, count=5):
@@ -40,20 +153,11 @@ def test_markers_on_the_centre_line_are_at_the_models_tail_points():
         pieces = pieces if len(pieces) else np.full(each, p["tail_length"] / each)
         ends = np.concatenate([[0], np.cumsum(np.repeat(pieces / (count // each), count // each))])
         along = np.minimum(ends / ends[-1], 1)
-        placed = placements(model, {f"p{k}": st.Marker(tail=s) for k, s in enumerate(along)})
-        np.testing.assert_allclose(world_points(model, placed, q), points, atol=1e-14, err_msg=name)
+        line = placements(model, {f"p{k}": st.Marker(tail=s) for k, s in enumerate(along)})
+        np.testing.assert_allclose(world_points(model, line, q), points, atol=1e-14, err_msg=name)
 
 
 def test_offsets_turn_with_links_and_with_slices_of_arcs():
-    def turned(model, tail, turns):
-        q = shapes(model)
-        turn = Rotation.from_quat(q[:, [4, 5, 6, 3]])
-        for vector in turns(q):
-            turn = turn * Rotation.from_rotvec(vector)
-        markers = {"a": st.Marker(tail=tail, offset=OFFSET), "line": st.Marker(tail=tail)}
-        found = world_points(model, placements(model, markers), q)
-        np.testing.assert_allclose(found[:, 0], found[:, 1] + turn.apply(OFFSET), atol=1e-14)
-
     def of_links(q):
         return [q[:, 7:8] * [1, 0, 0], q[:, 8:9] * [0, 0, 1]] * 2
 
@@ -61,8 +165,17 @@ def test_offsets_turn_with_links_and_with_slices_of_arcs():
         bends = [np.stack([q[:, k], 0 * q[:, k], q[:, k + 1]], axis=1) for k in (7, 9)]
         return [bends[0], bends[1] / 2]
 
-    turned(zoo.model("m2_n2"), 0.5, of_links)  # at the end of the first segment's links
-    turned(zoo.model("arcs2"), 0.75, of_arcs)
+    # m2_n2: at the end of the first segment's links
+    for name, tail, turns in (("m2_n2", 0.5, of_links), ("arcs2", 0.75, of_arcs)):
+        model = zoo.model(name)
+        q = shapes(model)
+        turn = Rotation.from_quat(q[:, [4, 5, 6, 3]])
+        for vector in turns(q):
+            turn = turn * Rotation.from_rotvec(vector)
+        markers = {"a": st.Marker(tail=tail, offset=OFFSET), "line": st.Marker(tail=tail)}
+        found = world_points(model, placements(model, markers), q)
+        wanted = found[:, 1] + turn.apply(OFFSET)
+        np.testing.assert_allclose(found[:, 0], wanted, atol=1e-14, err_msg=name)
 
 
 def test_derivatives_of_points_are_central_differences():
@@ -70,90 +183,103 @@ def test_derivatives_of_points_are_central_differences():
     for name in MODELS:
         model = zoo.model(name)
         shape, tail = geometry_of(model), shapes(model)[:, 7:]
-        offset = (0.001, -0.002, 0.003)
-        places = {f"p{k}": st.Marker(tail=s, offset=offset) for k, s in enumerate((0.1, 0.6, 1.0))}
-        placed = placements(model, places | {"torso": st.Marker(torso=(0.01, 0.02, 0.03))})
-        numbers = shape.numbers
-        found = body_points(shape, tail, placed, np.arange(len(numbers)))
-        with row(name):
-            for k, step in enumerate(h * np.eye(tail.shape[1])):
-                ahead = body_points(shape, tail + step, placed, none).points
-                behind = body_points(shape, tail - step, placed, none).points
-                wanted = (ahead - behind) / (2 * h)
-                np.testing.assert_allclose(found.by_tail[..., k], wanted, atol=1e-9)
-            for k, step in enumerate(h * np.eye(len(numbers))):
-                ends = [
-                    body_points(other(shape, numbers + way * step), tail, placed, none).points
-                    for way in (1, -1)
-                ]
-                wanted = (ends[0] - ends[1]) / (2 * h)
-                np.testing.assert_allclose(found.by_geometry[..., k], wanted, atol=1e-9)
+        places = {f"p{k}": st.Marker(tail=s, offset=OFFSET) for k, s in enumerate((0.1, 0.6, 1.0))}
+        at_body = placements(model, places | {"torso": st.Marker(torso=(0.01, 0.02, 0.03))})
+        numbers = np.concatenate([tail[0], shape.numbers])
+        found = body_points(shape, tail, at_body, np.arange(len(shape.numbers)))
 
+        def at(change, tail=tail, shape=shape, places=at_body):
+            mount, angles, lengths = np.split(shape.numbers + change[tail.shape[1] :], [3, 6])
+            own = replace(shape, mount=mount, angles=angles, lengths=lengths)
+            return body_points(own, tail + change[: tail.shape[1]], places, none).points
 
-def other(shape, numbers):
-    """The geometry with other numbers."""
-    return replace(shape, mount=numbers[:3], angles=numbers[3:6], lengths=numbers[6:])
-
-
-# Intervals.
-
-
-@pytest.mark.parametrize("name", ["m1_n3", "elastic", "arcs2"])
-def test_ends_of_intervals_are_those_of_scipy(name):
-    model = zoo.model(name)
-    times = np.linspace(0, 0.05, 41)
-    states = flown(model, times, start(model))
-    spans, begin = np.diff(times), states[:-1]
-    torques = np.zeros((len(spans), 3, model.layout.nt))
-    found = stages.solved(model, spans, begin, torques, np.repeat(begin[:, None], 3, axis=1))
-    off = stages.difference(model, found[:, -1], states[1:])
-    assert np.abs(off).max() < 1e-7
+        wanted = [(at(step) - at(-step)) / (2 * h) for step in h * np.eye(len(numbers))]
+        slopes = np.concatenate([found.by_tail, found.by_geometry], axis=-1)
+        np.testing.assert_allclose(slopes, np.stack(wanted, axis=-1), atol=1e-9, err_msg=name)
 
 
 def interval(model, x, torques, span=0.004):
-    """End of one interval with torques at both ends."""
     nodes = stages.NODES[:, None]
     over = ((1 - nodes) * torques[0] + nodes * torques[1])[None]
-    begin = x[None]
-    guess = np.repeat(begin[:, None], 3, axis=1)
-    return stages.solved(model, np.array([span]), begin, over, guess)[0], over
+    guess = np.tile(x, (1, 3, 1))
+    return stages.solved(model, np.array([span]), x[None], over, guess)[0], over
 
 
-@pytest.mark.parametrize("name", ["m1_n3", "elastic_arcs"])
-def test_derivatives_of_intervals_are_central_differences(name):
+@pytest.mark.parametrize("name", ["m1_n3", "elastic", "arcs2", "elastic_arcs"])
+def test_intervals_end_as_by_scipy_and_their_derivatives_are_central_differences(name):
     model = zoo.model(name)
-    rng = np.random.default_rng(0)
-    x, torques = start(model), 1e-3 * rng.standard_normal((2, model.layout.nt))
-    columns = np.eye(len(model.parameter_vector))
+    x, nt = start(model), model.layout.nt
+    torques, span = 1e-3 * np.random.default_rng(0).standard_normal((2, nt)), 0.001
+    flight = flown(model, np.array([0, span]), x, lambda t: [1 - t / span, t / span] @ torques)
+    ours = interval(model, x, torques, span)[0][-1]
+    assert np.abs(stages.difference(model, ours, flight[-1])).max() < 1e-7 or name == "elastic_arcs"
     X, over = interval(model, x, torques)
-    parts = X[None], columns, True
+    parts = X[None], np.eye(len(model.parameter_vector)), True
     found = stages.differentiated(model, np.array([0.004]), x[None], over, parts)
 
-    def change(ahead, behind, h):
-        return stages.difference(model, ahead[-1], behind[-1]) / (2 * h)
+    def change(h, end_at):
+        ahead, behind = (interval(*end_at(sign * h))[0][-1] for sign in (1, -1))
+        return stages.difference(model, ahead, behind) / (2 * h)
 
-    h = 1e-6
-    for k, step in enumerate(h * np.eye(2 * model.nv)):
-        ends = [interval(model, stages.moved(model, x, s * step), torques)[0] for s in (1, -1)]
-        np.testing.assert_allclose(found.by_state[0, :, k], change(*ends, h), atol=2e-6, rtol=2e-6)
-    for end in (0, 1):
-        for k in range(model.layout.nt):
-            step = np.zeros_like(torques)
-            step[end, k] = 1e-5
-            ends = [interval(model, x, torques + s * step)[0] for s in (1, -1)]
-            wanted = change(*ends, 1e-5)
-            np.testing.assert_allclose(
-                found.by_torque[0, end, :, k], wanted, atol=1e-6 * np.abs(wanted).max()
-            )
+    for k, unit in enumerate(np.eye(2 * model.nv)):
+        wanted = change(1e-6, lambda h, u=unit: (model, stages.moved(model, x, h * u), torques))
+        np.testing.assert_allclose(found.by_state[0, :, k], wanted, atol=2e-6, rtol=2e-6)
+    for unit in np.eye(2 * nt).reshape(-1, 2, nt):
+        wanted = change(1e-5, lambda h, u=unit: (model, x, torques + h * u))
+        (end,), (k,) = unit.any(axis=1).nonzero(), unit.any(axis=0).nonzero()
+        own = found.by_torque[0, end[0], :, k[0]]
+        np.testing.assert_allclose(own, wanted, atol=1e-6 * np.abs(wanted).max())
     for of, column in (("torso_mass", 1), ("tail_mount", 5)):
         value = np.array(model.parameters[of], float)
-        small = 1e-6 * max(np.abs(value).max(), 1e-3)
         unit = np.eye(3)[0] if value.ndim else 1.0
-        ends = []
-        for sign in (1, -1):
-            other = model.with_parameters(**{of: value + sign * small * unit})
-            ends.append(interval(other, x, torques)[0])
-        wanted = change(*ends, small)
-        np.testing.assert_allclose(
-            found.by_parameters[0, :, column], wanted, atol=1e-5 * np.abs(wanted).max() + 1e-9
-        )
+
+        def other(h, of=of, value=value, unit=unit):
+            return model.with_parameters(**{of: value + h * unit}), x, torques
+
+        wanted = change(1e-6 * max(np.abs(value).max(), 1e-3), other)
+        own = found.by_parameters[0, :, column]
+        np.testing.assert_allclose(own, wanted, atol=1e-5 * np.abs(wanted).max() + 1e-9)
+
+
+INNER = slice(20, -20)  # frames away from the ends
+
+
+def test_the_smoother_passes_what_its_formula_says():
+    """Amplitude 1 / (1 + (f / cutoff)^6), without delay; ends are left out."""
+    cutoff, times, shares = 10.0, np.linspace(0, 1.5, 601), np.array([0.5, 1.0, 2.0])
+    rate = 2 * np.pi * shares * cutoff
+    sine, cosine = np.sin(times[:, None] * rate), np.cos(times[:, None] * rate)
+    gain, middle = 1 / (1 + shares**6), slice(200, 400)
+    wanted = gain * sine, gain * cosine, -gain * sine
+    for order, found in enumerate(smoothed(times, sine, cutoff)):
+        off = (found / rate**order - wanted[order])[middle]
+        assert np.abs(off).max() < [2e-3, 3e-3, 4e-3][order], order
+
+    # uneven times with gaps are smoothed alike
+    times = np.sort(np.random.default_rng(0).uniform(0, 2, 400))
+    times[150:] += 0.03
+    value, first, _ = smoothed(times, np.sin(5 * times)[:, None], 20.0)
+    np.testing.assert_allclose(value[INNER, 0], np.sin(5 * times)[INNER], atol=1e-4)
+    np.testing.assert_allclose(first[INNER, 0], 5 * np.cos(5 * times)[INNER], atol=5e-3)
+
+
+def test_torques_power_and_the_residual_wrench_are_those_of_the_flight():
+    """A push on the torso is the wrench: the reference flies with another weight, too."""
+    model, times = zoo.model("m1_n3"), np.linspace(0, 0.4, 201)
+    mass = model.parameters["torso_mass"] + model.parameters["tail_mass"]
+
+    def torque(t):
+        return 1e-3 * np.array([np.sin(30 * t), np.cos(20 * t)])
+
+    wanted = np.array([torque(t) for t in times])
+    for gravity in (9.8, 4.9):
+        states = flown(model.with_parameters(gravity=gravity), times, start(model), torque)
+        found = st.joint_torques(model, tracks(model, times, states), placed(model), cutoff=80.0)
+        push = found.residual_force[INNER] - [0, 0, (9.8 - gravity) * mass]
+        assert np.abs(push).max() < 0.01, gravity
+        if gravity == 9.8:
+            off, rates = (found.tau - wanted)[INNER], states[:, -2:]
+            np.testing.assert_allclose(off, 0, atol=3e-5)
+            off = (found.power - wanted * rates)[INNER]
+            np.testing.assert_allclose(off, 0, atol=3e-5 * np.abs(rates).max())
+            assert np.abs(found.residual_moment[INNER]).max() < 1e-4

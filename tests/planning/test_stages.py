@@ -1,4 +1,6 @@
-"""Stages in C: collocation solved inside, exact derivatives of what they lead to, and threads."""
+"""Stages in C: collocation solved inside, exact derivatives of what they lead to, and threads; and
+what they are of: collocation rules against exact integrals, and meshes.
+"""
 
 import ctypes
 import os
@@ -7,10 +9,13 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
+from scipy.interpolate import BPoly
 
 import serpentail as st
 from serpentail.planning.condensed import fatrop, helpers
 from serpentail.planning.condensed.fatrop import kernel
+from serpentail.planning.nlp.mesh import Mesh, refined, uniform
+from serpentail.planning.nlp.rules import MOST_DEGREE, collocation_rule
 from tests.support.rows import row
 from tests.support.stages import first_stage
 from tests.support.tumbling import AGAIN, rat, start
@@ -27,26 +32,22 @@ LIMIT = 30  # s, of a test that waits for a thread
 
 
 def state(nt: int) -> np.ndarray:
-    """A state in units: the quaternion not of norm 1."""
     random = np.random.default_rng(1)
     tail, rate = 0.2 * random.normal(size=nt), 0.3 * random.normal(size=nt)
     return np.concatenate([[0.9, 0.3, 0.2, -0.1], tail, rate])
 
 
-def variables(stage, x: np.ndarray, size: float = 0.5) -> np.ndarray:
-    random = np.random.default_rng(2)
-    controls = size * random.normal(size=stage.size - len(x) - 1)
+def variables(stage, x: np.ndarray) -> np.ndarray:
+    controls = 0.5 * np.random.default_rng(2).normal(size=stage.size - len(x) - 1)
     return np.concatenate([controls, x, [0.4]])
 
 
 def differences(function, v, step=1e-5):
-    """Central differences (.., v) of a function."""
     rows = [(function(v + step * e) - function(v - step * e)) / (2 * step) for e in np.eye(len(v))]
     return np.stack(rows, axis=-1)
 
 
 def test_derivatives_are_central_differences():
-    """Slopes of the results, and Hessians of the weighted results."""
     for tail, settings in CASES:
         model = rat(*tail)
         x = state(model.layout.nt)
@@ -62,9 +63,6 @@ def test_derivatives_are_central_differences():
             np.testing.assert_allclose(found, wanted, atol=1e-5 * np.abs(found).max())
 
 
-NODE = ctypes.CFUNCTYPE(ctypes.c_int, *(ctypes.c_void_p,) * 6)
-
-
 def filling(number, status):
     """A function of a node of (1, 3) that gives one number everywhere, and its status."""
 
@@ -73,7 +71,7 @@ def filling(number, status):
         np.ctypeslib.as_array(numbers, (11,))[:] = number
         return status
 
-    return NODE(node)
+    return ctypes.CFUNCTYPE(ctypes.c_int, *(ctypes.c_void_p,) * 6)(node)
 
 
 def test_a_stage_without_numbers_has_no_results_until_it_has_them_again():
@@ -110,46 +108,40 @@ def test_linear_equations_are_solved_and_singular_ones_refused():
         assert code.factorise(len(singular), singular.ctypes.data, pivots.ctypes.data) == 1
 
 
-# Threads.
-
-
 @contextmanager
-def program(**settings):
-    """Yield the code and a program of six stages, and variables at which it can be evaluated."""
+def program():
+    """Yield a function that evaluates six stages by a factor, the code and the program."""
     model, x = rat(), state(2)
-    with first_stage(model, x, H, **settings) as stage:
-        code = kernel()
+    with first_stage(model, x, H) as stage:
+        code, own = kernel(), stage.size
         code.program_slopes.argtypes = (ctypes.c_void_p,) * 2
-        w = np.zeros(code.program_variables(stage.program))
-        nu, own = stage.size - len(x) - 1, stage.size
+        w, nu = np.zeros(code.program_variables(stage.program)), own - len(x) - 1
         w[nu] = 0.4
         for k in range(1, 6):
             first = k * own - len(x)
             w[first + nu : first + own] = [*x, 0.4]
-        yield code, stage, w
 
+        def slopes(factor=1.0):
+            code.program_slopes(stage.program, (factor * w).ctypes.data)
+            assert all(each.sloped for each in stage.all[:6])
+            shape = stage.stage.results, own
+            return [np.ctypeslib.as_array(each.Jr, shape).copy() for each in stage.all[:6]]
 
-def slopes(code, stage, w):
-    """Jacobians of the results of all six stages."""
-    code.program_slopes(stage.program, w.ctypes.data)
-    stages = stage.all[:6]
-    assert all(own.sloped for own in stages)
-    return [np.ctypeslib.as_array(own.Jr, (own.results, own.variables)).copy() for own in stages]
+        yield slopes, code, stage.program
 
 
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
 def test_stages_have_the_numbers_of_one_thread():
-    """Also in a forked child, which evaluates alone."""
-    with program() as (code, stage, w):
-        wanted = slopes(code, stage, w)
+    with program() as (slopes, *_):
+        wanted = slopes()
     for crew in (1, 2, 5):
-        with program() as (code, stage, w), helpers.helped(code, stage.program, crew):
-            for a, b in zip(wanted, slopes(code, stage, w), strict=True):
+        with program() as (slopes, code, own), helpers.helped(code, own, crew):
+            for a, b in zip(wanted, slopes(), strict=True):
                 np.testing.assert_array_equal(a, b)
             child = os.fork()
-            if child == 0:
-                code.program_slopes(stage.program, (1.001 * w).ctypes.data)
-                pairs = zip(wanted, slopes(code, stage, w), strict=True)
+            if child == 0:  # evaluates alone
+                slopes(1.001)
+                pairs = zip(wanted, slopes(), strict=True)
                 os._exit(0 if all(np.allclose(a, b) for a, b in pairs) else 1)
             assert os.waitpid(child, 0)[1] == 0
 
@@ -168,3 +160,50 @@ def test_plans_have_as_many_threads_as_the_model_allows_and_do_not_depend_on_the
     assert threading.active_count() == before
     assert found[0].report["iterations"] == found[1].report["iterations"]
     np.testing.assert_array_equal(found[0].solution.w, found[1].solution.w)
+
+
+SCHEMES = [("trapezoidal", None), ("hermite-simpson", None)]
+SCHEMES += [(name, d) for name in ("lobatto", "radau") for d in range(1, MOST_DEGREE + 1)]
+
+
+def test_rules_are_exact_up_to_their_order_and_no_further():
+    """Quadrature; and states of x = s^p from its rates at the nodes: p up to their number."""
+    for name, degree in SCHEMES:
+        found, s = collocation_rule(name, degree), np.linspace(0, 1, 5)
+        with row(name, degree):
+            for power in range(found.order):
+                total = found.weights @ found.nodes**power
+                assert total == pytest.approx(1 / (power + 1), abs=1e-13)
+            beyond = found.weights @ found.nodes**found.order - 1 / (found.order + 1)
+            assert abs(beyond) > 1e-10
+            for power in range(1, len(found.nodes) + 1):
+                states, rates = found.supports**power, power * found.nodes ** (power - 1)
+                np.testing.assert_allclose(found.states @ states, found.slopes @ rates, atol=2e-12)
+                np.testing.assert_allclose(found.integrals(s) @ rates, s**power, atol=2e-12)
+                wanted = power * s ** (power - 1)
+                np.testing.assert_allclose(found.basis(s) @ rates, wanted, atol=2e-11)
+            values = np.random.default_rng(0).normal(size=len(found.nodes))
+            coefficients = found.bernstein() @ values  # beyond which no polynomial goes
+            inside = BPoly(coefficients[:, None], [0, 1])(s)
+            np.testing.assert_allclose(inside, found.basis(s) @ values, atol=1e-11)
+
+
+def test_meshes_are_split_refined_and_guarded():
+    """Refinement splits where errors are and obeys the most; guards are for the intervals beside,
+    too, and stay.
+    """
+    mesh = Mesh(np.array([0.0, 0.2, 1.0]), np.array([True, False]), None).split(np.array([2, 1]))
+    np.testing.assert_allclose(mesh.ends, [0, 0.1, 0.2, 1])
+    assert mesh.guarded.tolist() == [True, True, False]
+    points = mesh.points(collocation_rule("hermite-simpson"))
+    np.testing.assert_allclose(points, [0, 0.05, 0.1, 0.15, 0.2, 0.6, 1])
+
+    errors = np.array([1e-8, 1e-8, 1e-3, 1e-8])
+    mesh = refined(uniform(4), errors, 0.1, 5, 100)
+    assert mesh.intervals > 4 and np.count_nonzero(mesh.widths < 0.25) == mesh.intervals - 3
+    assert refined(uniform(4), errors, 1e-9, 5, 6).intervals <= 6
+
+    third, last = (np.arange(8) == k for k in (2, 7))
+    mesh = uniform(8).with_guards(third)
+    assert np.flatnonzero(mesh.guarded).tolist() == [1, 2, 3]
+    assert np.flatnonzero(mesh.with_guards(last).guarded).tolist() == [1, 2, 3, 6, 7]

@@ -7,6 +7,5 @@ import pytest
 
 @pytest.fixture(scope="session")
 def worker():
-    """An executor with one process."""
     with ThreadPoolExecutor(1) as executor:
         yield executor

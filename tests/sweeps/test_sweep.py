@@ -1,5 +1,8 @@
-"""Rows of sweeps are what the runs themselves return, however and wherever they are made."""
+"""Points of sweeps: grids, and points that fill what they are spread in. Rows are what the runs
+themselves return, however and wherever they are made.
+"""
 
+import math
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import nullcontext
 from functools import partial
@@ -7,9 +10,11 @@ from multiprocessing import get_context
 
 import numpy as np
 import pytest
+from scipy.stats import kstest
 
 import serpentail as st
 from serpentail.sweeps import driver, supervision
+from serpentail.sweeps.axes import axes_of
 from serpentail.sweeps.executors import Place
 from serpentail.sweeps.result import Status
 from tests.support import swept, zoo
@@ -20,18 +25,13 @@ LOW, HIGH = [0, 0, 1, -9, -9, -9, 0, 0], [0, 0, 2, 9, 9, 9, 0, 0]
 SETTINGS = {"q0": Q0, "t_span": 0.05, "controller": st.Damping(1e-3)}
 
 
-@pytest.fixture(scope="module")
 def model():
     return zoo.model("m1_n1")
 
 
-def over(count=3):
-    return {"tail_mass": st.grid([0.003, 0.005]), "v0": st.sobol(LOW, HIGH)}, count
-
-
-def flights(model, count, **settings):
-    axes, points = over(count)
-    return st.sweep(model, axes, points=points, settings=SETTINGS, **settings)
+def flights(count, own=None, **settings):
+    axes = {"tail_mass": st.grid([0.003, 0.005]), "v0": st.sobol(LOW, HIGH)}
+    return st.sweep(own or model(), axes, points=count, settings=SETTINGS, **settings)
 
 
 def close(row, motion):
@@ -42,25 +42,24 @@ def close(row, motion):
     assert energies == pytest.approx(motion.energy[-1], abs=1e-12)
 
 
-def test_rows_are_those_of_single_runs(model):
-    found = flights(model, 8)
+def test_rows_are_those_of_single_runs():
+    found = flights(8)
     assert len(found) == 16 and found.spent.points == 16
     for k in (0, 7, 15):
         row = found[k]
-        own = model.with_parameters(tail_mass=row["tail_mass"])
+        own = model().with_parameters(tail_mass=row["tail_mass"])
         close(row, st.simulate(own, Q0, row["v0"], t_span=0.05, controller=st.Damping(1e-3)))
         np.testing.assert_array_equal(found.motion(k).v[0], row["v0"])
     assert [row["tail_mass"] for row in found.rows()] == [0.003] * 8 + [0.005] * 8
     assert {row["number"] for row in found.rows()} == set(range(16))
 
 
-def test_all_executors_make_the_same_rows(model):
-    wanted = flights(model, 2).rows()
+def test_all_executors_make_the_same_rows():
+    wanted = [row["q_end"] for row in flights(2).rows()]
     with ThreadPoolExecutor(1) as threads, ProcessPoolExecutor(1, get_context("spawn")) as pool:
         for executor in (threads, pool, "processes:2"):
-            found = flights(model, 2, executor=executor)
-            for row, other in zip(found.rows(), wanted, strict=True):
-                np.testing.assert_allclose(row["q_end"], other["q_end"], rtol=0, atol=1e-9)
+            found = [row["q_end"] for row in flights(2, executor=executor).rows()]
+            np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-9)
         assert not supervision._all and not supervision._idle  # none is left of its own
 
 
@@ -81,11 +80,9 @@ def test_points_that_hang_crash_or_raise_are_rows(worker, tmp_path):
 
 
 class Forgetful(ThreadPoolExecutor):
-    """Loses the first `lost` blocks that it gets."""
+    """Loses the first blocks that it gets."""
 
-    def __init__(self, lost):
-        super().__init__(1)
-        self.lost = lost
+    lost = 0
 
     def submit(self, *work):
         if not self.lost:
@@ -96,21 +93,22 @@ class Forgetful(ThreadPoolExecutor):
         return gone
 
 
-def test_a_block_that_a_worker_lost_runs_again():
+def test_a_block_that_a_worker_lost_runs_again_and_an_executor_that_is_gone_is_named(monkeypatch):
     """Three times at most."""
-    with Forgetful(3) as executor:
-        found = st.sweep(None, {"x": st.grid([3])}, swept.square, executor=executor, limit=60)
-    assert [row["square"] for row in found.rows()] == [9]
-    with Forgetful(4) as executor, pytest.raises(st.SweepError, match="the worker has died"):
-        st.sweep(None, {"x": st.grid([3])}, swept.square, executor=executor, limit=60)
 
+    def squares(executor):
+        return st.sweep(None, {"x": st.grid([3])}, swept.square, executor=executor, limit=60)
 
-def test_an_executor_that_is_gone_is_named_in_one_line(model, monkeypatch):
+    with Forgetful(1) as executor:
+        executor.lost = 3
+        assert [row["square"] for row in squares(executor).rows()] == [9]
+        executor.lost = 4
+        with pytest.raises(st.SweepError, match="the worker has died"):
+            squares(executor)
     with ThreadPoolExecutor(1) as executor:
         pass  # it takes no more work
-    told = r"its workers are gone.*after shutdown"
-    with pytest.raises(st.SweepError, match=told):
-        flights(model, 2, executor=executor, limit=60)
+    with pytest.raises(st.SweepError, match=r"its workers are gone.*after shutdown"):
+        squares(executor)
 
     def lost():
         raise ConnectionResetError("reset by the scheduler")
@@ -119,84 +117,80 @@ def test_an_executor_that_is_gone_is_named_in_one_line(model, monkeypatch):
         place = Place(executor.submit, lost)
         monkeypatch.setattr(driver, "place_of", lambda _: nullcontext(place))
         with pytest.raises(st.SweepError, match=r"are gone.*reset by the scheduler"):
-            flights(model, 2, limit=60)
+            squares(None)
 
 
-def test_a_second_call_runs_what_is_missing_only(model, tmp_path):
+def test_a_second_call_runs_what_is_missing_only(tmp_path):
     store = tmp_path / "rows.db"
-    first = flights(model, 2, store=store)
-    again = flights(model, 2, store=store)
+    first = flights(2, store=store)
+    again = flights(2, store=store)
     assert again.spent.points == 0 and again.rows() == first.rows()
-    more = flights(model, 4, store=store)  # Sobol's first points stay
+    more = flights(4, store=store)  # Sobol's first points stay
     assert more.spent.points == 4 and more.status() == Status(8, 8, 0)
-    other = st.sweep(
-        model.with_parameters(torso_mass=0.2), over()[0], points=2, settings=SETTINGS, store=store
-    )
-    assert other.spent.points == 4  # the model is another
+    assert flights(2, model().with_parameters(torso_mass=0.2), store=store).spent.points == 4
 
 
-def test_failures_are_rows_and_can_be_run_again(model, tmp_path):
+def test_failures_are_rows_and_can_be_run_again(tmp_path):
     axes = {"tail_mass": st.grid([0.003, -1.0]), "v0": st.random(LOW, HIGH)}
     given = {"points": 4, "settings": SETTINGS, "store": tmp_path / "rows.db"}
-    found = st.sweep(model, axes, **given)
+    found = st.sweep(model(), axes, **given)
     assert found.status() == Status(8, 8, 4)
     assert str(found.status()) == "8 of 8 points done, 4 of them failed, 0 left"
     assert "tail_mass: value -1" in found[5]["error"] and "q_end" not in found[5]
     close(found[1], found.motion(1))
-    assert st.sweep(model, axes, **given).spent.points == 0
-    assert st.sweep(model, axes, **given, retry_failed=True).spent.points == 4
+    assert st.sweep(model(), axes, **given).spent.points == 0
+    assert st.sweep(model(), axes, **given, retry_failed=True).spent.points == 4
 
 
-def test_functions_are_run_with_and_without_a_model(model, worker, tmp_path):
-    found = st.sweep(None, {"x": st.grid([3, 4])}, swept.square, executor=worker)
-    assert [row["square"] for row in found.rows()] == [9, 16]
+def test_functions_are_run_with_and_without_a_model_and_tell_progress(worker, tmp_path):
+    """What their rows depend on is part of their keys."""
+    given = {"store": tmp_path / "s.db", "executor": worker}
+    for of, points in (("1", 2), ("1", 0), ("2", 2)):
+        found = st.sweep(None, {"x": st.grid([3, 4])}, swept.square, of=of, **given)
+        assert found.spent.points == points
+        assert [row["square"] for row in found.rows()] == [9, 16]
+    with pytest.raises(st.SweepError, match="returned no motion"):
+        found.motion(0)
+    told = []
+    with st.progress(told.append):
+        st.sweep(None, {"x": st.grid(range(40))}, swept.square, executor=worker)
+    told = [each for each in told if each.stage == "sweep"]
+    assert told[-1].ended and any("of 40" in each.what for each in told)
+    assert any(each.left is not None for each in told[:-1])
     axes = {"tail_mass": st.grid([0.002]), "span": st.grid([0.1, 0.2])}
-    found = st.sweep(model, axes, swept.fly, executor=worker)
+    found = st.sweep(model(), axes, swept.fly, executor=worker)
     for row in found.rows():
         assert row["mass"] == 0.002 and "motion" not in row
         # the centre of mass falls so, and the torso, whose tail is light, nearly so
         assert row["fallen"] == pytest.approx(9.81 * row["span"] ** 2 / 2, rel=0.1)
     page = found.view(1, tmp_path / "page.html")
     assert page.read_text(encoding="utf-8").startswith("<!")
-    with pytest.raises(st.SweepError, match="returned no motion"):
-        st.sweep(None, {"x": st.grid([3])}, swept.square, executor=worker).motion(0)
 
 
-def test_what_function_rows_depend_on_is_part_of_their_keys(worker, tmp_path):
-    given = {"store": tmp_path / "s.db", "executor": worker}
-    for of, points in (("1", 1), ("1", 0), ("2", 1)):
-        assert (
-            st.sweep(None, {"x": st.grid([1])}, swept.square, of=of, **given).spent.points == points
-        )
-
-
-def test_plans_are_rows(model, worker):
-    axes = {"duration": st.grid([0.4, 0.5])}
+def test_plans_are_rows(worker):
     settings = {"q0": Q0, "v0": [0, 0, 1, 2, 0, 0, 0, 0], "goal": st.Goal(torso_rate=None)}
-    settings["intervals"] = 4
-    settings |= {"track": False, "tolerance": None}
-    found = st.sweep(model, axes, "plan", settings=settings, executor=worker)
+    settings |= {"track": False, "tolerance": None, "intervals": 4}
+    axes = {"duration": st.grid([0.4, 0.5])}
+    found = st.sweep(model(), axes, "plan", settings=settings, executor=worker)
     assert [row["duration_s"] for row in found.rows()] == [0.4, 0.5]
     assert all(row["error"] is None and "success" in row for row in found.rows())
 
 
-def test_what_cannot_be_is_refused_in_one_line(model):
-    usual = {"model": model, "over": {"tail_mass": st.grid([0.003])}, "run": "simulate"}
+def test_what_cannot_be_is_refused_in_one_line():
+    usual = {"model": model(), "over": {"tail_mass": st.grid([0.003])}, "run": "simulate"}
     usual |= {"settings": SETTINGS | {"v0": LOW}}
+    for name, value in {"run": "fly", "settings": 3, "limit": 0, "executor": "slurm"}.items():
+        with named(name), pytest.raises(st.SweepError, match=f"{name}: value {value!r}"):
+            st.sweep(**usual | {name: value})
     for words, changes in {
-        "run: value 'fly'": {"run": "fly"},
         "run: value .*simulate": {"run": lambda point: {}, "settings": None},
         "settings: no v0: ": {"settings": {"q0": Q0}},
-        "settings: no q0 and no v0: ": {"settings": {}},
         "settings: watch": {"settings": {"watch": print}},
-        "settings: value 3": {"settings": 3},
         "settings: q0: value .*nan": {"settings": {"q0": float("nan")}},
         "outputs: value 'height'": {"outputs": ["height"]},
         "outputs: value 'end_s'": {"outputs": "end_s"},
         r"outputs: value \[\]": {"outputs": []},
         r"outputs: value \['end_s'\]": {"outputs": ["end_s"], "run": "plan"},
-        "limit: value 0": {"limit": 0},
-        "executor: value 'slurm'": {"executor": "slurm"},
         "executor: processes: value 0": {"executor": "processes:0"},
         "over: segments: ": {"over": {"segments": st.grid([1, 2])}},
         "point 1 occurs twice": {"over": {"tail_mass": st.grid([0.003, 0.003])}},
@@ -214,10 +208,80 @@ def test_what_cannot_be_is_refused_in_one_line(model):
         assert "\n" not in str(caught.value)
 
 
-def test_progress_tells_how_many_are_left(worker):
-    told = []
-    with st.progress(told.append):
-        st.sweep(None, {"x": st.grid(range(40))}, swept.square, executor=worker)
-    told = [each for each in told if each.stage == "sweep"]
-    assert told[-1].ended and any("of 40" in each.what for each in told)
-    assert any(each.left is not None for each in told[:-1])
+def points(over, count=None, seed=0):
+    return list(axes_of(over, count, seed))
+
+
+def test_grids_give_all_combinations_in_order():
+    over = {"a": st.grid([1, 2]), ("b", "c"): st.grid([(3, "x"), (4, "y")])}
+    wanted = [(1, 3, "x"), (1, 4, "y"), (2, 3, "x"), (2, 4, "y")]
+    assert points(over) == [dict(zip("abc", values, strict=True)) for values in wanted]
+    assert len(axes_of(over, None, 0)) == 4
+    assert points({"b, c": st.grid([(3, 4)])}) == [{"b": 3, "c": 4}]
+
+
+def test_units_become_those_of_the_names_that_have_one():
+    axes = axes_of({"m, word": st.grid([("2 g", "2nd"), (0.1, "3 s")])}, None, 0)
+    found = [{"m": 0.002, "word": "2nd"}, {"m": 0.1, "word": "3 s"}]
+    assert list(axes.measured({"m": "kg"})) == found
+    spread = axes_of({"m": st.random("2 g", "3 g")}, 4, 0)
+    for unit in ("kg", None):
+        assert all(0.002 <= p["m"] <= 0.003 for p in spread.measured({"m": unit}))
+    for wrong in ({"word": "s"}, {"word": None}):
+        with pytest.raises(st.SweepError, match="over: word: value '2nd'"):
+            axes.measured(wrong)
+    with pytest.raises(st.SweepError, match="over: m: value '2 g': a mass where a length"):
+        spread.measured({"m": "m"})
+
+
+def test_points_are_uniform_and_the_same_again():
+    for name, way in {"random": st.random, "latin": st.latin, "sobol": st.sobol}.items():
+        over = {"a": way([0, 10], [1, 30]), "b": way(1e-3, 1e3, "log"), "c": st.grid([1, 2])}
+        found = points(over, 256, 3)
+        with named(name):
+            assert len(found) == 512 and found == points(over, 256, 3) != points(over, 256, 4)
+            # the points that are spread are the same at each place of the grid
+            assert [{**p, "c": 0} for p in found[:256]] == [{**p, "c": 0} for p in found[256:]]
+            columns = [
+                [p["a"][0] for p in found[:256]],
+                [(p["a"][1] - 10) / 20 for p in found[:256]],
+                [(math.log10(p["b"]) + 3) / 6 for p in found[:256]],
+            ]
+            for column in columns:
+                assert kstest(column, "uniform").pvalue > 1e-3
+                if name != "random":  # each of 256 equal parts has one point
+                    assert sorted(int(256 * x) for x in column) == list(range(256))
+            assert abs(np.corrcoef(columns) - np.eye(3)).max() < 0.2
+    for count in (1, 2, 5):  # Sobol's points may be any number
+        assert len(points({"a": st.sobol(0, 1)}, count)) == count
+
+
+def test_points_that_cannot_be_are_refused_in_one_line():
+    one = {"a": st.random(0, 1)}
+    for words, make in {
+        "grid: value 3": lambda: st.grid(3),
+        "grid: value 'ab'": lambda: st.grid("ab"),
+        "grid: no values": lambda: st.grid([]),
+        "grid: value nan": lambda: st.grid([float("nan")]),
+        "random: low: value '2 apples'": lambda: st.random("2 apples", 3),
+        "random: low: value 1": lambda: st.random(1, 0),
+        "random: low: value 0: .*above 0": lambda: st.random(0, 1, "log"),
+        "latin: law: value 'normal'": lambda: st.latin(0, 1, "normal"),
+        r"low is \(2,\), high is \(\)": lambda: st.sobol([0, 0], 1),
+        "over: value {}": lambda: points({}),
+        "over: value 3": lambda: points({3: st.grid([1])}),
+        r"over\['a'\]: value 3": lambda: points({"a": 3}),
+        r"over\['a, b'\]: value": lambda: points({"a, b": st.random(0, 1)}, 3),
+        "over: a, b: value 1: needs 2": lambda: points({("a", "b"): st.grid([1])}),
+        "'a' twice": lambda: points({"a": st.grid([1]), ("a",): st.grid([2])}),
+        "'b' twice": lambda: points({"a, b": st.grid([[1, 2]]), "b": st.grid([2])}),
+        "latin and random": lambda: points(one | {"b": st.latin(0, 1)}, 3),
+        "points: no value": lambda: points(one),
+        "points: value 3": lambda: points({"a": st.grid([1])}, 3),
+        "points: value 0": lambda: points(one, 0),
+        "seed: value -1": lambda: points(one, 3, -1),
+        "points: value 1000000000": lambda: points(one, 10**9),
+    }.items():
+        with named(words), pytest.raises(st.SweepError, match=words) as caught:
+            make()
+        assert "\n" not in str(caught.value)
