@@ -10,8 +10,7 @@ import serpentail as st
 from tests.support import zoo
 from tests.support.posed import posed
 
-from .conftest import answer
-from .strange import strange
+from .conftest import answer, strange
 
 CUT = ("tsit5", "ros34pw2")  # methods that take most_steps
 METHODS = some.sampled_from([*CUT, "rk4", "implicit_euler", "dop853", "lsoda", "auto"])
@@ -87,12 +86,7 @@ def test_many_runs_are_made_or_refused(model, search):
     search(law, name=names, value=strange((3,)) | strange((3, 8)))
 
 
-def pfl(name):
-    """Return what makes a linearising controller with one argument as given."""
-    given = {"reference": ([0.0, 1.0], np.zeros((2, 2))), "kp": 1.0, "kd": 2.0}
-    return lambda x: st.Pfl(zoo.model("feet_tail"), **given | {name: x})
-
-
+PFL = {"reference": ([0.0, 1.0], np.zeros((2, 2))), "kp": 1.0, "kd": 2.0}
 ACTING = {
     "Damping": st.Damping,
     "TorqueTable times": lambda x: st.TorqueTable(x, np.zeros((2, 2))),
@@ -103,7 +97,7 @@ ACTING = {
     "Phases time": lambda x: st.Phases([(0.0, None), (x, None)]),
     "Phases controller": lambda x: st.Phases([(0.0, x)]),
     "a function": lambda x: lambda t, q, v: x,
-    **{f"Pfl {name}": pfl(name) for name in ("reference", "kp", "kd")},
+    **{f"Pfl {k}": lambda x, k=k: st.Pfl(zoo.model("feet_tail"), **PFL | {k: x}) for k in PFL},
 }
 MADE = {
     st.Legs: {"times": [0.0, 1.0], "gamma": 3.6, "delta": [0.0, 1.0]},
@@ -118,24 +112,21 @@ MADE = {
 
 
 def test_what_acts_is_taken_or_refused(model, search):
-    def law(name, value):
-        if name == "Phases controller" and callable(value):
-            return  # a function of the user's raises what it likes
-        controller = answer(ACTING[name], value)
+    """A user's function of the time raises what it likes."""
+
+    def law(name, value, made):
+        function, word = made
+        answer(function, **MADE[function] | {word: value})
+        controller = None
+        if not (name == "Phases controller" and callable(value)):
+            controller = answer(ACTING[name], value)
         if controller is not None:
             acting = {"controller": controller, "most_steps": 2000}
             answer(st.simulate, model, **start(model) | acting)
 
-    search(law, name=some.sampled_from(sorted(ACTING)), value=strange((2,)) | strange((2, 2)))
-
-
-def test_what_is_made_of_strange_things_is_made_or_refused(search):
-    def law(which, value):
-        function, name = which
-        answer(function, **MADE[function] | {name: value})
-
-    every = [(function, name) for function, given in MADE.items() for name in given]
-    search(law, which=some.sampled_from(every), value=strange() | strange((2, 2)))
+    made = some.sampled_from([(function, word) for function in MADE for word in MADE[function]])
+    value = strange((2,)) | strange((2, 2))
+    search(law, name=some.sampled_from(sorted(ACTING)), value=value, made=made)
 
 
 # Plans.
@@ -150,13 +141,10 @@ def asked(**given):
     return posed(model, **usual | given)
 
 
-def test_starts_and_durations_are_taken_or_refused(taken_or_refused):
+def test_starts_durations_and_settings_of_plans_are_taken_or_refused(taken_or_refused):
     vectors = strange((11,))
     pairs = some.tuples(vectors, strange((10,))) | some.lists(vectors, max_size=3)
     taken_or_refused(asked, ["start", "duration"], pairs | strange())
-
-
-def test_settings_of_plans_are_taken_or_refused(taken_or_refused):
     taken_or_refused(asked, SETTINGS, strange((4,)))
 
 
