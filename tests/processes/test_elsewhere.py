@@ -29,9 +29,9 @@ BESIDE = [name for name in MOMENTS if name.startswith("beside")]  # where chance
 )
 def test_every_job_is_the_same_elsewhere(child, ways):
     zoo.model("m1_n3")  # compiled
-    command = [sys.executable, "-m", "tests.processes.elsewhere", zoo.folder("m1_n3"), *ways]
     environment = os.environ | {"SERPENTAIL_THREADS": "2"}  # in workers of pools, too
-    running = child(command, env=environment)
+    words = "-m", "tests.processes.elsewhere", zoo.folder("m1_n3"), *ways
+    running = child(*words, env=environment)
     said, errors = running.communicate(timeout=LIMIT)
     assert running.returncode == 0, (said, errors)
     found = [json.loads(line) for line in said.splitlines()]
