@@ -36,7 +36,7 @@ def sphere(count):
     return directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
 
-def test_the_kick_is_told_all_and_a_clean_flight_nothing(kick):
+def test_the_kick_is_told_all(kick):
     told = kick.warnings
     assert len(told) == 5
     assert millimetres(the(told, "torso: ")) == pytest.approx(10.7, abs=0.2)
@@ -45,12 +45,6 @@ def test_the_kick_is_told_all_and_a_clean_flight_nothing(kick):
     assert "7.03 rad" in the(told, "tail: segment 1") and the(told, "tail: goes")
     # value, time, limit and remedy
     assert all(re.search(r" at t = [\d.]+ s.*more than [\d.]+.*: \w", each) for each in told)
-    for name in ("m1_n3", "arcs2"):
-        model = zoo.model(name)
-        q = np.concatenate([[0, 0, -3, 1, 0, 0, 0], 0.3 * np.cos(np.arange(model.nq - 7))])
-        v = np.concatenate([[0, 0, 1, 9, 1, 2], np.zeros(model.nv - 6)])
-        flight = st.simulate(model, q, v, controller=st.Damping(1e-3), t_span=0.3)
-        assert flight.warnings == [], name
 
 
 # The ground, where a scene has one.
