@@ -24,7 +24,6 @@ from tests.support.models import BUILD
 configuration.set_hypothesis_home_dir(BUILD / "hypothesis")  # not in the checkout
 
 SECONDS = 30  # that one call may take
-REFUSALS = (st.SerpentailError,)
 
 
 @pytest.fixture(params=["few", pytest.param("many", marks=pytest.mark.slow)])
@@ -40,20 +39,7 @@ def search(request):
     return check
 
 
-@pytest.fixture
-def taken_or_refused(search):
-    """Return a function that gives a call its usual arguments, one of them, or another, strange."""
-
-    def check(function: Callable, names, value, usual=None, refusals=REFUSALS):
-        def law(name, value):
-            answer(function, refusals=refusals, **(usual or {}) | {name: value})
-
-        search(law, name=some.sampled_from(names), value=value)
-
-    return check
-
-
-def answer(function: Callable, *arguments, refusals=REFUSALS, **more):
+def answer(function: Callable, *arguments, refusals=(st.SerpentailError,), **more):
     """Return what a call answers, None where it refuses; it must do one of both in time, give
     finite numbers or words, and leave its arguments as they were.
     """
