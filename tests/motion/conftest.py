@@ -16,17 +16,14 @@ from tests.support.scenes import SCENES
 PRECESSION, TILT, SPIN = 7.0, 0.6, 11.0  # rad/s, rad, rad/s of a torque-free symmetric top
 
 
-def top(t):
-    """Attitude (w, x, y, z) and body rate of a torque-free top: R = Rz(a t) Rx(tilt) Rz(b t)."""
+def motion(t, segments=2):
+    """A torque-free top, R = Rz(a t) Rx(tilt) Rz(b t), in parabolic flight, its tail swinging in
+    sines.
+    """
     turns = np.stack([PRECESSION * t, TILT + 0 * t, SPIN * t], axis=1)
     rotation = Rotation.from_euler("ZXZ", turns)
+    attitude = rotation.as_quat(canonical=False)[:, [3, 0, 1, 2]]
     omega = PRECESSION * rotation.as_matrix()[:, 2, :] + [0, 0, SPIN]  # a R^T z + b z
-    return rotation.as_quat(canonical=False)[:, [3, 0, 1, 2]], omega
-
-
-def motion(t, segments=2):
-    """The top in parabolic flight, its tail swinging in sines."""
-    attitude, omega = top(t)
     phase = 12 * t[:, None] + np.arange(2 * segments)
     position = np.stack([0 * t, 0.6 * t, 2.8 * t - 4.9 * t**2], axis=1)
     rate = np.stack([0 * t, 0.6 + 0 * t, 2.8 - 9.8 * t], axis=1)

@@ -30,6 +30,8 @@ def the(warnings, word):
 def millimetres(warnings, word):
     """The depth that such a warning tells."""
     return float(re.search(r": ([\d.]+) mm ", the(warnings, word))[1])
+
+
 def test_the_kick_is_told_all(kick):
     told = kick.warnings
     assert len(told) == 5

@@ -41,24 +41,19 @@ def test_the_document_s_table_is_that_of_the_numbers():
 
 def test_text_markdown_and_json_have_values_units_and_meanings(kick):
     of = told(kick)
-    lines = str(of).splitlines()
-    width = len("peak_group_force_weights, right_foot")
-    assert all(line[width : width + 2] == "  " and line[width + 2] != " " for line in lines)
+    lines, width = str(of).splitlines(), len("peak_group_force_weights, right_foot  ")
     rows = {line[:width].rstrip(): line[width:] for line in lines}
     assert rows["apex_m"].split() == [f"{of['apex_m']:.5f}", "m"]
     assert rows["peak_ground_force_weights"].endswith("  body weights")
     assert rows["apex_m"].rindex(" m") == rows["duration_s"].rindex(" s")
-    assert rows["landed"].strip() == "no" and rows["steps"].strip().isdigit()
-    assert rows["peak_tail_force_N"].strip() == "-"
+    assert rows["landed"] == "no" and rows["steps"].isdigit() and rows["peak_tail_force_N"] == "-"
     said = [line.removeprefix("warnings").strip() for line in lines if line.startswith("warn")]
     assert said == kick.warnings
-    lines = of.markdown().splitlines()
+    lines, described = of.markdown().splitlines(), strict(of.described())
     assert len(lines) == len(of) + 2 and len({line.count("|") for line in lines}) == 1
-    (apex,) = (line.split(" | ") for line in lines if "| apex_m |" in line)
-    described = strict(of.described())
     assert {name: each["value"] for name, each in described.items()} == strict(of)
-    assert apex[1:] == [as_word(of["apex_m"]), "m", described["apex_m"]["meaning"] + " |"]
-    assert described["apex_m"]["unit"] == "m" and described["body_weight_N"]["unit"] == "N"
+    value, meaning = as_word(of["apex_m"]), described["apex_m"]["meaning"]
+    assert f"| apex_m | {value} | m | {meaning} |" in lines and described["apex_m"]["unit"] == "m"
 
 
 def test_words_and_reports_without_units():

@@ -1,22 +1,29 @@
-"""Trajectories: what their fields must be, files that give them back bit by bit, and motions
-between samples, against analytic ones.
+"""Trajectories: what their fields must be, files that give them back bit by bit, motions between
+samples, against analytic ones; attitudes: products, rates, and angles by inversion.
 """
 
 import dataclasses
+import itertools
 import json
 import zipfile
-from itertools import product
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from serpentail.attitude import rotation_matrix
+from serpentail.attitude import pitch_roll_yaw, product, quaternion_rate, rotation_matrix
 from serpentail.motion.trajectory import Trajectory
 from tests.support.rows import row
 
 from .conftest import fields, motion
 
 FLIGHT = motion(np.linspace(0, 0.4, 41))
+A, B = np.random.default_rng(5).normal(size=(2, 7, 4))  # quaternions
+
+
+def near(found, expected, most):
+    np.testing.assert_allclose(found, expected, rtol=0, atol=most)
 
 
 def assert_same(first, second):
@@ -52,16 +59,13 @@ def test_fields_are_private_and_read_only():
 def test_unsound_fields_are_named():
     given = fields(FLIGHT)
     for name, change, words in (
-        ("t", lambda t: t[:0], r"t .*\(0,\)"),
-        ("t", lambda t: t[:, None], r"t .*\(41, 1\)"),
+        *(("t", lambda t: t[:0], r"t .*\(0,\)"), ("t", lambda t: t[:, None], r"t .*\(41, 1\)")),
         ("t", lambda t: t[::-1], r"t\[1\] = 0\.39 .*0\.4"),
         ("t", lambda t: np.minimum(t, 0.2), r"t\[21\] = 0\.2 .*0\.2"),
         ("q", lambda q: q[:, :-1], r"q .*\(41, 10\).*\(41, 7 \+ 2m\)"),
-        ("q", lambda q: q[0], r"q .*\(11,\)"),
         ("q", lambda q: q[1:], r"q .*\(40, 11\): give \(41, 11\)"),
         ("q", lambda q: 2 * q, r"q\[\d+, 3:7\] .*norm 2"),
         ("q", lambda q: q * 1j, "q: .*complex128"),
-        ("q", lambda q: [[0.0], [0.0, 1.0]], "q: type list"),
         ("v", lambda v: v[:, 1:], r"v .*\(41, 9\): give \(41, 10\)"),
         ("v", lambda v: np.where(v > 0, np.nan, v), r"v\[0, 1\]: value nan"),
         ("v", lambda v: np.ma.masked_greater(v, 3.0), r"v: \d+ masked"),
@@ -70,24 +74,19 @@ def test_unsound_fields_are_named():
         ("potential", lambda potential: potential[:-1], r"potential .*\(40,\): give \(41,\)"),
         ("linear_momentum", lambda p: p.T, r"linear_momentum .*\(3, 41\): give \(41, 3\)"),
         ("angular_momentum", lambda h: h * np.inf, r"angular_momentum\[0, 0\]: value inf"),
-        ("angular_momentum", lambda h: h.astype(str), "angular_momentum: type"),
         ("info", lambda info: info | {"seconds": np.nan}, "info .*JSON"),
-        ("info", lambda info: info | {"seconds": np.zeros(2)}, "info .*JSON"),
         ("info", lambda info: [info], "info .*list"),
     ):
         with row(name, words), pytest.raises(ValueError, match=words):
             Trajectory(**given | {name: change(given[name])})
-    nothing_masked = np.ma.masked_greater(FLIGHT.v, 1e9)
-    np.testing.assert_array_equal(dataclasses.replace(FLIGHT, v=nothing_masked).v, FLIGHT.v)
 
     # quaternions may drift from unit norm by a thousandth
-    for sign in (-1, 1):
-        q, drifted = FLIGHT.q.copy(), FLIGHT.q.copy()
-        q[7, 3:7] *= 1 + 2e-3 * sign
-        with row(sign), pytest.raises(ValueError, match=r"q\[7, 3:7\] has norm"):
+    q = FLIGHT.q.copy()
+    for size in (1 - 2e-3, 1 + 2e-3, 1 - 9e-4, 1 + 9e-4):
+        q[7, 3:7] = size * FLIGHT.q[7, 3:7]
+        refused = pytest.raises(ValueError, match=r"q\[7, 3:7\] has norm")
+        with row(size), refused if abs(size - 1) > 1e-3 else nullcontext():
             dataclasses.replace(FLIGHT, q=q)
-        drifted[7, 3:7] *= 1 + 9e-4 * sign
-        assert dataclasses.replace(FLIGHT, q=drifted).q[7, 3] == drifted[7, 3]
 
 
 # Files.
@@ -186,11 +185,10 @@ def test_resample_converges_to_the_free_top_and_the_sines():
 def test_resample_is_exact_for_a_parabola_of_linear_torque_and_does_not_overshoot():
     t = np.linspace(0, 0.4, 997)
     dense = FLIGHT.resample(t)
-    np.testing.assert_allclose(dense.q[:, :3], motion(t).q[:, :3], rtol=0, atol=1e-15)
-    np.testing.assert_allclose(dense.v[:, :3], motion(t).v[:, :3], rtol=0, atol=1e-14)
-    np.testing.assert_allclose(np.linalg.norm(dense.attitude, axis=1), 1, rtol=0, atol=4e-16)
-    expected = np.stack([np.interp(t, FLIGHT.t, column) for column in FLIGHT.tau.T], axis=1)
-    np.testing.assert_allclose(dense.tau, expected, rtol=0, atol=1e-14)
+    near(dense.q[:, :3], motion(t).q[:, :3], 1e-15)
+    near(dense.v[:, :3], motion(t).v[:, :3], 1e-14)
+    near(np.linalg.norm(dense.attitude, axis=1), 1, 4e-16)
+    near(dense.tau.T, [np.interp(t, FLIGHT.t, column) for column in FLIGHT.tau.T], 1e-14)
     step = np.where(FLIGHT.t < 0.2, 0.0, 1.0)
     energy = dataclasses.replace(FLIGHT, kinetic=step).resample(t).kinetic
     assert energy.min() == 0 and energy.max() == 1
@@ -208,7 +206,7 @@ def test_no_motion_goes_on_beyond_its_samples():
     ):
         with row(t), pytest.raises(ValueError, match=words):
             FLIGHT.resample(t)
-    for samples, beyond in product((1, 2, 41), (-1e-3, -1e-9, 0.4 + 1e-9, 0.401, 1e9, -1e300)):
+    for samples, beyond in itertools.product((1, 2, 41), (-1e-9, 0.4 + 1e-9, 1e9, -1e300)):
         short = motion(np.linspace(0.4, 0, samples)[::-1])
         for t in ([beyond], sorted([0.4, beyond])):
             with row(samples, t), pytest.raises(ValueError, match="outside"):
@@ -217,6 +215,82 @@ def test_no_motion_goes_on_beyond_its_samples():
     # one sample and no tail will do
     alone = motion(np.array([0.1]), segments=0)
     again = alone.resample([0.1])
-    np.testing.assert_allclose(again.q, alone.q, rtol=0, atol=4e-16)
+    near(again.q, alone.q, 4e-16)
     assert_same(dataclasses.replace(again, q=alone.q), alone)
     assert motion(np.linspace(0, 1, 101), segments=0).resample([0.5]).tau.shape == (1, 0)
+
+
+# Attitudes.
+
+
+def scipys(quaternion):
+    """The rotations of quaternions (w, x, y, z)."""
+    return Rotation.from_quat(np.roll(quaternion.reshape(-1, 4), -1, axis=-1))
+
+
+def euler(angles):
+    """R = Rz(phi_z) Rx(phi_x) Ry(phi_y) of angles (..., 3) ordered x, y, z."""
+    return Rotation.from_euler("ZXY", angles[..., [2, 0, 1]].reshape(-1, 3)).as_matrix()
+
+
+def configurations(quaternion):
+    """Configurations (..., 7) with these attitudes."""
+    return np.concatenate([np.zeros((*quaternion.shape[:-1], 3)), quaternion], axis=-1)
+
+
+def test_a_product_turns_as_one_rotation_after_the_other_and_a_rate_is_half_of_one():
+    entries = np.stack(product(A.T, B.T), axis=-1)
+    near(rotation_matrix(entries), (scipys(A) * scipys(B)).as_matrix(), 1e-14)
+    norms = np.linalg.norm(A, axis=-1) * np.linalg.norm(B, axis=-1)
+    np.testing.assert_allclose(np.linalg.norm(entries, axis=-1), norms, rtol=1e-14)
+    one, i, j, k = np.eye(4)
+    for a, b, expected in ((i, j, k), (j, k, i), (k, i, j), (i, i, -one), (j, i, -k)):
+        np.testing.assert_array_equal(product(a, b), expected)
+    # a rate is half the product with the angular velocity in the body's axes
+    still = np.array([0.0, 1.0, 1.0, 1.0]) * B
+    near(quaternion_rate(A.T, B.T[1:]), np.array(product(A.T, still.T)) / 2, 1e-14)
+
+
+def test_angles_invert_the_product_of_rotations():
+    """Of any shape, about single axes, and near the pitch where roll and yaw are not unique."""
+    quaternion = np.random.default_rng(4).normal(size=(5, 200, 4))
+    rotation = rotation_matrix(quaternion).reshape(-1, 3, 3)
+    near(rotation, scipys(quaternion).as_matrix(), 1e-15)
+    angles = pitch_roll_yaw(configurations(quaternion))
+    assert angles.shape == (5, 200, 3) and np.abs(angles[..., 0]).max() <= np.pi / 2
+    near(euler(angles), rotation, 1e-15)
+    single = np.hstack([np.full((3, 1), np.cos(0.35)), np.sin(0.35) * np.eye(3)])
+    near(pitch_roll_yaw(configurations(single)), 0.7 * np.eye(3), 1e-15)
+    for short in (0, 1e-3, 1e-8, 1e-12):
+        turns = np.broadcast_arrays(np.pi / 2 - short, 0.4, np.linspace(-3, 3, 50))
+        rotation = euler(np.stack(turns, axis=-1))
+        steep = np.roll(Rotation.from_matrix(rotation).as_quat(), 1, axis=-1)
+        with row("short of the pole by", short):
+            near(euler(pitch_roll_yaw(configurations(steep))), rotation, 2e-15)
+
+
+def test_unwrapped_pitch_counts_the_turns_of_a_somersault():
+    """Also over so many samples that they must be unwrapped at once, without loss of digits."""
+    for end, count, most in ((5 * np.pi, 300, 1e-12), (3e4, 3 * 10**5, 1e-9)):
+        turn = np.linspace(0, end, count)
+        quaternion = np.stack([np.cos(turn / 2), np.sin(turn / 2), 0 * turn, 0 * turn], axis=1)
+        found = pitch_roll_yaw(configurations(quaternion), unwrap=True)
+        near(found, np.stack([turn, 0 * turn, 0 * turn], axis=1), most)
+    # a time axis is needed, but may have no sample
+    assert pitch_roll_yaw(np.zeros((0, 9)), unwrap=True).shape == (0, 3)
+    with pytest.raises(ValueError, match="1 dimensions"):
+        pitch_roll_yaw(np.array([0, 0, 0, 1.0, 0, 0, 0]), unwrap=True)
+
+
+def test_unwrapped_angles_are_the_attitude_and_nearest_to_those_before():
+    turns = 2 * np.pi * np.arange(-9, 10)
+    for step in (0.05, 0.4, 4.0):
+        walk = np.cumsum(step * np.random.default_rng(7).normal(size=(200, 4)), axis=0)
+        unwrapped = pitch_roll_yaw(configurations(walk), unwrap=True)
+        once = pitch_roll_yaw(configurations(walk))
+        for before, angles, found in zip(unwrapped, once[1:], unwrapped[1:], strict=False):
+            other = [np.pi - angles[0], angles[1] + np.pi, angles[2] + np.pi]
+            ways = [np.add.outer(branch, turns) - before[:, None] for branch in (angles, other)]
+            nearest = min(np.abs(way).min(axis=1).sum() for way in ways)
+            assert np.abs(found - before).sum() == pytest.approx(nearest, abs=1e-9), step
+        near(euler(unwrapped), rotation_matrix(walk), 1e-13)

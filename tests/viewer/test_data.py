@@ -122,18 +122,6 @@ def test_many_samples_are_thinned_and_the_page_says_so(tmp_path, flight):
     assert dict(run["numbers"])["samples"] == "100001"
 
 
-def test_a_run_that_failed_is_shown_up_to_there(tmp_path, kick):
-    with pytest.raises(st.SimulationError) as caught:
-        scene_of("kick").simulate(most_steps=400)
-    cut = caught.value.trajectory
-    cut.save(tmp_path / "cut.npz")
-    for motion in (cut, st.Trajectory.load(tmp_path / "cut.npz")):
-        data, run = single_run(st.view(motion, tmp_path / "run.html", model=kick.model))
-        assert len(data["notes"]) == 1 and data["notes"][0].endswith(str(caught.value))
-        assert data["warnings"] == cut.warnings != []
-        assert run["rows"] == len(cut.t) and 1 < len(cut.t) < 1201
-
-
 def test_several_motions_have_names_that_stay_data(tmp_path, kick, flight):
     """No name ends the script that the data are in, opens a tag, or takes part in the template."""
     path = tmp_path / "page.html"
