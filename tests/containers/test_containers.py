@@ -7,6 +7,7 @@ import dataclasses
 import json
 import subprocess
 import sys
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ import serpentail as st
 from tests.motion.conftest import motion
 from tests.support import zoo
 
+FLIGHT = motion(np.linspace(0, 0.4, 41))  # without a model
 SETTINGS = {"legs": st.Legs.fixed(3.6, -0.3), "output_step": 0.002, "rtol": 1e-6}
 FEET = [f"feet_{side}_{point}" for side in ("right", "left") for point in "AMT"]
 START = [0, 0, 0.06, 1, 0, 0, 0, 0.1, 0]
@@ -32,12 +34,6 @@ def tired(t, q, v):
 
 def dropped(q, span, **settings):
     return st.simulate(zoo.model("feet_tail"), q, np.zeros(8), t_span=span, **SETTINGS, **settings)
-
-
-@pytest.fixture
-def flight():
-    """An analytic motion without a model."""
-    return motion(np.linspace(0, 0.4, 41))
 
 
 @pytest.fixture(scope="module")
@@ -58,21 +54,17 @@ def runs():
 # Datasets.
 
 
-def test_a_flight_has_named_coordinates(flight):
-    data = flight.to_xarray()
+def test_coordinates_are_named_those_of_the_tail_as_their_model_calls_them():
+    data = FLIGHT.to_xarray()
     assert dict(data.sizes) == {"time": 41, "coordinate": 11, "rate": 10, "joint": 4, "axis": 3}
     names = ["x", "y", "z", "qw", "qx", "qy", "qz", "pitch_1", "yaw_1", "pitch_2", "yaw_2"]
     assert data.coordinate.values.tolist() == names
-    equal(data.q.sel(coordinate=names), flight.q)
-    equal(data.v.sel(rate="omega_x"), flight.v[:, 3])
-    equal(data.v.sel(rate="pitch_2_dot"), flight.v[:, 8])
-    equal(data.tau.sel(joint="yaw_1"), flight.tau[:, 1])
-    equal(data.time, flight.t)
-    for name in ("kinetic", "potential", "linear_momentum", "angular_momentum"):
-        equal(data[name], getattr(flight, name))
-
-
-def test_tail_coordinates_are_called_as_their_model_calls_them():
+    equal(data.v.sel(rate="omega_x"), FLIGHT.v[:, 3])
+    equal(data.v.sel(rate="pitch_2_dot"), FLIGHT.v[:, 8])
+    equal(data.tau.sel(joint="yaw_1"), FLIGHT.tau[:, 1])
+    equal(data.time, FLIGHT.t)
+    for name in ("q", "kinetic", "potential", "linear_momentum", "angular_momentum"):
+        equal(data[name], getattr(FLIGHT, name))
     for name, pair in (
         ("m1_n1", ["alpha_1", "beta_1"]),
         ("arcs1", ["a_1", "b_1"]),
@@ -100,7 +92,7 @@ def test_units_and_facts_are_attributes(drop):
     assert json.loads(data.attrs["info"]) == drop.info and "events" not in data.attrs
 
 
-def test_points_are_named_and_grouped(drop, flight):
+def test_points_are_named_and_grouped(drop):
     data, contact = drop.to_xarray(), drop.contact
     assert data.point.values.tolist()[:6] == FEET
     equal(data.forces.isel(point=data.group == "tail"), contact.of("tail").forces)
@@ -110,7 +102,7 @@ def test_points_are_named_and_grouped(drop, flight):
     # only feet of six points have names for each
     none = np.zeros((41, 2, 3))
     contact = st.Contact(none, none, none[..., :2], {"feet": 2})
-    data = dataclasses.replace(flight, contact=contact).to_xarray()
+    data = dataclasses.replace(FLIGHT, contact=contact).to_xarray()
     assert data.point.values.tolist() == ["feet_1", "feet_2"] and "legs" not in data
 
 
@@ -145,26 +137,25 @@ def test_a_run_that_stops_at_an_event_keeps_the_common_times():
     assert np.isnan(data.points[0, done:]).all() and np.isfinite(data.points[1]).all()
 
 
-def test_netcdf_gives_the_numbers_back_also_without_xarray(flight, drop, runs, tmp_path):
+def test_netcdf_gives_the_numbers_back_also_without_xarray(drop, runs, tmp_path):
     path = tmp_path / "new" / "motion.nc"
-    for each in (flight, motion(np.array([0.1]), 0), runs, drop):
+    for each in (FLIGHT, motion(np.array([0.1]), 0), runs, drop):
         assert each.to_netcdf(str(path)) == path
         with xarray.open_dataset(path, decode_timedelta=True) as back:
             xarray.testing.assert_identical(back.load(), each.to_xarray())
     with netcdf_file(path, mmap=False) as file:
         assert file.variables["q"].dimensions == ("time", "coordinate")
         assert file.variables["forces"].units == b"N" and file.model == drop.info["model"].encode()
-        q, t = file.variables["q"][:], file.variables["time"][:]
+        equal(file.variables["q"][:], drop.q)
+        equal(file.variables["time"][:], drop.t)
         names = [b"".join(row).decode() for row in file.variables["coordinate"][:]]
-    equal(q, drop.q)
-    equal(t, drop.t)
     assert [name.strip("\0") for name in names][:3] == ["x", "y", "z"]
 
 
-def test_odd_facts_do_not_stop_a_file(flight, tmp_path):
+def test_odd_facts_do_not_stop_a_file(tmp_path):
     info = {"a/b c": 1, "big": 2**40, "yes": True, "none": None, "empty": "", "é": 1}
     info |= {"word": "ü", "info": 3}
-    odd = dataclasses.replace(flight, info=info)
+    odd = dataclasses.replace(FLIGHT, info=info)
     with xarray.open_dataset(odd.to_netcdf(tmp_path / "odd.nc")) as back:
         facts = back.attrs
     assert facts["big"] == 2.0**40 and facts["yes"] == 1 and facts["word"] == "ü"
@@ -175,87 +166,68 @@ def test_odd_facts_do_not_stop_a_file(flight, tmp_path):
 # Tables.
 
 
-def test_a_frame_has_a_row_a_sample(drop):
-    table = drop.to_dataframe()
-    assert table.index.name == "time"
-    equal(table.index, drop.t)
-    equal(table[["x", "y", "z"]], drop.q[:, :3])
-    equal(table["alpha_1_dot"], drop.v[:, 6])
-    equal(table["tau_beta_1"], drop.tau[:, 1])
-    equal(table["linear_momentum_y"], drop.linear_momentum[:, 1])
-    equal(table["forces_feet_left_A_z"], drop.contact.forces[:, 3, 2])
-    equal(table["legs_gamma_right"], drop.contact.legs[:, 0])
-    units = table.attrs["units"]
-    assert set(units) == {"time", *table.columns}
-    expected = {"z": "m", "qw": "1", "alpha_1": "rad", "tau_alpha_1": "N m"}
-    assert expected.items() <= units.items()
-
-
 def read(path):
-    """Header and columns by their names of a CSV file, by the csv module."""
+    """Columns by their names of a CSV file, by the csv module."""
     with path.open(encoding="utf-8", newline="") as stream:
         header, *rows = csv.reader(stream)
     assert len(header) == len(set(header)) and {len(row) for row in rows} == {len(header)}
-    return header, dict(zip(header, np.array(rows, float).T, strict=True))
+    return dict(zip(header, np.array(rows, float).T, strict=True))
 
 
-def test_csv_has_units_and_all_digits(drop, tmp_path):
-    path = tmp_path / "new" / "drop.csv"
-    assert drop.to_csv(str(path)) == path
-    header, columns = read(path)
-    assert header[:5] == ["time [s]", "x [m]", "y [m]", "z [m]", "qw [1]"]
-    assert "forces_feet_right_A_x [N]" in header and "alpha_1_dot [rad/s]" in header
+def test_a_frame_and_a_csv_file_have_a_row_a_sample_units_and_all_digits(drop, tmp_path):
+    table, path = drop.to_dataframe(), tmp_path / "new" / "drop.csv"
+    assert table.index.name == "time" and drop.to_csv(str(path)) == path
+    units, columns = table.attrs["units"], read(path)
+    assert [*columns] == [f"{name} [{units[name]}]" for name in ("time", *table.columns)]
+    equal(table.index, drop.t)
     equal(columns["time [s]"], drop.t)
-    equal(np.stack([columns[name] for name in header[1:5]], axis=1), drop.q[:, :4])
-    equal(columns["bristles_tail_1_y [m]"], drop.contact.of("tail").bristles[:, 0, 1])
+    for name, unit, expected in (
+        *(("z", "m", drop.q[:, 2]), ("qw", "1", drop.q[:, 3]), ("alpha_1", "rad", drop.q[:, 7])),
+        *(("alpha_1_dot", "rad/s", drop.v[:, 6]), ("tau_beta_1", "N m", drop.tau[:, 1])),
+        ("linear_momentum_y", "kg m/s", drop.linear_momentum[:, 1]),
+        ("forces_feet_left_A_z", "N", drop.contact.forces[:, 3, 2]),
+        ("bristles_tail_1_y", "m", drop.contact.of("tail").bristles[:, 0, 1]),
+        ("legs_gamma_right", "rad", drop.contact.legs[:, 0]),
+    ):
+        equal(table[name], expected)
+        equal(columns[f"{name} [{unit}]"], expected)
 
 
 def test_tables_of_runs_have_two_indices(runs, tmp_path):
-    table = runs.to_dataframe()
-    assert list(table.index.names) == ["run", "time"] and len(table) == 3 * 21
-    equal(table["z"], runs.q[..., 2].ravel())
-    assert table.loc[1, "z"].isna().any() and "mu" not in table.columns
-    header, columns = read(runs.to_csv(tmp_path / "runs.csv"))
-    assert header[:3] == ["run", "time [s]", "x [m]"]
-    forces = columns["forces_feet_right_T_z [N]"].reshape(3, 21)[0]
+    table, columns = runs.to_dataframe(), read(runs.to_csv(tmp_path / "runs.csv"))
+    assert list(table.index.names) == ["run", "time"] and "mu" not in table.columns
+    assert [*columns][:3] == ["run", "time [s]", "x [m]"]
     equal(columns["run"], np.repeat(range(3), 21))
-    equal(columns["z [m]"], runs.q[..., 2].ravel())
-    equal(forces, runs[0].contact.forces[:, 2, 2])
+    for heights in (table["z"], columns["z [m]"]):
+        equal(heights, runs.q[..., 2].ravel())
+    equal(columns["forces_feet_right_T_z [N]"][:21], runs[0].contact.forces[:, 2, 2])
 
 
 # Files, and libraries of extras: imported by those who ask for them, and missed by name.
 
 
-def test_files_are_whole_or_not_there(flight, tmp_path, monkeypatch):
-    def refuse(*_):
-        raise OSError(28, "no room")
-
-    (tmp_path / "file").write_text("no folder")
-    for method in (flight.to_csv, flight.to_netcdf):
+def test_files_are_whole_or_not_there(tmp_path, monkeypatch):
+    path = tmp_path / "a"
+    path.write_text("before")
+    monkeypatch.setattr("pathlib.Path.replace", mock.Mock(side_effect=OSError(28, "no room")))
+    for method in (FLIGHT.to_csv, FLIGHT.to_netcdf):
+        with pytest.raises(st.NotWritten, match="no room"):
+            method(path)
         with pytest.raises(st.NotWritten, match="not written"):
-            method(tmp_path / "file" / "a")
-        (tmp_path / "a").write_text("before")
-        with monkeypatch.context() as change:
-            change.setattr("pathlib.Path.replace", refuse)
-            with pytest.raises(st.NotWritten, match="no room"):
-                method(tmp_path / "a")
-        assert (tmp_path / "a").read_text() == "before"
-        assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "file"]
+            method(path / "below")
+        assert path.read_text() == "before" and [*tmp_path.iterdir()] == [path]
 
 
-def test_an_extra_that_is_missing_is_named_and_csv_needs_none(flight, monkeypatch, tmp_path):
-    for extra in ("xarray", "pandas"):
-        monkeypatch.setitem(sys.modules, extra, None)
-    path = tmp_path / "a.nc"
-    for call, extra in (
-        (flight.to_xarray, "xarray"),
-        (lambda: flight.to_netcdf(path), "xarray"),
-        (flight.to_dataframe, "pandas"),
-    ):
-        with pytest.raises(st.ExtraMissing, match=rf"serpentail\[{extra}\]") as caught:
-            call()
-        assert isinstance(caught.value, ImportError) and list(tmp_path.iterdir()) == []
-    assert flight.to_csv(tmp_path / "a.csv").stat().st_size > 1000
+def test_an_extra_that_is_missing_is_named_and_csv_needs_none(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    for method, extra in (("to_xarray", "xarray"), ("to_dataframe", "pandas")):
+        with pytest.raises(st.ExtraMissing, match=rf"serpentail\[{extra}\]"):
+            getattr(FLIGHT, method)()
+    with pytest.raises(st.ExtraMissing, match=r"serpentail\[xarray\]"):
+        FLIGHT.to_netcdf(tmp_path / "a.nc")
+    assert not list(tmp_path.iterdir())
+    assert FLIGHT.to_csv(tmp_path / "a.csv").stat().st_size > 1000
 
 
 def test_who_does_not_ask_loads_nothing():

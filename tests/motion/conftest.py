@@ -16,17 +16,14 @@ from tests.support.scenes import SCENES
 PRECESSION, TILT, SPIN = 7.0, 0.6, 11.0  # rad/s, rad, rad/s of a torque-free symmetric top
 
 
-def top(t):
-    """Attitude (w, x, y, z) and body rate of a torque-free top: R = Rz(a t) Rx(tilt) Rz(b t)."""
+def motion(t, segments=2):
+    """A torque-free top, R = Rz(a t) Rx(tilt) Rz(b t), in parabolic flight, its tail swinging in
+    sines.
+    """
     turns = np.stack([PRECESSION * t, TILT + 0 * t, SPIN * t], axis=1)
     rotation = Rotation.from_euler("ZXZ", turns)
+    attitude = rotation.as_quat(canonical=False)[:, [3, 0, 1, 2]]
     omega = PRECESSION * rotation.as_matrix()[:, 2, :] + [0, 0, SPIN]  # a R^T z + b z
-    return rotation.as_quat(canonical=False)[:, [3, 0, 1, 2]], omega
-
-
-def motion(t, segments=2):
-    """The top in parabolic flight, its tail swinging in sines: all known functions of time."""
-    attitude, omega = top(t)
     phase = 12 * t[:, None] + np.arange(2 * segments)
     position = np.stack([0 * t, 0.6 * t, 2.8 * t - 4.9 * t**2], axis=1)
     rate = np.stack([0 * t, 0.6 + 0 * t, 2.8 - 9.8 * t], axis=1)
@@ -50,17 +47,6 @@ def fields(trajectory):
     return {name: value for name, value in found.items() if value is not None}
 
 
-def assert_same(first, second):
-    """Every array bit-equal, every info equal."""
-    for name, value in fields(first).items():
-        other = getattr(second, name)
-        if name == "info":
-            assert value == other
-        else:
-            assert value.dtype == other.dtype == np.float64
-            assert value.tobytes() == other.tobytes() and value.shape == other.shape
-
-
 @cache
 def scene_of(name, **changes):
     path = SCENES / f"{name}.toml"
@@ -70,12 +56,6 @@ def scene_of(name, **changes):
 @cache
 def simulated(name):
     return scene_of(name).simulate()
-
-
-@pytest.fixture
-def flight():
-    """Forty-one samples of the analytic motion."""
-    return motion(np.linspace(0, 0.4, 41))
 
 
 @pytest.fixture
@@ -98,32 +78,24 @@ def leap():
 
 def made(model, q=0.1, *, t=None, forces=None, points=None, events=(), legs=None):
     """A motion at rest of configurations (K, nq), or of a level torso at a height; forces (K,
-    points, 3) are the ground's.
+    points, 3) are the ground's, events have kind, group and time.
     """
     if not isinstance(q, np.ndarray):
         like = next((each for each in (t, forces, points) if each is not None), range(3))
         q = at_height(model, q, len(like))
-    rows = len(q)
-    zeros = np.zeros((rows, 3))
-    contact = None
+    rows, contact = len(q), None
     if model.contacts:
         count = sum(model.contacts.values())
         forces = np.zeros((rows, count, 3)) if forces is None else forces
         points = np.zeros_like(forces) if points is None else points
         contact = st.Contact(points, forces, np.zeros((rows, count, 2)), model.contacts, legs)
-    return st.Trajectory(
-        t=np.arange(float(rows)) if t is None else t,
-        q=q,
-        v=np.zeros((rows, model.nv)),
-        tau=np.zeros((rows, model.nv - 6)),
-        kinetic=np.zeros(rows),
-        potential=np.zeros(rows),
-        linear_momentum=zeros,
-        angular_momentum=zeros,
-        info={"events": list(events)},
-        contact=contact,
-        model=model,
-    )
+    still = {"v": np.zeros((rows, model.nv)), "tau": np.zeros((rows, model.nv - 6))}
+    still |= dict.fromkeys(("kinetic", "potential"), np.zeros(rows))
+    still |= dict.fromkeys(("linear_momentum", "angular_momentum"), np.zeros((rows, 3)))
+    t = np.arange(float(rows)) if t is None else t
+    keys = ("kind", "group", "time")
+    info = {"events": [dict(zip(keys, event, strict=True)) for event in events]}
+    return st.Trajectory(t=t, q=q, info=info, contact=contact, model=model, **still)
 
 
 def at_height(model, height, rows=3):
@@ -135,7 +107,3 @@ def at_height(model, height, rows=3):
 
 def told(motion):
     return summary(motion.model, motion)
-
-
-def event(kind, group, time):
-    return {"time": time, "group": group, "kind": kind}

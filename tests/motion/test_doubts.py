@@ -27,30 +27,20 @@ def the(warnings, word):
     return found
 
 
-def millimetres(warning):
-    return float(re.search(r": ([\d.]+) mm ", warning)[1])
+def millimetres(warnings, word):
+    """The depth that such a warning tells."""
+    return float(re.search(r": ([\d.]+) mm ", the(warnings, word))[1])
 
 
-def sphere(count):
-    directions = np.random.default_rng(3).normal(size=(count, 3))
-    return directions / np.linalg.norm(directions, axis=1, keepdims=True)
-
-
-def test_the_kick_is_told_all_and_a_clean_flight_nothing(kick):
+def test_the_kick_is_told_all(kick):
     told = kick.warnings
     assert len(told) == 5
-    assert millimetres(the(told, "torso: ")) == pytest.approx(10.7, abs=0.2)
-    assert millimetres(the(told, "tail: 1")) == pytest.approx(150, abs=2)
+    assert millimetres(told, "torso: ") == pytest.approx(10.7, abs=0.2)
+    assert millimetres(told, "tail: 1") == pytest.approx(150, abs=2)
     assert re.search("714 .*t = 0.4 s|t = 0.4 s, 714 ", the(told, "ground: "))
     assert "7.03 rad" in the(told, "tail: segment 1") and the(told, "tail: goes")
     # value, time, limit and remedy
     assert all(re.search(r" at t = [\d.]+ s.*more than [\d.]+.*: \w", each) for each in told)
-    for name in ("m1_n3", "arcs2"):
-        model = zoo.model(name)
-        q = np.concatenate([[0, 0, -3, 1, 0, 0, 0], 0.3 * np.cos(np.arange(model.nq - 7))])
-        v = np.concatenate([[0, 0, 1, 9, 1, 2], np.zeros(model.nv - 6)])
-        flight = st.simulate(model, q, v, controller=st.Damping(1e-3), t_span=0.3)
-        assert flight.warnings == [], name
 
 
 # The ground, where a scene has one.
@@ -58,16 +48,17 @@ def test_the_kick_is_told_all_and_a_clean_flight_nothing(kick):
 
 def test_the_torso_s_depth_by_points_of_its_surface(rat):
     """At random attitudes; the lowest of 40,000 points of the ellipsoid."""
-    surface = sphere(40_000) * SEMI_AXES
+    surface = np.random.default_rng(3).normal(size=(40_000, 3))
+    surface *= SEMI_AXES / np.linalg.norm(surface, axis=1, keepdims=True)
     for seed in range(5):
         rotation = Rotation.random(random_state=seed)
         q = at_height(rat, 0.005, 2)
         q[1, 2], q[1, 3:7] = 0.004, np.roll(rotation.as_quat(), 1)
         q[0, 2] = 1.0  # far above
         expected = -1e3 * (rotation.apply(surface)[:, 2].min() + 0.004)
-        found = the(made(rat, q).warnings, "torso: ")
-        assert millimetres(found) == pytest.approx(expected, rel=0.01)
-        assert "t = 1 s" in found and '"torso" to `contacts`' in found
+        told = made(rat, q).warnings
+        assert millimetres(told, "torso: ") == pytest.approx(expected, rel=0.01)
+        assert "t = 1 s" in the(told, "torso: ")
 
 
 def test_the_depths_of_tail_and_legs_by_hand_and_the_reference(rat):
@@ -77,13 +68,13 @@ def test_the_depths_of_tail_and_legs_by_hand_and_the_reference(rat):
     q = at_height(rat, 0.15, 1)
     q[0, 3:5] = np.cos(np.pi / 6), np.sin(np.pi / 6)
     tip = reference.attitude(q[0, 3:7]) @ (MOUNT - [0, LENGTH, 0])
-    found = the(made(rat, q).warnings, "tail: ")
-    assert millimetres(found) == pytest.approx(-1e3 * (0.15 + tip[2]), rel=0.01)
+    depth = -1e3 * (0.15 + tip[2])
+    assert millimetres(made(rat, q).warnings, "tail: ") == pytest.approx(depth, rel=0.01)
     angles = np.radians([210, -40, 210, -75])
     q = at_height(rat, 0.002, 1)
     every = np.array(reference.joints(rat.parameters, angles))
-    found = the(made(rat, q, legs=angles[None]).warnings, "legs: ")
-    assert millimetres(found) == pytest.approx(-1e3 * (0.002 + every[:, :3, 2].min()), rel=0.01)
+    told, depth = made(rat, q, legs=angles[None]).warnings, -1e3 * (0.002 + every[:, :3, 2].min())
+    assert millimetres(told, "legs: ") == pytest.approx(depth, rel=0.01)
     q[0, 2] = -every[:, :3, 2].min()
     assert (every[:, 3:, 2] + q[0, 2]).min() < -0.02
     assert not any("legs" in each for each in made(rat, q, legs=angles[None]).warnings)
@@ -126,15 +117,9 @@ def test_how_deep_a_tail_goes_by_points_close_together():
         found = sunk(tails)
         np.testing.assert_allclose(found, [through(tail) for tail in tails], atol=1e-6)
         assert found.any()
-    # those that leave the torso are not in it
-    mounts = 0.84 * sphere(50)
-    ways = np.linspace(0, 3, 7)[:, None] * np.ones((50, 1, 3))
-    assert sunk(mounts[:, None] * (1 + ways)).max() == 0  # straight away
-    inward = mounts[:, None] * (1 - ways[:, :4])
-    assert sunk(inward).min() == pytest.approx(0.84)  # through the centre
-    outside = np.concatenate([1.0 * mounts / 0.84, 3 * mounts]).reshape(2, 50, 3).swapaxes(0, 1)
-    assert sunk(outside).max() < 1e-12  # which begin on the surface
-    assert sunk(mounts[:, None]).max() == 0  # no link at all
+    mounts = 0.84 * tails[:, :1] / np.linalg.norm(tails[:, :1], axis=2, keepdims=True)
+    assert sunk(np.concatenate([mounts, 4 * mounts], axis=1)).max() == 0  # straight away
+    assert sunk(mounts).max() == 0  # no link at all
 
 
 def test_a_tail_that_comes_back_into_the_torso_is_told(rat):
@@ -167,22 +152,17 @@ def test_bends_beyond_half_a_turn(rat):
     """Of joints what all links turn together; of arcs the length of (a, b), or theta."""
     along = np.array([np.cos(2.0), np.sin(2.0)])
     for name, segment, bent in (
-        ("m2_n2", 2, [0, -1 / 2]),
-        ("m2_n2", 2, [1 / 2, 0.1]),
-        ("arcs2", 2, along),
-        ("polar", 1, [0.1, -1]),
-        ("mixed", 1, along),
-        ("mixed", 2, [0.1, 1 / 2]),
+        *(("m2_n2", 2, [0, -1 / 2]), ("m2_n2", 2, [1 / 2, 0.1]), ("arcs2", 2, along)),
+        *(("polar", 1, [0.1, -1]), ("mixed", 1, along), ("mixed", 2, [0.1, 1 / 2])),
     ):
         model = zoo.model(name)
-        for bend, count in ((3.2, 0), (3.21, 1)):
+        for bend, expected in ((3.2, []), (3.21, [(str(segment), "3.21", "2")])):
             q = at_height(model, 1.0)
             q[2, 5 + 2 * segment : 7 + 2 * segment] = bend * np.array(bent)
-            told = [each for each in made(model, q).warnings if each.startswith("tail: segment")]
+            told = "\n".join(made(model, q).warnings)
             with row(name, segment, bend):
-                assert len(told) == count
-                assert all(f"segment {segment} " in each for each in told)
-                assert all("3.21 rad at t = 2 s" in each for each in told)
+                found = re.findall(r"tail: segment (\d) .* by (\S+) rad at t = (\S+) s", told)
+                assert found == expected
     # of more than two turns they are taken for degrees
     for bend, degrees in ((12.5, False), (12.6, True)):
         q = at_height(rat, 1.0)

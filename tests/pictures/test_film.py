@@ -1,27 +1,32 @@
-"""Moving films: as many frames as their speed asks for, all different, whole or not at all."""
+"""Moving films: as many frames as their speed asks for, all different, whole or not at all; views,
+that look from where they say, and the torso in a view: its outline, and what it hides.
+"""
 
 import dataclasses
+import os
 import re
 import subprocess
 import sys
-from itertools import pairwise
+from itertools import pairwise, product
 
 import matplotlib
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from PIL import Image, ImageSequence
+from scipy.spatial.transform import Rotation
 
 import serpentail as st
 from serpentail.pictures import encode
+from serpentail.pictures.animal import Pen, above_ground, hull
 from serpentail.pictures.filmstrip import strip_of
+from serpentail.pictures.frames import frames, silhouette
 from serpentail.pictures.movie import even, pictures, speed_words
-from serpentail.pictures.views import SIDE
-from tests.support.drawn_flight import flight
+from serpentail.pictures.views import NAMED, SIDE, TOP, looking, views_of
+from tests.support.drawn_flight import SEMI_AXES, flight
 from tests.support.rows import row
 
 LASTS = 0.58  # s, the flight
-MODULE = sys.modules[st.film.__module__]
 FEW = {"speed": 3.0, "views": ("side",)}  # five frames
 
 
@@ -32,16 +37,13 @@ def gif_frames(path):
 
 
 def mp4_frames(path):
+    ffmpeg = pytest.importorskip("imageio_ffmpeg").get_ffmpeg_exe()
     raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
-    done = subprocess.run([ffmpeg(), "-i", path, *raw], capture_output=True, check=True)
+    done = subprocess.run([ffmpeg, "-i", path, *raw], capture_output=True, check=True)
     (head,) = set(re.findall(r"Video: h264.*yuv420p.*", done.stderr.decode()))
     assert " 25 fps" in head
     wide, high = map(int, re.search(r", (\d{2,})x(\d{2,})", head).groups())
     return list(np.frombuffer(done.stdout, np.uint8).reshape(-1, high, wide, 3))
-
-
-def ffmpeg():
-    return pytest.importorskip("imageio_ffmpeg").get_ffmpeg_exe()
 
 
 def check_frames(path, read, speed):
@@ -52,7 +54,6 @@ def check_frames(path, read, speed):
     for before, after in pairwise(frames):
         changed = np.abs(before.astype(int) - after).max(axis=2) > 60
         assert changed[:-40].sum() > 200  # it moves, not its path and the time below alone
-    assert [p.name for p in path.parent.iterdir()] == [path.name]
     first = path.read_bytes()
     assert flight().film(path, **settings).read_bytes() == first
 
@@ -60,15 +61,14 @@ def check_frames(path, read, speed):
 def test_a_gif_has_the_frames_of_its_speed_all_different_and_the_same_twice(tmp_path):
     check_frames(tmp_path / "new" / "a.gif", gif_frames, 0.8)
     # several motions move beside each other
-    alone = flight().film(tmp_path / "a.gif", **FEW)
-    both = st.film([flight(), flight((2.6, 2.8))], tmp_path / "b.gif", **FEW)
-    one, two = (gif_frames(path) for path in (alone, both))
+    one = gif_frames(flight().film(tmp_path / "a.gif", **FEW))
+    two = gif_frames(st.film([flight(), flight((2.6, 2.8))], tmp_path / "b.gif", **FEW))
     assert len(one) == len(two) and two[0].shape[1] > one[0].shape[1]
 
 
 def test_an_mp4_has_them_too_and_a_gif_its_colours(tmp_path):
     """A gif's palette is made beforehand: no drawn colour may be far from it."""
-    ffmpeg()
+    pytest.importorskip("imageio_ffmpeg")
     check_frames(tmp_path / "new" / "a.mp4", mp4_frames, 2.0)
     gif = gif_frames(flight().film(tmp_path / "a.gif", **FEW))
     mp4 = mp4_frames(flight().film(tmp_path / "a.mp4", **FEW))
@@ -80,7 +80,8 @@ def test_a_film_is_slow_motion_of_four_seconds_tells_its_speed_and_ends_in_time(
     tmp_path, monkeypatch
 ):
     told = []
-    monkeypatch.setitem(MODULE.MOVING, ".gif", lambda _, frames: told.append(frames))
+    moving = sys.modules[st.film.__module__].MOVING
+    monkeypatch.setitem(moving, ".gif", lambda _, frames: told.append(frames))
     monkeypatch.setattr("serpentail.pictures.film.pictures", lambda strip, slow: (strip, slow))
     flight().film(tmp_path / "a.gif")
     (strip, slowness), *_ = told
@@ -100,8 +101,7 @@ def test_a_film_is_slow_motion_of_four_seconds_tells_its_speed_and_ends_in_time(
 
 
 def test_pictures_have_even_sizes_and_leave_the_look_of_others():
-    """4.1 inches at 100 dots an inch are 409.99999999999994."""
-    for pixels in range(100, 1100, 2):
+    for pixels in range(100, 1100, 2):  # 4.1 inches of 100 dots are 409.99999999999994
         assert int(Figure(figsize=(even(pixels / 100), 1), dpi=100).bbox.width) == pixels
     strip = strip_of([flight()], 3, [SIDE], None, None)
     before = dict(matplotlib.rcParams)
@@ -111,9 +111,10 @@ def test_pictures_have_even_sizes_and_leave_the_look_of_others():
 
 def test_a_film_on_paper_is_the_filmstrip_and_in_html_the_page(tmp_path, monkeypatch):
     for suffix in (".png", ".pdf", ".svg"):
-        film = flight().film(tmp_path / f"film{suffix}", views=("top",))
-        flight().filmstrip(tmp_path / f"strip{suffix}", views=("top",))
-        assert film.read_bytes() == (tmp_path / f"strip{suffix}").read_bytes(), suffix
+        film, strip = tmp_path / f"film{suffix}", tmp_path / f"strip{suffix}"
+        flight().film(film, views=("top",))
+        flight().filmstrip(strip, views=("top",))
+        assert film.read_bytes() == strip.read_bytes(), suffix
     template = tmp_path / "page"
     monkeypatch.setattr("serpentail.viewer.view.PAGE", template)
     with pytest.raises(st.ViewError, match="not built"):
@@ -126,7 +127,6 @@ def test_a_film_on_paper_is_the_filmstrip_and_in_html_the_page(tmp_path, monkeyp
 
 def test_what_no_film_can_be_is_refused(tmp_path):
     for path, change, words in (
-        ("a.avi", {}, r"'\.avi'.* \.gif, \.html, \.mp4, \.pdf, \.png, \.svg"),
         ("a", {}, "suffix ''"),
         ("a.gif", {"speed": 0}, "speed: value 0"),
         ("a.gif", {"speed": "slow"}, "speed: value 'slow'"),
@@ -143,36 +143,18 @@ def test_what_no_film_can_be_is_refused(tmp_path):
 # Encoders.
 
 
-def test_without_an_encoder_the_remedy_is_told_first_and_one_on_path_serves(tmp_path, monkeypatch):
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    monkeypatch.setattr("shutil.which", lambda name: None)
-    with pytest.raises(st.ViewError, match=r'pip install "serpentail\[film\]"'):
-        flight().film(tmp_path / "a.mp4")
-    assert not list(tmp_path.iterdir())
-    monkeypatch.setattr("shutil.which", lambda name: "found" if name == "ffmpeg" else None)
-    assert encode.encoder() == "found"
-
-
-@pytest.fixture
-def script(tmp_path, monkeypatch):
-    """What is run as the encoder."""
-    found = tmp_path / "ffmpeg"
-    found.touch(0o700)
-    monkeypatch.setattr(encode, "encoder", lambda: str(found))
-    return found
-
-
-def test_an_encoder_that_fails_leaves_the_old_file(tmp_path, script):
-    path = tmp_path / "a.mp4"
+def test_an_encoder_on_path_serves_and_may_fail_or_be_stopped(tmp_path, monkeypatch):
+    """It leaves the old file, and does not outlive a stop by the user."""
+    path, script = tmp_path / "a.mp4", tmp_path / "ffmpeg"
     path.write_bytes(b"before")
+    script.touch(0o700)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
     for code, words in (("exit 3", "3"), ("echo the disk is on fire >&2; exit 1", "the disk")):
         script.write_text(f"#!/bin/sh\n{code}\n")
         with row(code), pytest.raises(st.NotWritten, match=rf"a\.mp4.*ffmpeg: {words}"):
             flight().film(path, **FEW)
-        assert path.read_bytes() == b"before" and set(tmp_path.iterdir()) == {path, script}
 
-
-def test_a_stop_by_the_user_ends_the_encoder(tmp_path, script, monkeypatch):
     def stopped():
         yield np.zeros((64, 64, 3), np.uint8)
         raise KeyboardInterrupt
@@ -183,5 +165,117 @@ def test_a_stop_by_the_user_ends_the_encoder(tmp_path, script, monkeypatch):
         subprocess, "Popen", lambda *a, **o: begun.append(real(*a, **o)) or begun[0]
     )
     with pytest.raises(KeyboardInterrupt):
-        encode.write_mp4(tmp_path / "a.mp4", stopped())
-    assert begun[0].returncode is not None and list(tmp_path.iterdir()) == [script]
+        encode.write_mp4(path, stopped())
+    assert begun[0].returncode is not None
+    assert path.read_bytes() == b"before" and set(tmp_path.iterdir()) == {path, script}
+
+
+# Views.
+
+
+def test_points_are_seen_as_after_turning_the_world():
+    """The side view of a world that is turned by -azimuth about z, then tipped by the elevation."""
+    points = np.random.default_rng(1).normal(size=(20, 3))
+    for azimuth, elevation in product((-200, -30, 0, 40, 90), (0, 20, 65, 90)):
+        turns = Rotation.from_euler("zy", [-azimuth, elevation], degrees=True)
+        found = looking("a", azimuth, elevation).of(points)
+        with row(azimuth, elevation):
+            np.testing.assert_allclose(found, turns.apply(points)[:, [1, 2, 0]], atol=1e-14)
+    np.testing.assert_array_equal(SIDE.matrix, [[0, 1, 0], [0, 0, 1], [1, 0, 0]])
+    np.testing.assert_array_equal(TOP.matrix, [[0, 1, 0], [-1, 0, 0], [0, 0, 1]])
+    # the viewer is where the angles say: 90 degrees is in front of the head
+    np.testing.assert_array_equal(looking("a", 90, 0).matrix[2], [0, 1, 0])
+    assert NAMED["oblique"].matrix[2].min() > 0  # right of it, before it and above
+
+
+def test_views_that_are_none_are_refused():
+    for views, words in (
+        (("sid",), r"views\[0\]: value 'sid': .*'side'"),
+        (("side", (1, 2, 3)), r"views\[1\]: value \(1, 2, 3\)"),
+        (((0, 120),), r"views\[0\]: value \(0, 120\).* 0 to 90"),
+        (((0, 90.1),), r"views\[0\]: value \(0, 90\.1\)"),
+        (((0, -0.1),), r"views\[0\]: value \(0, -0\.1\)"),
+        (((np.nan, 3),), r"views\[0\]"),
+        ("side", "views: value 'side'"),
+        ((), r"views: value \(\)"),
+    ):
+        for refused in (views_of, lambda views: flight().filmstrip(views=views)):
+            with row(views), pytest.raises(st.ViewError, match=words):
+                refused(views)
+
+
+# The torso.
+
+
+def surface(count=150):
+    """Points on the torso's ellipsoid, in its frame."""
+    polar, around = np.meshgrid(np.linspace(0, np.pi, count), np.linspace(0, 2 * np.pi, 2 * count))
+    sphere = [np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar)]
+    return np.stack(sphere, axis=-1).reshape(-1, 3) * SEMI_AXES
+
+
+def film_frame(seed, height=0.06):
+    """One frame in a random attitude."""
+    trajectory = flight(samples=1)
+    q = trajectory.q.copy()
+    q[:, 2], q[:, 3:7] = height, Rotation.random(rng=seed).as_quat()
+    return frames(trajectory.model, dataclasses.replace(trajectory, q=q), [0], 0.0)[0]
+
+
+def widths(points):
+    """How far points (P, 2) reach in 90 directions."""
+    angle = np.linspace(0, 2 * np.pi, 90)
+    return (points @ np.stack([np.cos(angle), np.sin(angle)])).max(axis=0)
+
+
+def test_silhouette_is_the_outline_of_the_projected_surface():
+    for seed, view in product(range(5), NAMED.values()):
+        rotation = Rotation.random(rng=seed).as_matrix()
+        shadow = view.of(surface() @ rotation.T)[:, :2]
+        outline = silhouette(rotation, SEMI_AXES, view, count=721)
+        with row(seed, view.name):
+            np.testing.assert_allclose(widths(outline), widths(shadow), rtol=2e-4)
+            np.testing.assert_allclose(outline[0], outline[-1], atol=1e-15)
+
+
+def test_the_torso_hides_exactly_what_a_ray_to_the_viewer_hits():
+    for seed, view in product(range(3), NAMED.values()):
+        frame = film_frame(seed)
+        points = frame.torso + np.random.default_rng(seed).uniform(-0.06, 0.06, (400, 3))
+        steps = np.linspace(0, 0.2, 2001)[:, None, None] * view.matrix[2]
+        ray = np.linalg.norm((points + steps - frame.torso) @ frame.rotation / SEMI_AXES, axis=-1)
+        nearest, over = ray.min(axis=0), frame.in_front(points, view)
+        # beside the torso nothing is covered
+        spread = view.matrix[:2] @ frame.rotation * SEMI_AXES
+        flat = view.of(points - frame.torso)[:, :2]
+        covered = np.einsum("ni,ij,nj->n", flat, np.linalg.inv(spread @ spread.T), flat) < 1
+        with row(seed, view.name):
+            assert not (over & (nearest < 1 - 1e-3)).any()
+            assert not (~over & covered & (nearest > 1 + 1e-3)).any()
+
+
+def test_what_is_above_the_ground_is_outlined():
+    for seed, view, height in product(range(2), NAMED.values(), (-0.02, 0.005)):
+        frame = film_frame(seed, height)
+        world = frame.torso + surface(300) @ frame.rotation.T
+        shadow = view.of(world[world[:, 2] >= 0])[:, :2]
+        outline = hull(view.of(above_ground(frame))[:, :2])
+        with row(seed, view.name, height):
+            np.testing.assert_allclose(widths(outline), widths(shadow), atol=5e-4)
+    # above the ground there is no part below
+    frame = film_frame(1, height=0.06)
+    assert above_ground(frame) is None and frame.lowest < 0.06 - SEMI_AXES.min()
+    assert len(above_ground(film_frame(1, height=-0.06))) == 0
+
+
+def test_a_line_before_the_torso_has_a_rim_and_one_behind_is_hidden():
+    """Seen from the right, +x: of a line across, what is drawn over the torso, and its rim."""
+    frame = dataclasses.replace(film_frame(0), rotation=np.eye(3))
+    for side, colours in ((1, ["white", "red"]), (-1, [])):
+        axes = Figure().subplots()
+        pen = Pen(axes, frame, NAMED["side"], frame.torso)
+        across = frame.torso + np.array([[0.05 * side, -0.2, 0], [0.05 * side, 0.2, 0]])
+        pen.line(across, color="red", linewidth=1.0)
+        over = [line for line in axes.lines if line.get_zorder() > 0.4]  # the torso's level
+        assert [line.get_color() for line in over] == colours
+        assert all(np.ptp(line.get_xdata()) == pytest.approx(0.4) for line in axes.lines)

@@ -15,7 +15,6 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
-from contextlib import contextmanager
 from functools import partial
 from multiprocessing import get_context
 
@@ -40,14 +39,14 @@ def start(model):
     return q, v
 
 
-def _digest(*arrays) -> str:
-    return hashlib.sha256(b"".join(np.array(a, float).tobytes() for a in arrays)).hexdigest()
-
-
 def starts(model, count):
     """Return states that are near to it."""
     random = np.random.default_rng(7)
     return [each + 0.01 * random.normal(size=(count, len(each))) for each in start(model)]
+
+
+def _digest(*arrays) -> str:
+    return hashlib.sha256(b"".join(np.array(a, float).tobytes() for a in arrays)).hexdigest()
 
 
 def batch(model) -> str:
@@ -63,7 +62,6 @@ def simulate(model) -> str:
 
 
 def rollouts(model) -> str:
-    """Make runs that threads take up in turn."""
     found = st.simulate(model, *starts(model, 12), t_span=0.1, output_step=0.02)
     return _digest(found.q, found.v, found.kinetic)
 
@@ -79,11 +77,8 @@ def casadi(model) -> str:
 
 
 def plan(model) -> str:
-    """Plan a motion: IPOPT, its linear algebra, and the truth of its end.
-
-    After a batch: from then on nodes are evaluated in lanes, whose last digits are their own.
-    """
-    batch(model)
+    """Plan a motion: IPOPT, its linear algebra, and the truth of its end."""
+    batch(model)  # from then on nodes are evaluated in lanes, whose last digits are their own
     found = st.plan(model, start=start(model), intervals=2, **AGAIN)
     assert found.report["converged"], found.report
     return _digest(found.solution.w, found.trajectory.q)
@@ -119,15 +114,6 @@ def in_child(work: Callable[[], str]) -> str:
     return said or "died"
 
 
-@contextmanager
-def in_a_thread(work: Callable):
-    """Have a thread do some work."""
-    thread = threading.Thread(target=work)
-    thread.start()
-    yield
-    thread.join()
-
-
 def all_jobs(model: st.Model) -> str:
     return json.dumps({name: done(model, name) for name in JOBS})
 
@@ -148,10 +134,8 @@ def again(model: st.Model) -> str:
 
 def from_a_thread(model: st.Model) -> str:
     """Fork where the main thread is not the one that goes on in the child."""
-    found: list[str] = []
-    with in_a_thread(lambda: found.append(forked(model))):
-        pass
-    return found[0]
+    with ThreadPoolExecutor(1) as thread:
+        return thread.submit(forked, model).result()
 
 
 def beside(does: Callable[[st.Model], object], model: st.Model) -> str:
@@ -163,7 +147,8 @@ def beside(does: Callable[[st.Model], object], model: st.Model) -> str:
             does(model)
             next(turns)
 
-    with in_a_thread(work):
+    with ThreadPoolExecutor(1) as thread:
+        thread.submit(work)
         time.sleep(0.05)
         said = forked(model)
         over.set()
@@ -172,19 +157,10 @@ def beside(does: Callable[[st.Model], object], model: st.Model) -> str:
 
 
 def beside_the_compiler(model: st.Model) -> str:
-    """Fork while another thread holds the locks of the C that is compiled late."""
-    held, over, batches = threading.Event(), threading.Event(), model.batch_library
-
-    def work():
-        with batches.sources["batch"].lock, batches.rollouts.lock:
-            held.set()
-            over.wait()
-
-    with in_a_thread(work):
-        held.wait()
-        said = forked(model)
-        over.set()
-    return said
+    """Fork while the locks of the C that is compiled late are held, as by another thread."""
+    batches = model.batch_library
+    with batches.sources["batch"].lock, batches.rollouts.lock:
+        return forked(model)
 
 
 MOMENTS = {
@@ -199,7 +175,6 @@ MOMENTS = {
 
 
 def by_executor(make: Callable, model: st.Model) -> Iterator[list[str]]:
-    """Have the workers of an executor do the jobs."""
     with make(TWICE) as executor:
         for name in JOBS:
             asked = [executor.submit(done, model, name) for _ in range(TWICE)]
@@ -213,12 +188,10 @@ def by_forks(moment: Callable[[st.Model], str], model: st.Model) -> Iterator[lis
     yield from ([found[name]] for name in JOBS)
 
 
-def pool(method: str, workers: int) -> ProcessPoolExecutor:
-    """Return a pool whose workers are started by a method."""
-    return ProcessPoolExecutor(workers, mp_context=get_context(method))
-
-
-POOLS = {method: partial(pool, method) for method in ("fork", "spawn", "forkserver")}
+POOLS = {
+    method: partial(ProcessPoolExecutor, mp_context=get_context(method))
+    for method in ("fork", "spawn", "forkserver")
+}
 POOLS |= {"loky": LokyExecutor, "threads": ThreadPoolExecutor}
 WAYS = {name: partial(by_executor, make) for name, make in POOLS.items()}
 WAYS |= {name: partial(by_forks, moment) for name, moment in MOMENTS.items()}

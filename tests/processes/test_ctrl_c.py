@@ -5,8 +5,6 @@ is finished; nothing else is left behind.
 import json
 import os
 import signal
-import subprocess
-import sys
 import time
 from contextlib import suppress
 from pathlib import Path
@@ -22,10 +20,10 @@ PROMPT = 1.0  # s
 AFTER = (0.3, 1.0, 3.0)  # s of work; one try must be prompt: other work may hold up a process
 PATIENCE = 60.0  # s to begin, and to end at the latest
 # a shell's background may not hear Ctrl-C
-HEAR = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+HEAR = "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler)"
 # does what each line of stdin tells until Ctrl-C, and tells what is kept
-SERVES = """
-import sys, time, numpy as np, scipy.integrate, serpentail as st
+SERVES = f"""{HEAR}
+import time, numpy as np, scipy.integrate, serpentail as st
 from tests.processes.elsewhere import start
 say = lambda *words: print(*words, flush=True)
 model = st.load(sys.argv[1], threads=int(sys.argv[2]))
@@ -53,28 +51,9 @@ LONG = {
 }
 
 
-@pytest.fixture
-def child():
-    """Return a function that starts a program of Python, which does not outlive its test."""
-    begun = []
-
-    def started(program, *arguments, **settings):
-        command = [sys.executable, "-c", HEAR + program, *map(str, arguments)]
-        pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
-        settings |= {"text": True, "start_new_session": True}
-        begun.append(subprocess.Popen(command, **pipes, **settings))
-        return begun[-1]
-
-    yield started
-    for process in begun:
-        with suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
-
-
 @pytest.mark.parametrize("threads", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_what_takes_long_ends_and_keeps_what_there_is(child, threads):
-    process = child(SERVES, zoo.model("m1_n3").folder, threads)
+    process = child("-c", SERVES, zoo.folder("m1_n3"), threads)
     for call, told in LONG.items():
         expected, found = [] if told is None else ["True", "True"], []
         for after in AFTER:
@@ -94,8 +73,7 @@ def test_what_takes_long_ends_and_keeps_what_there_is(child, threads):
     assert (process.returncode, said, errors) == (0, "", "")
 
 
-COMMAND = """
-import sys
+COMMAND = f"""{HEAR}
 from serpentail.cli import main
 print("ready", file=sys.stderr, flush=True)
 sys.exit(main(sys.argv[1:]))
@@ -110,18 +88,14 @@ duration = 500.0
 output_step = 5e-4
 method = "rk4"
 step = 5e-6
-[simulate.start]
-height = 1.0
-rate = [0.1, 0.2, 0.3]
+start = {height = 1.0, rate = [0.1, 0.2, 0.3]}
 [plan]
 duration = 0.4
 intervals = 60
 retries = 50
 multi_start = 50
 tolerance = 1e-9
-[plan.start]
-q = [0, 0, 0.3, 0.9, 0.43, 0, 0, 0.1, 0]
-v = [0, -0.3, 2.4, 1, 2, 1, 0, 0]
+start = {q = [0, 0, 0.3, 0.9, 0.43, 0, 0, 0.1, 0], v = [0, -0.3, 2.4, 1, 2, 1, 0, 0]}
 """
 
 
@@ -129,8 +103,8 @@ v = [0, -0.3, 2.4, 1, 2, 1, 0, 0]
 def test_a_command_ends_in_one_line_and_writes_what_there_is(child, tmp_path, verb):
     scene, saved = tmp_path / "scene.toml", tmp_path / "motion.npz"
     scene.write_text(SCENE)
-    folder = zoo.model("m1_n3").folder
-    process = child(COMMAND, verb, scene, "--folder", folder, "--json", "-", "--save", saved)
+    options = "--folder", zoo.model("m1_n3").folder, "--json", "-", "--save", saved
+    process = child("-c", COMMAND, verb, scene, *options)
     while not process.stderr.readline().startswith(verb):  # it tells of itself after a second
         assert process.poll() is None
     time.sleep(0.5)
@@ -158,7 +132,7 @@ def test_a_compile_leaves_no_compiler_and_no_half_file(child, tmp_path, number, 
     compiler.write_text(SLOW_CC.format(pids=pids))
     compiler.chmod(0o755)
     environment = os.environ | {"CC": str(compiler), "SERPENTAIL_CACHE": str(cache)}
-    process = child(COMMAND, "info", folder, env=environment)
+    process = child("-c", COMMAND, "info", folder, env=environment)
     assert process.stderr.readline() == "ready\n"
     until(lambda: pids.exists() and len(pids.read_text().split()) >= 2)
     time.sleep(1.0)  # all sources are being compiled
@@ -176,13 +150,12 @@ def test_a_compile_leaves_no_compiler_and_no_half_file(child, tmp_path, number, 
             os.kill(pid, signal.SIGKILL)
     # what comes next finds nothing broken
     environment |= {"CC": os.environ.get("CC", "cc")}
-    again = child(COMMAND, "info", folder, env=environment)
+    again = child("-c", COMMAND, "info", folder, env=environment)
     said = again.communicate(timeout=PATIENCE)[1]
     assert besides_progress(said) == "ready\n" and again.returncode == 0
 
 
 def until(condition) -> None:
-    """Wait for a condition."""
     end = time.monotonic() + PATIENCE
     while not condition():
         assert time.monotonic() < end

@@ -7,10 +7,8 @@ import math
 import os
 import pickle
 import re
-import signal
 import subprocess
 import sys
-from contextlib import suppress
 
 import pytest
 
@@ -19,9 +17,9 @@ from serpentail.model import cores, workers
 from tests.support import zoo
 from tests.support.rows import row
 
-from .elsewhere import JOBS, MOMENTS, WAYS, start, starts
+from .elsewhere import JOBS, MOMENTS, POOLS, TWICE, WAYS, start, starts
 
-LIMIT = 500.0  # s, then all processes of a test are killed
+LIMIT = 500.0  # s
 QUICK = ("fork", "threads", "at rest", "beside rollouts", "beside the compiler")
 BESIDE = [name for name in MOMENTS if name.startswith("beside")]  # where chance decides
 
@@ -29,41 +27,21 @@ BESIDE = [name for name in MOMENTS if name.startswith("beside")]  # where chance
 @pytest.mark.parametrize(
     "ways", [QUICK, pytest.param([*WAYS, *10 * BESIDE], marks=pytest.mark.slow)]
 )
-def test_every_job_is_the_same_elsewhere(ways):
+def test_every_job_is_the_same_elsewhere(child, ways):
     zoo.model("m1_n3")  # compiled
-    command = [sys.executable, "-m", "tests.processes.elsewhere", zoo.folder("m1_n3"), *ways]
     environment = os.environ | {"SERPENTAIL_THREADS": "2"}  # in workers of pools, too
-    running = subprocess.Popen(
-        command, env=environment, stdout=subprocess.PIPE, text=True, start_new_session=True
-    )
-    try:
-        said, _ = running.communicate(timeout=LIMIT)
-    finally:
-        with suppress(ProcessLookupError):
-            os.killpg(running.pid, signal.SIGKILL)
-        running.wait()
-    assert running.returncode == 0, said
+    words = "-m", "tests.processes.elsewhere", zoo.folder("m1_n3"), *ways
+    running = child(*words, env=environment)
+    said, errors = running.communicate(timeout=LIMIT)
+    assert running.returncode == 0, (said, errors)
     found = [json.loads(line) for line in said.splitlines()]
-    expected = {
-        way: dict.fromkeys(JOBS, ["same"] if way in MOMENTS else ["same", "same"]) for way in ways
-    }
-    assert found == [{way: expected[way]} for way in ways]
+    same = [["same"] * (1 if way in MOMENTS else TWICE) for way in ways]
+    assert found == [{way: dict.fromkeys(JOBS, each)} for way, each in zip(ways, same, strict=True)]
 
 
 # How many threads a process uses.
 
 V1, V2 = "4:cpu,cpuacct:{}\n0::/\n", "0::{}\n"
-
-
-def tree(root, group, files, lines):
-    """A root of a file system with control groups, of which the process is in one."""
-    (root / "proc/self").mkdir(parents=True)
-    (root / "proc/self/cgroup").write_text(lines.format(group))
-    for name, text in files.items():
-        path = root / "sys/fs/cgroup" / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text)
-    return root
 
 
 def v1(quota, period, at="cpu,cpuacct/"):
@@ -89,9 +67,15 @@ LIMITS = [
 
 
 def test_quotas_of_control_groups_are_found(tmp_path):
+    """In the root of a file system whose process is in a group."""
     for case, lines, group, files, expected in LIMITS:
+        texts = {f"sys/fs/cgroup/{name}": text for name, text in files.items()}
+        for name, text in (texts | {"proc/self/cgroup": lines.format(group)}).items():
+            path = tmp_path / case / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text)
         with row(case):
-            assert cores.quota(tree(tmp_path / case, group, files, lines)) == expected
+            assert cores.quota(tmp_path / case) == expected
     assert cores.quota(tmp_path) == math.inf
 
 
@@ -106,43 +90,19 @@ def test_an_argument_comes_before_the_environment_and_that_before_the_machine(mo
         assert (cores.threads(), cores.threads(4)) == (expected, 4)
 
 
-WORKERS = """
-import json, multiprocessing, sys
-from concurrent.futures import ProcessPoolExecutor
-import joblib
-from serpentail.model.cores import threads
-if __name__ == "__main__":
-    found = [threads()]
-    with multiprocessing.get_context("fork").Pool(1) as pool:
-        found.append(pool.apply(threads))
-    if sys.argv[1:]:
-        with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
-            found.append(pool.submit(threads).result(60))
-        found += joblib.Parallel(2, timeout=60)([joblib.delayed(threads)()])
-    print(json.dumps(found))
-"""
-
-
-def test_workers_of_process_pools_use_one_thread():
+def test_workers_of_process_pools_use_one_thread(monkeypatch):
     """Unless the environment says how many."""
-    for chosen, more, expected in (("", ["spawn"], [cores.cores(), 1, 1, 1]), ("3", [], [3, 3])):
-        command = [sys.executable, "-c", WORKERS, *more]
-        environment = os.environ | {"SERPENTAIL_THREADS": chosen}
-        done = subprocess.run(
-            command, env=environment, capture_output=True, text=True, timeout=100, check=True
-        )
-        assert json.loads(done.stdout) == expected
+    for ways, chosen, expected in ((("fork", "spawn", "loky"), "", 1), (("fork",), "3", 3)):
+        monkeypatch.setenv("SERPENTAIL_THREADS", chosen)
+        for way in ways:
+            with row(way, chosen), POOLS[way](1) as pool:
+                assert pool.submit(cores.threads).result(60) == expected
+        assert cores.threads() == (expected if chosen else cores.cores())
 
 
-@pytest.fixture
-def crews(monkeypatch):
-    """Sizes of the pools that batches were shared among."""
-    found, pool = [], workers.pool
-    monkeypatch.setattr(workers, "pool", lambda size: found.append(size) or pool(size))
-    return found
-
-
-def test_a_model_and_runs_keep_to_their_threads_and_digits(crews):
+def test_a_model_and_runs_keep_to_their_threads_and_digits(monkeypatch):
+    crews, pool = [], workers.pool  # sizes of the pools that batches were shared among
+    monkeypatch.setattr(workers, "pool", lambda size: crews.append(size) or pool(size))
     models = [st.load(zoo.folder("m1_n3"), threads=k) for k in (1, 2, 3)]
     q, v = starts(models[0], 5001)
     found = [model.forward_dynamics(q, v, [0.0, 0.0]) for model in models]

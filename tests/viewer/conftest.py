@@ -1,6 +1,5 @@
-"""Motions to show: the kick on the ground, and flights."""
+"""Motions to show: the kick on the ground, flights, and a plan."""
 
-import dataclasses
 from functools import cache
 
 import numpy as np
@@ -10,18 +9,14 @@ import serpentail as st
 from tests.motion.conftest import simulated
 from tests.support import page, zoo
 
-ARRAYS = ("t", "q", "v", "tau", "kinetic", "potential", "linear_momentum", "angular_momentum")
-
 
 @pytest.fixture(autouse=True)
 def built():
-    """The page."""
     page.need(page.need_page)
 
 
 @pytest.fixture
 def kick():
-    """1201 samples of the kick."""
     return simulated("kick")
 
 
@@ -37,18 +32,6 @@ def flown(model, samples=41, spin=9.0):
 def flight():
     """41 samples of a flight of a continuum tail."""
     return flown(zoo.model("arcs2"))
-
-
-@pytest.fixture
-def single(flight):
-    """Its first sample alone."""
-    return dataclasses.replace(flight, **{n: getattr(flight, n)[:1] for n in ARRAYS})
-
-
-@pytest.fixture
-def silent():
-    """A motion of a model that lacks ``tail_points``."""
-    return dataclasses.replace(flown(zoo.model("m1_n1")), model=zoo.model("bare"))
 
 
 @cache

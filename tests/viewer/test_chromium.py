@@ -165,8 +165,8 @@ def test_keys(browser, pages, kick):
     assert text(driver, "play") == "Pause"
 
 
-def test_other_motions_open(browser, tmp_path, flight, single):
-    for motion, end in ((flight, "Pause"), (single, "Play")):
+def test_other_motions_open(browser, tmp_path, flight):
+    for motion, end in ((flight, "Pause"), (flight.resample([0.0]), "Play")):
         driver = opened(browser, motion.view(tmp_path / "run.html"))
         seek(driver, 0.1)
         press(driver, " ", "n", "f", "r", "+", "-")

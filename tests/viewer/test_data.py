@@ -13,12 +13,12 @@ from serpentail.pictures.frames import body_of
 from serpentail.viewer.packing import packed
 from serpentail.viewer.shape import shape
 from serpentail.watching.poses import animal
-from tests.motion.conftest import scene_of, told
+from tests.motion.conftest import at_height, scene_of, told
 from tests.support import page, zoo
 from tests.support.page import data_of
 from tests.support.rows import row
 
-from .conftest import ARRAYS, flown, plan
+from .conftest import flown, plan
 
 WEIGHT = 9.8 * (0.10572 + 0.00351)
 RADIUS = 0.0029  # m: the rat's usual one
@@ -30,17 +30,10 @@ def single_run(path):
     return data, run
 
 
-def test_samples_are_packed_bit_by_bit():
-    """What float32 cannot hold becomes its largest."""
-    for rows in (1, 2, 57):
-        draws = np.random.default_rng(rows)
-        values = draws.normal(size=(rows, 5)) * 10.0 ** draws.integers(-44, 38, size=(rows, 5))
-        values[0, :2] = 0.0, -0.0
-        expected = np.ascontiguousarray(values.astype(np.float32))
-        assert page._floats(packed(values), rows).tobytes() == expected.tobytes()
-    largest = np.finfo(np.float32).max
-    beyond = page._floats(packed(np.array([1e300, -1e300])), 2)
-    assert beyond.ravel().tolist() == [largest, -largest]
+def test_what_float32_cannot_hold_is_packed_as_its_largest():
+    largest = float(np.finfo(np.float32).max)
+    found = page._floats(packed(np.array([1e300, -1e300, -0.0, 1e-44])), 4)
+    assert found.ravel().tolist() == [largest, -largest, -0.0, float(np.float32(1e-44))]
 
 
 def test_the_kick_is_whole_and_below_1_mb(tmp_path, kick):
@@ -49,9 +42,8 @@ def test_the_kick_is_whole_and_below_1_mb(tmp_path, kick):
     check_words(data, run, kick)
     loaded = st.Trajectory.load(kick.save(tmp_path / "kick.npz"))
     again = loaded.view(tmp_path / "loaded.html", model=kick.model)
-    assert loaded.model is None and again.read_bytes() == path.read_bytes()
+    assert again.read_bytes() == path.read_bytes()
     assert path == tmp_path / "run.html" and path.stat().st_size <= 1e6
-    assert run["rows"] == len(kick.t) == 1201
 
     # times, poses and points are the motion's
     arrays, model = run["arrays"], kick.model
@@ -82,14 +74,14 @@ def test_the_kick_is_whole_and_below_1_mb(tmp_path, kick):
 
 def check_words(data, run, kick):
     numbers, summary = dict(run["numbers"]), told(kick)
-    assert float(numbers["take-off (s)"]) == pytest.approx(summary["take_off_s"], rel=1e-3)
-    assert float(numbers["highest torso (m)"]) == pytest.approx(summary["apex_m"], rel=1e-3)
     assert numbers["samples"] == "1201" and numbers["landed, and stands at the end"] == "no"
-    largest = np.linalg.norm(kick.contact.forces.sum(axis=1), axis=1).max()
     said = "largest force of the ground at the samples"
-    assert float(numbers[f"{said} (N)"]) == pytest.approx(largest, rel=1e-4)
-    assert float(numbers[f"{said} (body weights)"]) == pytest.approx(largest / WEIGHT, rel=1e-4)
-    assert float(numbers["tilt at the end (deg)"]) == pytest.approx(0.795, abs=0.01)
+    for label, name in (
+        *(("take-off (s)", "take_off_s"), ("highest torso (m)", "apex_m")),
+        *((f"{said} (N)", "peak_ground_force_N"), ("tilt at the end (deg)", "tilt_end_deg")),
+        (f"{said} (body weights)", "peak_ground_force_weights"),
+    ):
+        assert float(numbers[label]) == pytest.approx(summary[name], rel=1e-3), label
     assert data["notes"] == [] and data["warnings"] == kick.warnings and len(kick.warnings) == 5
     assert [event["time"] for event in run["events"]] == [event["time"] for event in kick.events]
     assert run["events"][0]["label"] == "feet take off"
@@ -101,7 +93,7 @@ def check_words(data, run, kick):
     assert [plot["least"] for plot in data["plots"]] == [1e-3, 0.1, 0.1, 0, 0, 0]
 
 
-def test_a_flight_has_no_ground_and_no_legs(tmp_path, flight, single):
+def test_a_flight_has_no_ground_and_no_legs(tmp_path, flight):
     data, run = single_run(flight.view(tmp_path / "run.html"))
     assert (run["grounded"], run["legs"], run["contacts"]) == (False, 0, 0)
     assert not {"legs", "forces", "touching", "force"} & set(run["arrays"])
@@ -114,33 +106,20 @@ def test_a_flight_has_no_ground_and_no_legs(tmp_path, flight, single):
     squares = np.array(run["body"]["semi_axes"]) ** 2
     inertia = parameters["torso_mass"] / 5 * (squares.sum() - squares)
     np.testing.assert_allclose(inertia, parameters["torso_inertia"], rtol=1e-12)
-    assert single_run(single.view(tmp_path / "run.html"))[1]["rows"] == 1
+    single = flight.resample([0.0]).view(tmp_path / "run.html")
+    assert single_run(single)[1]["rows"] == 1
 
 
 def test_many_samples_are_thinned_and_the_page_says_so(tmp_path, flight):
-    count = 100_001
-    rows = np.linspace(0, len(flight.t) - 1, count).astype(int)
-    arrays = {name: getattr(flight, name)[rows] for name in ARRAYS}
-    long = dataclasses.replace(flight, **arrays | {"t": 1e4 + 1e-3 * np.arange(count)})
+    t = 1e4 + 1e-3 * np.arange(100_001)
+    long = dataclasses.replace(flight.resample(np.linspace(0, 0.2, len(t))), t=t)
     data, run = single_run(long.view(tmp_path / "run.html"))
     (note,) = data["notes"]
     assert "one of 42 samples" in note and "100001" in note
     times = run["arrays"]["t"].astype(float).sum(axis=1)
     assert run["rows"] == len(times) <= 2400
-    np.testing.assert_allclose(times[[0, 1, -1]], 1e4 + 1e-3 * np.array([0, 42, 100_000]), 1e-13)
+    np.testing.assert_allclose(times[[0, 1, -1]], t[[0, 42, -1]], 1e-13)
     assert dict(run["numbers"])["samples"] == "100001"
-
-
-def test_a_run_that_failed_is_shown_up_to_there(tmp_path, kick):
-    with pytest.raises(st.SimulationError) as caught:
-        scene_of("kick").simulate(most_steps=400)
-    cut = caught.value.trajectory
-    cut.save(tmp_path / "cut.npz")
-    for motion in (cut, st.Trajectory.load(tmp_path / "cut.npz")):
-        data, run = single_run(st.view(motion, tmp_path / "run.html", model=kick.model))
-        assert len(data["notes"]) == 1 and data["notes"][0].endswith(str(caught.value))
-        assert data["warnings"] == cut.warnings != []
-        assert run["rows"] == len(cut.t) and 1 < len(cut.t) < 1201
 
 
 def test_several_motions_have_names_that_stay_data(tmp_path, kick, flight):
@@ -202,33 +181,26 @@ def test_a_long_tail_and_another_scale(tmp_path):
 # Shapes.
 
 
-def thick(name):
-    """A model of the zoo with links and arcs of chosen radii; the last link has no inertia along
-    itself. Return it and the radii of links and arcs (m).
-    """
-    model, changes = zoo.model(name), {}
-    links, arcs = (len(model.parameters.get(each, ())) for each in ("link_masses", "arc_masses"))
-    of_links, of_arcs = np.linspace(0.004, 0.001, links), np.linspace(0.003, 0.002, arcs)
-    if links:
-        masses = np.linspace(2e-3, 1e-3, links)
-        along = masses * of_links**2 / 2
-        along[-1], of_links[-1] = 0, 0.015 * model.parameters["tail_length"]
-        inertias = np.stack([2e-8 + 0 * along, along, 2e-8 + 0 * along], axis=1)
-        changes = {"link_masses": masses, "link_inertias": inertias}
-    if arcs:  # as thick as that mass of water
-        lengths = np.array(model.parameters["arc_lengths"])
-        changes["arc_masses"] = 1e3 * np.pi * of_arcs**2 * lengths
-    return model.with_parameters(**changes), of_links, np.repeat(of_arcs, model.samples or 1)
-
-
 def test_links_and_arcs_are_drawn_as_thick_as_they_are():
+    """Arcs as that mass of water; the last link has no inertia along itself."""
     for name in ("own_links", "own_arcs", "mixed"):
-        model, links, arcs = thick(name)
+        model, changes = zoo.model(name), {}
+        p = model.parameters
+        links = np.linspace(0.004, 0.001, len(p.get("link_masses", ())))
+        arcs = np.linspace(0.003, 0.002, len(p.get("arc_masses", ())))
+        if links.size:
+            masses = np.linspace(2e-3, 1e-3, len(links))
+            along = masses * links**2 / 2
+            along[-1], links[-1] = 0, 0.015 * p["tail_length"]
+            inertias = np.stack([2e-8 + 0 * along, along, 2e-8 + 0 * along], axis=1)
+            changes = {"link_masses": masses, "link_inertias": inertias}
+        if arcs.size:
+            changes["arc_masses"] = 1e3 * np.pi * arcs**2 * np.array(p["arc_lengths"])
+        model, arcs = model.with_parameters(**changes), np.repeat(arcs, model.samples or 1)
         radii = np.concatenate([links, arcs])
         if name == "mixed":  # an arc, two links, an arc, three links
             radii = np.concatenate([arcs[:3], links[:2], arcs[3:], links[2:]])
-        q = np.zeros((2, model.nq))
-        q[:, 3] = 1
+        q = at_height(model, 0.0, 2)
         scales = animal(model, q, None)["tail"].scales
         with row(name):
             np.testing.assert_allclose(shape(model)["tail_radii"], radii)
