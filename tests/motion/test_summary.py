@@ -1,6 +1,4 @@
-"""Numbers of runs of every kind, none where there is none: as JSON, text and tables; the ground's
-forces, impulses and slips, against sums by hand and v^2 / (2 mu g).
-"""
+"""Numbers of runs of every kind, none where there is none: as JSON, text and tables."""
 
 import dataclasses
 import json
@@ -75,9 +73,6 @@ def test_words_and_reports_without_units():
     assert as_text({}) == ""
 
 
-# Runs of other kinds.
-
-
 def test_a_flight_without_contacts():
     model = zoo.model("arcs2")
     of = told(st.simulate(model, at_height(model, 0)[0], np.zeros(model.nv), t_span=0.1))
@@ -120,9 +115,6 @@ def test_a_run_that_failed_and_methods_that_look_for_no_events():
         assert of["standing_end"] is True and strict(of) == of
 
 
-# Forces and impulses.
-
-
 def test_the_ground_s_impulse_is_what_momentum_and_weight_leave(kick, leap):
     for motion in (kick, leap):
         expected = motion.linear_momentum[-1] - motion.linear_momentum[0]
@@ -160,9 +152,6 @@ def test_peaks_by_hand(leap):
     forces[1] = 1e308  # what overflows is no number
     of = told(made(leap.model, forces=forces))
     assert of["peak_ground_force_N"] is of["peak_group_force_N"]["feet"] is None
-
-
-# Slips.
 
 
 def test_the_path_of_sliding_feet_tail_and_torso():

@@ -1,6 +1,4 @@
-"""Trajectories: what their fields must be, files that give them back bit by bit, motions between
-samples, against analytic ones; attitudes: products, rates, and angles by inversion.
-"""
+"""Trajectories, their files, and motions between samples; products and angles of attitudes."""
 
 import dataclasses
 import itertools
@@ -89,9 +87,6 @@ def test_unsound_fields_are_named():
             dataclasses.replace(FLIGHT, q=q)
 
 
-# Files.
-
-
 def test_load_returns_what_was_saved_bit_by_bit(tmp_path):
     """Equal motions make equal files; the suffix is added to any name."""
     path = tmp_path / "new" / "run.v2.npz"
@@ -153,9 +148,6 @@ def test_other_files_are_refused_without_unpickling_or_filling_the_memory(tmp_pa
             Trajectory.load(tmp_path / f"{name}.npz")
     np.savez_compressed(tmp_path / "small.npz", **own | {"info": "{}"})
     assert_same(dataclasses.replace(FLIGHT, info={}), Trajectory.load(tmp_path / "small.npz"))
-
-
-# Between samples.
 
 
 def test_resample_reproduces_the_samples():
