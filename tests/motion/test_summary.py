@@ -188,9 +188,11 @@ def test_a_rolling_torso_does_not_slip_and_a_spinning_one_does(rat):
         motion = dataclasses.replace(made(rat, q, t=t), v=v, contact=contact)
         wanted = 0.0 if rolls else radius * turn
         assert told(motion)["slip_m"]["torso"] == pytest.approx(wanted, abs=1e-6)
-    # a point in the air does not slip
+    # a point in the air does not slip, and one on the ground less by what its spring stretches
     points, forces = np.zeros((2, 3, 6, 3))
     points[:, 0, 0] = [0, 1, 3]
-    for force, slip in ((0, 0.0), (1, 2.0)):
+    for force, stretch, slip in ((0, 0.0, 0.0), (1, 0.0, 2.0), (1, 0.5, 1.0)):
         forces[1:, 0, 2] = force
-        assert told(made(rat, points=points, forces=forces))["slip_m"] == {"feet": slip}
+        motion = made(rat, points=points, forces=forces)
+        contact = dataclasses.replace(motion.contact, bristles=stretch * points[..., :2])
+        assert told(dataclasses.replace(motion, contact=contact))["slip_m"] == {"feet": slip}

@@ -61,6 +61,7 @@ def test_unsound_fields_are_named():
         ("t", lambda t: t[::-1], r"t\[1\] = 0\.39 .*0\.4"),
         ("t", lambda t: np.minimum(t, 0.2), r"t\[21\] = 0\.2 .*0\.2"),
         ("q", lambda q: q[:, :-1], r"q .*\(41, 10\).*\(41, 7 \+ 2m\)"),
+        ("q", lambda q: q[0], r"q .*\(11,\)"),
         ("q", lambda q: q[1:], r"q .*\(40, 11\): give \(41, 11\)"),
         ("q", lambda q: 2 * q, r"q\[\d+, 3:7\] .*norm 2"),
         ("q", lambda q: q * 1j, "q: .*complex128"),
@@ -73,6 +74,7 @@ def test_unsound_fields_are_named():
         ("linear_momentum", lambda p: p.T, r"linear_momentum .*\(3, 41\): give \(41, 3\)"),
         ("angular_momentum", lambda h: h * np.inf, r"angular_momentum\[0, 0\]: value inf"),
         ("info", lambda info: info | {"seconds": np.nan}, "info .*JSON"),
+        ("info", lambda info: info | {"seconds": np.zeros(2)}, "info .*JSON"),
         ("info", lambda info: [info], "info .*list"),
     ):
         with row(name, words), pytest.raises(ValueError, match=words):
