@@ -1,6 +1,4 @@
-"""Datasets with named dimensions and units, tables of a row a sample, and their files with every
-digit, NetCDF and CSV: of a flight, drops on the ground, and runs that end early.
-"""
+"""Datasets with named dimensions and units, tables of a row a sample, and their files."""
 
 import csv
 import dataclasses
@@ -49,9 +47,6 @@ def runs():
     q[1, 2] = 2
     own = {"mu": [0.1, 0.2, 0.3], "tail_mount": np.tile([0, -0.04, 0.004], (3, 1))}
     return dropped(q, 0.04, parameters=own, controller=tired)
-
-
-# Datasets.
 
 
 def test_coordinates_are_named_those_of_the_tail_as_their_model_calls_them():
@@ -163,9 +158,6 @@ def test_odd_facts_do_not_stop_a_file(tmp_path):
     assert json.loads(facts["info"]) == info
 
 
-# Tables.
-
-
 def read(path):
     """Columns by their names of a CSV file, by the csv module."""
     with path.open(encoding="utf-8", newline="") as stream:
@@ -201,9 +193,6 @@ def test_tables_of_runs_have_two_indices(runs, tmp_path):
     for heights in (table["z"], columns["z [m]"]):
         equal(heights, runs.q[..., 2].ravel())
     equal(columns["forces_feet_right_T_z [N]"][:21], runs[0].contact.forces[:, 2, 2])
-
-
-# Files, and libraries of extras: imported by those who ask for them, and missed by name.
 
 
 def test_files_are_whole_or_not_there(tmp_path, monkeypatch):

@@ -1,6 +1,4 @@
-"""How laws are searched for examples that break them, few quickly and many among the slow tests,
-what every call must keep, and what users give: numbers in every form, and what is no number at all.
-"""
+"""How laws are searched for examples that break them, what every call keeps, what users give."""
 
 import contextlib
 import copy

@@ -1,6 +1,4 @@
-"""Whatever they are given, functions of a model answer with finite numbers or refuse; trajectories,
-simulations, what acts in them, and plans before anything is derived are made or refused.
-"""
+"""Whatever they are given, functions and makers answer with finite numbers, or refuse."""
 
 import inspect
 

@@ -43,9 +43,6 @@ def test_the_kick_is_told_all(kick):
     assert all(re.search(r" at t = [\d.]+ s.*more than [\d.]+.*: \w", each) for each in told)
 
 
-# The ground, where a scene has one.
-
-
 def test_the_torso_s_depth_by_points_of_its_surface(rat):
     """At random attitudes; the lowest of 40,000 points of the ellipsoid."""
     surface = np.random.default_rng(3).normal(size=(40_000, 3))
@@ -97,9 +94,6 @@ def test_a_tenth_of_the_torso_s_length_is_allowed_and_more_where_it_has_contact_
         assert [each.split(":")[0] for each in told] == words
 
 
-# The tail through the torso.
-
-
 def through(points, parts=4000):
     """How deep polylines (P, 3) go into the unit ball, by points close together."""
     deepest, left, begin = 0.0, False, min(np.linalg.norm(points[0]), 1)
@@ -136,9 +130,6 @@ def test_a_tail_that_comes_back_into_the_torso_is_told(rat):
     assert f"{depth:.2g} of the way" in found and "t = 1 s" in found
 
 
-# Blows and bends.
-
-
 def test_blows_from_20_body_weights_on(rat):
     for weights, count in ((19.9, 0), (20.1, 1)):
         forces = np.zeros((3, 6, 3))
@@ -168,9 +159,6 @@ def test_bends_beyond_half_a_turn(rat):
         q = at_height(rat, 1.0)
         q[:, 7] = bend / 3
         assert ("degrees" in the(made(rat, q).warnings, "tail: segment 1")) is degrees
-
-
-# Where the model is, and where it is not.
 
 
 def test_files_and_pickles_keep_what_was_found(kick, rat, tmp_path):

@@ -1,6 +1,4 @@
-"""Moving films: as many frames as their speed asks for, all different, whole or not at all; views,
-that look from where they say, and the torso in a view: its outline, and what it hides.
-"""
+"""Moving films, whole or not at all; views, and the torso in a view: its outline, what it hides."""
 
 import dataclasses
 import os
@@ -140,9 +138,6 @@ def test_what_no_film_can_be_is_refused(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-# Encoders.
-
-
 def test_an_encoder_on_path_serves_and_may_fail_or_be_stopped(tmp_path, monkeypatch):
     """It leaves the old file, and does not outlive a stop by the user."""
     path, script = tmp_path / "a.mp4", tmp_path / "ffmpeg"
@@ -202,9 +197,6 @@ def test_views_that_are_none_are_refused():
         for refused in (views_of, lambda views: flight().filmstrip(views=views)):
             with row(views), pytest.raises(st.ViewError, match=words):
                 refused(views)
-
-
-# The torso.
 
 
 def surface(count=150):

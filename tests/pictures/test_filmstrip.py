@@ -1,6 +1,4 @@
-"""Filmstrips: equal scales, nothing hidden, moments that differ, ground where there is some; what
-stands on it, and what is below it.
-"""
+"""Filmstrips: equal scales, nothing hidden, moments that differ, ground where there is some."""
 
 import dataclasses
 from itertools import product

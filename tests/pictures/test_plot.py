@@ -1,6 +1,4 @@
-"""Plots over time: the panels asked for, on the axes given, without what stays zero; all figures
-are written whole or not at all, with equal bytes twice, and without global state.
-"""
+"""Plots over time; all figures have equal bytes twice, and leave global state alone."""
 
 import dataclasses
 import subprocess
@@ -138,9 +136,6 @@ def test_everything_is_labelled_and_legends_cover_nothing():
         assert axes.bbox.x0 <= box.x0 < box.x1 <= axes.bbox.x1
         bottom = axes.transData.inverted().transform((0, box.y0))[1]
         assert np.nanmin(lines) >= low and np.nanmax(lines) <= min(high, bottom)
-
-
-# All figures.
 
 
 def test_figures_are_the_same_twice_in_every_format_whatever_the_user_has_set(tmp_path):

@@ -1,6 +1,4 @@
-"""Ctrl-C: what takes long ends within a second, in one line from the command line, and keeps what
-is finished; nothing else is left behind.
-"""
+"""Ctrl-C: what takes long ends within a second, in one line, and keeps what is finished."""
 
 import json
 import os

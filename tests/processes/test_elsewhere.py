@@ -1,6 +1,4 @@
-"""Elsewhere all is the same: in children, pools and threads, of which there are as many as asked,
-as the environment says, as machine and container allow; and on systems without what POSIX has.
-"""
+"""Children, pools, threads and other systems give the same; how many threads there are."""
 
 import json
 import math
@@ -135,8 +133,6 @@ def test_a_number_of_threads_that_is_none_is_refused(monkeypatch):
     with pytest.raises(st.SimulationError, match="threads: value 2"):
         st.simulate(model, *start(model), threads=2)
 
-
-# Systems.
 
 # This system takes the part of another one, from which these names are gone before serpentail is
 # imported.

@@ -20,10 +20,10 @@ def kick():
     return simulated("kick")
 
 
-def flown(model, samples=41, spin=9.0):
+def flown(model, samples=41):
     """A tumble of a model."""
     q = np.concatenate([[0, 0, 0.5, 1, 0, 0, 0], 0.3 * np.cos(np.arange(model.layout.nt))])
-    v = np.concatenate([[0, 0, 1, spin, 1, 2], np.zeros(model.layout.nt)])
+    v = np.concatenate([[0, 0, 1, 9, 1, 2], np.zeros(model.layout.nt)])
     step = 0.2 / (samples - 1)
     return st.simulate(model, q, v, controller=st.Damping(1e-3), t_span=0.2, output_step=step)
 

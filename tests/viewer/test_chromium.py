@@ -1,6 +1,4 @@
-"""The page in a real browser, also in a notebook: it needs nothing else, seeks, switches, obeys
-keys, fits a phone.
-"""
+"""The page in a real browser, also in a notebook: it needs nothing else, seeks, obeys keys."""
 
 import dataclasses
 import time

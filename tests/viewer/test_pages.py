@@ -1,6 +1,4 @@
-"""Pages from the command line and in the frames of notebooks, and what cannot be a page: refused by
-one clear error, with no file touched.
-"""
+"""Pages from the command line and in notebooks, and what cannot be a page."""
 
 import dataclasses
 import json
@@ -45,15 +43,13 @@ def run(tmp_path, monkeypatch, capsys):
 
 
 def test_simulate_writes_a_page_of_what_was_done_before_it_failed(run):
-    few = ["--set", "most_steps=300", "--set", "start={height=0.1}", "--save", "cut.npz"]
+    few = ["--set", "most_steps=300", "--set", "start={height=0.1}"]
     status, out, err = run("simulate", KICK, "--view", "kick.html", *few)
     assert (status, out) == (2, "") and "t = " in err
-    data, cut = data_of(Path("kick.html")), st.Trajectory.load("cut.npz")
+    data = data_of(Path("kick.html"))
     (note,) = data["notes"]
-    assert note.endswith(err.strip()) and data["warnings"] == cut.warnings
-    assert 1 < data["runs"][0]["rows"] == len(cut.t) < 1201
-    assert run("view", "cut.npz")[0] == 0
-    assert Path("cut.html").read_bytes() == Path("kick.html").read_bytes()
+    assert note.endswith(err.strip()) and data["warnings"]
+    assert 1 < data["runs"][0]["rows"] < 1201
     options = ["--set", "duration=0.05", "--set", "mu=0.5", "--json", "-"]
     status, out, err = run("simulate", KICK, "--view", "kick.html", *options)
     assert (status, err, json.loads(out)["model"]) == (0, "", "kick")
@@ -100,9 +96,6 @@ def test_saved_motions_find_their_model_or_are_told_where_it_is(run, tmp_path, m
         assert run("view", "kick.npz")[0] == status, other
 
 
-# Refusals.
-
-
 def test_paths_and_names(tmp_path, flight):
     file = tmp_path / "file"
     file.write_text("no folder")
@@ -140,9 +133,6 @@ def test_motions_models_and_a_page_that_is_not_there(tmp_path, flight, monkeypat
     with pytest.raises(st.ViewError, match=r"Node\.js 18 .*make setup"):
         flight.view(path)
     assert path.read_text() == "before"
-
-
-# Notebooks.
 
 
 class Output(HTMLParser):
