@@ -9,7 +9,7 @@ from serpentail.model.stepping.singly import SingleSteps
 from tests.support import zoo
 from tests.support.models import folder_of
 
-from ...c.batches.ground import TOUCHING, states
+from ...c.batches.tails import TOUCHING, on_ground
 from ...support.rows import row
 
 H = 2e-4  # s
@@ -22,7 +22,7 @@ OWN = {"tail_mass": (0.008, 0.02), "gravity": (0, 9), "mu": (0.1, 1.5)}
 def runs_of(model, count=RUNS, seed=5, touching=TOUCHING):
     """Arguments of steps by name, all runs different; on the ground legs move at 2 rad/s or so."""
     if model.contacts:
-        values = states(model, (list(touching) * count)[:count], seed)
+        values = on_ground(model, (list(touching) * count)[:count], seed)
         values.pop("angles")
         values["legs"][:, 4:] *= 20
         if "feet" not in model.contacts:
