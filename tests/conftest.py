@@ -7,6 +7,7 @@ from importlib.util import find_spec
 
 import pytest
 
+from serpentail.model.calls import extension
 from tests.support.models import choose_compiler
 
 # of extras that `make test` does not install
@@ -34,6 +35,11 @@ def pytest_configure(config):
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if os.environ.get("CI") and missing():
         raise pytest.UsageError(f"in CI every test runs, but {', '.join(missing())} is missing")
+
+
+def pytest_sessionstart(session):
+    """Compile what makes calls, before a test tries what happens where that cannot be had."""
+    extension()
 
 
 def missing():

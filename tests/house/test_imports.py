@@ -52,7 +52,7 @@ def test_heavy_packages_are_loaded_by_those_who_use_them():
     assert "serpentail.viewer" not in loaded(later)
     # instead of its time, which hangs on the machine: typing, contextlib and importlib
     few = (
-        "import sys; old = {*sys.modules}; import serpentail; assert len({*sys.modules} - old) < 20"
+        "import sys; old = {*sys.modules}; import serpentail; assert len({*sys.modules} - old) < 40"
     )
     assert loaded(few) == set()
     of_tapes = "import " + ", ".join(f"serpentail_codegen.{name}" for name in BARE)

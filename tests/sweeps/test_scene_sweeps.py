@@ -78,6 +78,7 @@ def test_the_command_makes_the_rows_of_a_scene_and_goes_on(study, capsys):
 
 
 def test_rows_are_saved_for_other_tools(study):
+    pytest.importorskip("pyarrow")
     axes = {"start.pitch": st.latin(-0.5, 0.5), "tail_mass": st.grid([0.003, -1])}
     found = st.sweep(study, axes, points=3, seed=1, outputs=["end_s", "q_end"])
     folder, rows = study.parent, found.rows()

@@ -4,6 +4,7 @@ import copy
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 import serpentail as st
 from serpentail.verification import report as verify
@@ -71,6 +72,8 @@ def test_every_slight_fault_is_not_what_the_program_means():
 
 def test_every_slight_fault_disagrees_with_references():
     """Those of all functions together, too: of another animal, which obeys the laws."""
+    for library in ("pinocchio", "mujoco"):
+        pytest.importorskip(library)
     model = alone("m1_n3")
     inertia = [x * (1 + SLIGHT_FAULT) for x in model.parameters["torso_inertia"]]
     other = model.with_parameters(torso_inertia=inertia)

@@ -1,5 +1,6 @@
 """Independent references agree: libraries with 40 digits, and 40 digits with Lagrange and more."""
 
+import importlib
 from itertools import product
 
 import casadi as ca
@@ -27,7 +28,8 @@ def states_of(segments, kind):
 @pytest.mark.parametrize("name", ["Pinocchio", "Mujoco"])
 @pytest.mark.parametrize("given", [{}, INERTIA], ids=["ellipsoids", "given inertias"])
 def test_libraries_agree_with_40_digits(name, given):
-    module = pytest.importorskip(f"tests.references.{name.lower()}_chain", exc_type=ImportError)
+    pytest.importorskip(name.lower())
+    module = importlib.import_module(f"tests.references.{name.lower()}_chain")
     for size, kind in product([(1, 1), (1, 3), (3, 4)], KINDS):
         chain = getattr(module, f"{name}Chain")(TABLE_1 | given, *size)
         exact = ExactChain(TABLE_1 | given, *size)

@@ -3,6 +3,7 @@
 import copy
 import json
 import re
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ OTHERS = [name for name in zoo.ZOO if name not in (*SOUND, "polar")]  # polar on
 REASONS = {f"only for {kind} models" for kind in ("double", "articulated", "contact", "passive")}
 REASONS |= {"no even m or n of links", "only for a torso that moves", verify_model.PLAIN}
 REASONS |= {"the passive tail cannot be left out: parameters are baked"}
+REASONS |= {f"No module named {x!r}" for x in ("pinocchio", "mujoco") if find_spec(x) is None}
 OTHER_NUMBERS = {  # of a large animal, and of one without weight
     "m2_n2": {"torso_mass": 60.0, "torso_inertia": [2.0, 1.5, 3.0], "tail_mass": 5.0},
     "m1_n3": {"gravity": 0.0, "tail_mass": 0.05},
@@ -67,6 +69,7 @@ def test_long_tails_and_long_segments_pass(segments, links):
 
 
 def test_what_was_left_out_is_said():
+    pytest.importorskip("pinocchio")
     model = alone("bare")
     checks = verify_model.judge(model)
     omitted = {c.name: c.omitted for c in checks if c.omitted}
