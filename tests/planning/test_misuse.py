@@ -193,7 +193,7 @@ def test_bounds_and_durations_may_have_units_and_slips_of_units_give_a_warning()
         np.testing.assert_allclose(getattr(texts.bounds, name), wanted, rtol=1e-15)
     for words, duration, bounds in (
         ('duration: value 6 s: .*"6 ms"', 6.0, Bounds()),
-        ('torque: value 20 N m: .*"20 mN m"', 0.4, Bounds(torque=20)),
+        ('torque: value 20 N m: .*did you mean "20 mN m"', 0.4, Bounds(torque=20)),
         ('angle: value 60 rad: .*"60 deg"', 0.4, Bounds(angle=60)),
     ):
         with row(words), pytest.warns(st.UnusualSize, match=words):

@@ -100,3 +100,22 @@ def test_rods_lie_between_their_points():
     begins = found.positions - along * found.scales[:, 2:] / 2
     np.testing.assert_allclose(begins, points[:, :-1].reshape(-1, 3), atol=1e-12)
     assert np.isfinite(found.wxyzs).all() and (found.scales[:, :2] == 0.1).all()
+
+
+def test_a_browser_sees_it_and_the_terminal_does_not_tell_of_it(view, capfd):
+    pytest.importorskip("selenium")
+    from selenium.webdriver.support.ui import WebDriverWait
+
+    from tests.support import chromium
+    from tests.support.page import need
+
+    need(chromium.need_chromium)
+    with chromium.chromium() as driver:
+
+        def shown(_):
+            return "t = 0.1000 s" in driver.execute_script("return document.body.innerText")
+
+        driver.get(view.url)
+        view(dropped())
+        assert WebDriverWait(driver, 60).until(shown)
+    assert "Connection" not in "".join(capfd.readouterr())

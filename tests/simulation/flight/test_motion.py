@@ -164,3 +164,11 @@ def test_a_kink_beside_a_sample_takes_no_step_of_its_own(method):
         assert flight.info["steps"] <= 2000 + len(kinks)
         fallen = flight.linear_momentum[0, 2] - flight.linear_momentum[:, 2]
         np.testing.assert_allclose(fallen, weight * flight.t, rtol=0, atol=1e-5 * weight)
+
+
+def test_the_c_numbers_its_statuses_one_by_one():
+    names = "PAUSED STEP_TOO_SMALL TOO_MANY_STEPS STOPPED_AT_EVENT TORQUE_FAILED NO_SUCH_METHOD "
+    names += "STEP_TOO_LONG BAD_TIMES"
+    header = (zoo.folder("m2_n2") / "include" / "m2_n2_simulation.h").read_text()
+    for number, name in enumerate(names.split(), 32):
+        assert f"M2_N2_{name} = {number}" in header

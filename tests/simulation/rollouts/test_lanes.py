@@ -8,6 +8,7 @@ import pytest
 import serpentail as st
 from serpentail.model.snapshot import model_library
 from serpentail.simulation import batched_runs, parallel_runs
+from serpentail.simulation.adaptive_runs import AdaptiveRuns
 from tests.support import zoo
 from tests.support.rows import row
 
@@ -208,3 +209,21 @@ def test_pilots_tell_whether_compiling_pays(priced, monkeypatch, price, lanes):
     found, flights = both(model, *starts(model, 19), compare=near, **how)
     assert found.info["abreast"] == lanes and found.errors == [None] * 19
     np.testing.assert_array_equal(found.q[:5], [flight.q for flight in flights[:5]])
+
+
+def test_sound_flights_are_made_abreast_and_no_second_time(monkeypatch):
+    """A group that fails is made singly, run by run: none of these may."""
+    go, again = AdaptiveRuns.go, []
+
+    def told(self, runs, ended):
+        for numbers, outcome in go(self, runs, ended):
+            again.extend([] if outcome else numbers)
+            yield numbers, outcome
+
+    monkeypatch.setattr(AdaptiveRuns, "go", told)
+    q, v = starts(tail(), 19)
+    found = st.simulate(tail(), q, v, t_span=0.3, method="tsit5")
+    assert again == [] and found.errors == [None] * 19
+    monkeypatch.setattr(parallel_runs, "RunsInTurn", lambda *_: pytest.fail("in turn"))
+    for law in (None, DAMPING, TABLE, JUMPS):
+        st.simulate(tail(), q, v, controller=law, **RK4)
