@@ -17,6 +17,7 @@ from hypothesis import strategies as some
 from hypothesis.extra import numpy as arrays
 
 import serpentail as st
+from tests.support.forms import Foreign
 from tests.support.models import BUILD
 
 configuration.set_hypothesis_home_dir(BUILD / "hypothesis")  # not in the checkout
@@ -99,13 +100,6 @@ def finite(thing) -> bool:
 EXTREMES = (0.0, -0.0, 5e-324, 1e-308, 1e-160, 1e160, 1e308, np.nan, np.inf, -np.inf)
 NUMBERS = some.one_of(some.floats(-3, 3), some.sampled_from(EXTREMES), some.floats())
 SHAPES = arrays.array_shapes(min_dims=0, max_dims=3, min_side=0, max_side=13)
-
-
-class Foreign:
-    """An array of another package that refuses to be read."""
-
-    def __array__(self, *_args, **_options):
-        raise RuntimeError("no numbers in here")
 
 
 class Growing:

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import strategies as some
 
 import serpentail as st
-from tests.model.methods.conftest import SOUND
 from tests.motion.conftest import fields, motion
 from tests.support import zoo
+from tests.support.forms import SOUND
 from tests.support.posed import posed
 from tests.support.rows import row
 

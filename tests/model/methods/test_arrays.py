@@ -12,9 +12,10 @@ from scipy.spatial.transform import Rotation
 import serpentail as st
 from serpentail_codegen.scene.signatures.table import ALL, NEEDS
 from tests.support import zoo
+from tests.support.forms import SOUND, Foreign
 
 from ...support.rows import row
-from .conftest import ARGUMENTS, CALLS, SIZES, SOUND, assert_same, call, shapes, state, states
+from .conftest import ARGUMENTS, CALLS, SIZES, assert_same, call, shapes, state, states
 
 ELSEWHERE = {"rollout", "implicit", *NEEDS}  # tested in files of their own
 ONE = "forward_dynamics_external"  # on which every form and every wrong value is tried
@@ -84,13 +85,6 @@ def of_arguments(rows):
 def refuse(model, name, arguments, words):
     with pytest.raises(st.StateError, match=f"^{name}: {words}"):
         call(model, name, arguments)
-
-
-class Foreign:
-    """An array of another package that refuses to be read."""
-
-    def __array__(self, *_args, **_options):
-        raise RuntimeError("no numbers in here")
 
 
 def test_other_things_than_real_numbers_are_refused(model):
