@@ -15,7 +15,7 @@ import numpy as np
 import serpentail as st
 from serpentail.building.generator import generate
 from serpentail.model.compiler import compile_library
-from serpentail_codegen.scene.signatures.table import DERIVATIVES
+from serpentail_scene.signatures.table import DERIVATIVES
 
 from .comparison import compared
 from .fixtures import by_clang, fixture, label

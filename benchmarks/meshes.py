@@ -20,7 +20,7 @@ from benchmarks.fixtures import built, label
 from examples import righting
 from serpentail.planning.condensed import fatrop
 from serpentail.planning.condensed.helpers import helped
-from serpentail_codegen.scene.signatures.table import AIRBORNE, EXACT_DERIVATIVES
+from serpentail_scene.signatures.table import AIRBORNE, EXACT_DERIVATIVES
 
 NODES, ROUNDS = 64, 300
 DYNAMICS = ((1, 3), (3, 4))

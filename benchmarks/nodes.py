@@ -21,7 +21,7 @@ from serpentail.planning.nlp.node_calls import MappedNode
 from serpentail.planning.problem import SMOOTHING, PlanningProblem
 from serpentail_codegen.functions.catalogue import CATALOGUE
 from serpentail_codegen.functions.tail import Tail
-from serpentail_codegen.scene.signatures.table import AIRBORNE, EXACT_DERIVATIVES
+from serpentail_scene.signatures.table import AIRBORNE, EXACT_DERIVATIVES
 
 SIZES = ((1, 3), (3, 2), (6, 2), (2, None))
 NODES, ROUNDS = 64, 20

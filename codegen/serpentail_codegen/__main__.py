@@ -8,12 +8,13 @@ import time
 from pathlib import Path
 from typing import Any
 
+from serpentail_scene.signatures.table import ALL
+
 from .scene.naming import suffix
 from .scene.parse import load_scene, parse_scene, scene_for, scene_to_dict
 from .scene.problems import Problem, SceneError
 from .scene.scene import KINDS, Scene
 from .scene.schema import scene_schema
-from .scene.signatures.table import ALL
 from .stamp import is_made, key_of, note
 
 

@@ -8,13 +8,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from serpentail_scene.layout import QUATERNION, TORSO_NQ, TORSO_Q, Layout
+
 from .checks import finite_array
 from .errors import StateError
-from .model.layout import QUATERNION, TORSO_NQ
 
 Array = NDArray[np.float64]
 Entries = Sequence[Any] | Array  # numbers, arrays or CasADi expressions, one after another
 TURN = 2 * np.pi
+REST = np.array([0.0, 0, 0, 1, 0, 0, 0])  # place and quaternion of a fixed base
+REST.setflags(write=False)
+
+
+def pose_of(q: NDArray[Any], layout: Layout) -> NDArray[Any]:
+    """Return place and quaternion (..., 7) of the torso in configurations q (..., nq).
+
+    A fixed base is at the world's origin, in its axes.
+    """
+    return np.broadcast_to(REST, (*q.shape[:-1], TORSO_NQ)) if layout.fixed else q[..., TORSO_Q]
 
 
 def product(a: Entries, b: Entries) -> list[Any]:

@@ -12,8 +12,9 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from serpentail_scene.units import in_unit
+
 from .errors import SerpentailError, StateError
-from .units import in_unit
 
 Error = type[Exception]
 T = TypeVar("T")

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from serpentail_scene.units import DEEPEST, plain
+
 from .errors import UnusualSize
-from .units import DEEPEST, plain
 
 LARGEST = {  # unit -> most, in words, and the unit that may have been meant
     "kg": (1e4, "10 t", "g"),

@@ -25,7 +25,7 @@ from serpentail_codegen.scene.parameters import PARAMETERS
 from serpentail_codegen.scene.parse import load_scene, parse_scene
 from serpentail_codegen.scene.passive import PASSIVE
 from serpentail_codegen.scene.scene import KEYS
-from serpentail_codegen.scene.signatures.table import NEEDS
+from serpentail_scene.signatures.table import NEEDS
 from tests.support import zoo
 from tests.support.models import folder_of
 from tests.support.scenes import SCENES

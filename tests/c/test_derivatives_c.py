@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from serpentail_codegen.ir.interpret import Numbers, Run
-from serpentail_codegen.scene.signatures.table import DERIVATIVES
+from serpentail_scene.signatures.table import DERIVATIVES
 from tests.references.metrics import equilibrated_condition
 from tests.support import zoo
 from tests.support.derivative_models import jacobian_error, nest_of, parameters_of

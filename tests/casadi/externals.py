@@ -6,7 +6,7 @@ from functools import cache
 import casadi
 import numpy as np
 
-from serpentail_codegen.scene.signatures.table import EXACT_DERIVATIVES
+from serpentail_scene.signatures.table import EXACT_DERIVATIVES
 from tests.references.parameters import random_states
 from tests.support import collocation, zoo
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail_codegen.scene.signatures.table import EXACT_DERIVATIVES
+from serpentail_scene.signatures.table import EXACT_DERIVATIVES
 from tests.references.parameters import random_states
 from tests.support import collocation, zoo
 from tests.support.models import folder_of

@@ -13,7 +13,7 @@ from serpentail.cli import ROOMS, arguments_of
 from serpentail.model.model import Model
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.scene.parameters import PARAMETERS
-from serpentail_codegen.scene.signatures.table import ALL, SIGNATURES
+from serpentail_scene.signatures.table import ALL, SIGNATURES
 from tests.docs.running import PAGES, ROOT, blocks
 from tests.support import zoo
 from tests.support.rows import row

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from serpentail_codegen.scene.signatures.table import DERIVATIVES
+from serpentail_scene.signatures.table import DERIVATIVES
 from tests.references.metrics import block_error
 from tests.support.derivative_models import (
     FIRST,

@@ -9,8 +9,8 @@ from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.scene.shape import Shape
-from serpentail_codegen.scene.signatures.table import FIXED
 from serpentail_codegen.targets.c.straight import straight_line
+from serpentail_scene.signatures.table import FIXED
 from tests.support import zoo
 from tests.support.rows import row
 

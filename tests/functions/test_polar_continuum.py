@@ -15,7 +15,7 @@ from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.mechanics import polar_arc
-from serpentail_codegen.scene.signatures.table import VALUES
+from serpentail_scene.signatures.table import VALUES
 from tests.references.exact_polar import ExactPolar
 from tests.references.metrics import block_error, equilibrated_condition, mass_matrix_error
 from tests.references.parameters import TABLE_1

@@ -13,7 +13,7 @@ import pytest
 
 from serpentail import cli
 from serpentail.verification import report as verify
-from serpentail_codegen.scene.signatures.table import SIGNATURES
+from serpentail_scene.signatures.table import SIGNATURES
 from tests.support import zoo
 from tests.support.rows import row
 from tests.support.told import besides_progress

@@ -13,9 +13,9 @@ from serpentail_codegen.scene.parse import parse_scene, scene_for, scene_to_dict
 from serpentail_codegen.scene.problems import SceneError
 from serpentail_codegen.scene.resolve import resolve_parameters
 from serpentail_codegen.scene.scene import Scene
-from serpentail_codegen.scene.signatures import table as functions
-from serpentail_codegen.scene.signatures.signature import ALWAYS, CALLED, GROUND, NAMED
-from serpentail_codegen.scene.signatures.table import ALL, DEFAULT, FIXED, SIGNATURES
+from serpentail_scene.signatures import table as functions
+from serpentail_scene.signatures.signature import ALWAYS, CALLED, GROUND, NAMED
+from serpentail_scene.signatures.table import ALL, DEFAULT, FIXED, SIGNATURES
 from tests.support.rows import row
 from tests.support.scenes import VALID
 

@@ -10,10 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as some
 from mpmath import mp, mpf
 
-import serpentail.units
-import serpentail_codegen.scene.units
+import serpentail_scene.units
 from serpentail_codegen.scene.parameters import PARAMETERS
-from serpentail_codegen.scene.units import MEASURES, dimensions, in_unit, pattern, plain
+from serpentail_scene.units import MEASURES, dimensions, in_unit, pattern, plain
 from tests.support.rows import row
 from tests.support.scenes import VALID
 
@@ -71,7 +70,7 @@ def test_every_unit_is_tested_and_both_packages_have_the_same_file():
     tested = {(plain(w), plain(u)) for w, u, _ in (*SHIFTS, *ANGLES)} | {("km/h", "m/s")}
     known = {(w, u) for u, (_, units) in MEASURES.items() for w in units}
     assert known == tested
-    modules = serpentail.units, serpentail_codegen.scene.units
+    modules = serpentail_scene.units, serpentail_scene.units
     assert len({Path(m.__file__).read_bytes() for m in modules}) == 1
     assert {p.name for p in PARAMETERS if plain(p.unit) not in MEASURES} == {"mu"}
 

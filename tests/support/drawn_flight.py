@@ -6,8 +6,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from serpentail.attitude import rotation_matrix
-from serpentail.model.layout import Layout
 from serpentail.motion.trajectory import Trajectory
+from serpentail_scene.layout import Layout
 
 SEMI_AXES = np.array([0.0315, 0.0495, 0.027])
 MOUNT = np.array([0, -0.0405, 0.0045])

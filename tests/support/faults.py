@@ -7,8 +7,8 @@ import numpy as np
 import serpentail as st
 from serpentail.verification import report as verify
 from serpentail.verification import states
-from serpentail_codegen.scene.signatures.signature import IMPLICIT
-from serpentail_codegen.scene.signatures.table import NEEDS, in_group
+from serpentail_scene.signatures.signature import IMPLICIT
+from serpentail_scene.signatures.table import NEEDS, in_group
 from tests.support import zoo
 
 SLIGHT_FAULT = 1e-9

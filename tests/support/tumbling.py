@@ -6,7 +6,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import serpentail as st
-from serpentail_codegen.scene.signatures.table import EXACT_DERIVATIVES
+from serpentail_scene.signatures.table import EXACT_DERIVATIVES
 from tests.support import zoo
 from tests.support.models import model_folder
 

@@ -17,7 +17,7 @@ from typing import Any
 import serpentail as st
 from serpentail_codegen.scene.parse import parse_scene
 from serpentail_codegen.scene.scene import Scene
-from serpentail_codegen.scene.signatures.table import VALUES
+from serpentail_scene.signatures.table import VALUES
 from tests.support import models
 
 GROUND = {"contacts": ["feet", "tail", "torso"]}

@@ -12,7 +12,7 @@ import serpentail as st
 from serpentail.verification import errors, law, states
 from serpentail.verification import report as verify
 from serpentail_codegen.functions.catalogue import CATALOGUE
-from serpentail_codegen.scene.signatures.table import AIRBORNE, DERIVATIVES, NEEDS
+from serpentail_scene.signatures.table import AIRBORNE, DERIVATIVES, NEEDS
 from tests.references import metrics
 from tests.support import models, zoo
 from tests.support.faults import TAKING_MORE, alone, broken, failed, not_a_number

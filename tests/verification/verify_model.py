@@ -16,7 +16,6 @@ from pathlib import Path
 import numpy as np
 
 import serpentail as st
-from serpentail.model.layout import TAIL_Q, TAIL_V, TORSO_NQ
 from serpentail.model.passive import PARTS
 from serpentail.verification.errors import block_error, differences, matrix_error
 from serpentail.verification.law import VALUE_LIMIT, Law, rid_of
@@ -28,8 +27,9 @@ from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.pipeline import generate, tail_of
 from serpentail_codegen.scene.parse import parse_scene
 from serpentail_codegen.scene.passive import PASSIVE_NAMES
-from serpentail_codegen.scene.signatures.signature import CONTACT, IMPLICIT, SIMULATION
-from serpentail_codegen.scene.signatures.table import in_group
+from serpentail_scene.layout import TAIL_Q, TAIL_V, TORSO_NQ
+from serpentail_scene.signatures.signature import CONTACT, IMPLICIT, SIMULATION
+from serpentail_scene.signatures.table import in_group
 
 STRICT_LIMIT = 22.5  # roundings: 5e-15 in double
 # what H sums cancels in a folded tail: libraries are off by 1e-14 to 2e-14 there

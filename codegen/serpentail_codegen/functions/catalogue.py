@@ -2,7 +2,8 @@
 table.
 """
 
-from ..scene.signatures.table import SIGNATURES
+from serpentail_scene.signatures.table import SIGNATURES
+
 from . import contact, fixed_base, pfl
 from .airborne import curvature as airborne
 from .derivatives import by_parameters, hessian, jacobians
@@ -26,7 +27,7 @@ CATALOGUE = {name: _FOUND[name] for name, s in SIGNATURES.items() if s.outputs}
 
 def function_of(name: str, tail: Tail) -> Function:
     """Return a function of a tail, with the arguments that it has for that tail."""
-    return (fixed_base.FUNCTIONS if tail.shape.fixed else CATALOGUE)[name].of(tail)
+    return (fixed_base.FUNCTIONS if tail.fixed else CATALOGUE)[name].of(tail)
 
 
 SYMBOLIC = {name for name in CATALOGUE if SIGNATURES[name].symbolic}  # in the CasADi module

@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
+from serpentail_scene.signatures.table import SIGNATURES
+
 from ..ir.builder import Builder, narrowed
 from ..ir.program import Index, Ref
 from ..ir.step import Step, specialised
@@ -13,7 +15,6 @@ from ..ir.tape import Number
 from ..mechanics.lower import declared_shapes, derive
 from ..scene.parameters import Parameter
 from ..scene.shape import Stretch
-from ..scene.signatures.table import SIGNATURES
 from .scope import Instead, Scope, Vectors
 from .tail import Tail
 

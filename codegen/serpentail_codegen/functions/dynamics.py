@@ -3,13 +3,15 @@
 from dataclasses import replace
 from functools import partial
 
+from serpentail_scene.layout import OMEGA, TORSO_NV, VELOCITY
+from serpentail_scene.signatures.arguments import TAU, V_DOT, Argument, Q, V
+
 from ..ir.program import Array, Index, Ref
 from ..mechanics import rotations, torso
-from ..scene.signatures.arguments import TAU, V_DOT, Argument, Q, V
 from .draft import Draft
 from .factored import FactoredDynamics, factored_dynamics
 from .function import Assembly, Function, assemble
-from .layout import OMEGA, TORSO_NV, VELOCITY, block, segment_v
+from .layout import block, segment_v
 from .passive import add_elastic_energy, add_passive_forces, net_torques
 from .scope import Motion, State, Vectors
 from .sweeps.inertia import column_of, tail_inertia

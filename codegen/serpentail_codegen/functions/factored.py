@@ -3,12 +3,14 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from serpentail_scene.layout import OMEGA, VELOCITY
+from serpentail_scene.signatures.arguments import Argument, Q, V
+
 from ..ir.program import Array, Index, Ref, padded
 from ..mechanics import rotations, translation
-from ..scene.signatures.arguments import Argument, Q, V
 from .draft import Draft
 from .function import Function, assemble
-from .layout import OMEGA, VELOCITY, block, tail_v
+from .layout import block, tail_v
 from .scope import Instead, Scope, State, Vectors
 from .sweeps.columns import factored_dynamics_by_columns
 from .sweeps.inertia import column_of, tail_inertia

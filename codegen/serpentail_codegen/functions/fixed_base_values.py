@@ -1,9 +1,11 @@
 """The state of a tail on a fixed base, and its values: energy, momentum and positions."""
 
+from serpentail_scene.layout import POSITION, QUATERNION, TORSO_NQ, TORSO_NV
+
 from ..ir.program import Array
 from ..mechanics import resting
 from .draft import Draft
-from .layout import POSITION, QUATERNION, TORSO_NQ, TORSO_NV, block
+from .layout import block
 from .passive import add_elastic_energy
 from .scope import State, Vectors
 from .sweeps.inertia import column_of, forward_roots, gather_inertia, segment_roots

@@ -4,9 +4,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 
+from serpentail_scene.signatures.arguments import Argument
+from serpentail_scene.signatures.table import SIGNATURES
+
 from ..ir.program import Array, Program
-from ..scene.signatures.arguments import Argument
-from ..scene.signatures.table import SIGNATURES
 from .draft import Draft
 from .tail import Tail, struct_parameters
 

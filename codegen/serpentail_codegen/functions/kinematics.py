@@ -1,9 +1,11 @@
 """The tail's points and their Jacobians."""
 
+from serpentail_scene.layout import OMEGA, TORSO_NV
+
 from ..ir.program import Array, Index, Ref
 from ..mechanics import loads, torso
 from .draft import Draft
-from .layout import OMEGA, TORSO_NV, coordinate, tail_v
+from .layout import coordinate, tail_v
 from .scope import State
 from .sweeps.inertia import column_of, forward_roots, gather_inertia, segment_roots
 from .sweeps.pieces import (

@@ -1,9 +1,11 @@
 """Partial feedback linearisation: the torques that give the tail wanted accelerations."""
 
+from serpentail_scene.layout import OMEGA, VELOCITY
+
 from ..ir.program import Array, padded
 from ..mechanics import rotations, torso, translation
 from .draft import Draft
-from .layout import OMEGA, VELOCITY, block, coordinates, tail_v
+from .layout import block, coordinates, tail_v
 from .passive import add_passive_forces
 from .scope import Motion, State, Vectors
 from .sweeps.inertia import column_of, forward_roots, gather_inertia, segment_roots

@@ -7,8 +7,10 @@ declares.
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, VELOCITY
+
 from ..ir.program import Array, Index, Ref
-from .layout import OMEGA, POSITION, QUATERNION, VELOCITY, block, segment_q, segment_v
+from .layout import block, segment_q, segment_v
 
 
 class Scope:

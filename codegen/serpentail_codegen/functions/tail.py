@@ -3,24 +3,27 @@
 from dataclasses import dataclass, replace
 from math import pi
 
-from ..ir.program import padded
+from serpentail_scene.layout import TORSO_NQ, TORSO_NV, Sizes
+
+from ..ir.program import Array, Ref, padded
 from ..scene.parameters import Parameter
 from ..scene.resolve import parameters_of
 from ..scene.scene import Scene
 from ..scene.shape import EQUAL, Run, Shape, Stretch, runs_of, stretches_of
-from .layout import LOAD, Layout
+from .layout import LOAD
 
 SPRING = 18  # numbers of a point's linearised contact
 
 
 @dataclass(frozen=True)
-class Tail(Layout):
+class Tail(Sizes):
     """Sizes of a tail of m segments.
 
     They have n links each; or n samples each in a continuum, bent by bend_range at most; or both in
     a "mixed" tail, whose arcs have n samples. ``shape`` says how segments and links differ.
     """
 
+    segments: int
     links: int
     kind: str = "articulated"
     bend_range: float = 2 * pi
@@ -47,14 +50,17 @@ class Tail(Layout):
         return replace(self.shape, weightless=False) == EQUAL
 
     @property
-    def nq(self) -> int:
-        """Length of q, 7 + nt; with a fixed base nt, the tail coordinates alone."""
-        return self.nt if self.shape.fixed else super().nq
+    def fixed(self) -> bool:  # type: ignore[override]
+        """Tell if the torso never moves."""
+        return self.shape.fixed
 
-    @property
-    def nv(self) -> int:
-        """Length of v, 6 + nt; with a fixed base nt, the rates of the tail coordinates alone."""
-        return self.nt if self.shape.fixed else super().nv
+    def all_q(self, q: Array) -> Ref:
+        """Return all tail coordinates."""
+        return q.part(TORSO_NQ, self.nt)
+
+    def all_v(self, v: Array) -> Ref:
+        """Return the rates, accelerations or forces of all tail coordinates."""
+        return v.part(TORSO_NV, self.nt)
 
     @property
     def torso_nv(self) -> int:

@@ -9,11 +9,12 @@ from dataclasses import dataclass
 from math import pi, prod
 from typing import Any
 
+from serpentail_scene.units import dimensions, in_unit
+
 from .checks import is_finite
 from .parameters import PARAMETERS, Parameters, Value
 from .passive import PASSIVE
 from .problems import Problem, suggest
-from .units import dimensions, in_unit
 
 # Exponents of the body mass: bone lengths of legs, Alexander, Jayes, Maloiy & Wathuta, J. Zool. 189
 # (1979) 305-314; times of a stride at equivalent speeds, Heglund & Taylor, J. Exp. Biol. 138 (1988)

@@ -4,6 +4,8 @@ import sys
 from collections.abc import Collection, Mapping
 from typing import Any
 
+from serpentail_scene.signatures.table import AIRBORNE, ALL, DERIVATIVES, FIXED, NEEDS
+
 from .parameters import PARAMETERS, SINGLE, Parameter, Value
 from .passive import PARTS, PASSIVE_NAMES
 from .problems import Problem, suggest
@@ -18,7 +20,6 @@ from .scene import (
     foreign_to,
     is_whole,
 )
-from .signatures.table import AIRBORNE, ALL, DERIVATIVES, FIXED, NEEDS
 
 
 def plain(value: Value) -> float | list[float]:

@@ -8,6 +8,17 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from serpentail_scene.signatures.table import (
+    ALL,
+    DEFAULT,
+    DEFAULT_ON_GROUND,
+    DERIVATIVES,
+    FIXED,
+    NEEDS,
+)
+from serpentail_scene.source import tables_of
+from serpentail_scene.units import in_unit
+
 from .body import OF_TORSO, body_of, scaled
 from .checks import (
     contact_problems,
@@ -41,16 +52,6 @@ from .scene import (
 )
 from .segments import are_tables, tell_values
 from .shape import EQUAL
-from .signatures.table import (
-    ALL,
-    DEFAULT,
-    DEFAULT_ON_GROUND,
-    DERIVATIVES,
-    FIXED,
-    NEEDS,
-)
-from .source import tables_of
-from .units import in_unit
 
 
 def load_scene(path: str | Path) -> Scene:

@@ -5,6 +5,8 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import Any
 
+from serpentail_scene.units import in_unit
+
 from .checks import fits, number_problem, plain, unknown_keys
 from .cone import ellipsoid, single
 from .parameters import PARAMETERS, Parameter, Parameters, Value
@@ -20,7 +22,6 @@ from .scene import NAMES, foreign_to
 from .segment_tables import flattened
 from .segments import RADIUS
 from .shape import EQUAL, Shape
-from .units import in_unit
 
 HAS_NOT = {  # why a tail or a base has no such parameters
     "equal": "each piece of this tail has a value of its own",

@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from serpentail_scene.signatures.table import DEFAULT
+
 from .parameters import ANY, PARAMETERS, Parameters, Rule
 from .passive import PASSIVE_NAMES, parts_of
 from .shape import EQUAL, Shape
-from .signatures.table import DEFAULT
 
 KINDS = ("articulated", "continuum", "mixed")
 GROUPS = ("feet", "tail", "torso")  # of contact points, in their order

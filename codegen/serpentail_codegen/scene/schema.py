@@ -7,13 +7,14 @@ their keys.
 from collections.abc import Mapping
 from typing import Any
 
+from serpentail_scene.signatures.table import ALL
+from serpentail_scene.units import MEASURES, choices, pattern, plain
+
 from .checks import plain as as_data
 from .parameters import PARAMETERS, Parameter
 from .passive import PASSIVE
 from .scene import COUNT, KEYS, ONLY, foreign_to
 from .segment_tables import TAPER, VALUES, Key
-from .signatures.table import ALL
-from .units import MEASURES, choices, pattern, plain
 
 DRAFT = "http://json-schema.org/draft-07/schema#"
 

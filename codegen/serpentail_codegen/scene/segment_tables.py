@@ -4,11 +4,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from serpentail_scene.units import in_unit
+
 from .checks import is_finite
 from .parameters import ANY, NOT_NEGATIVE, POSITIVE, Rule
 from .problems import Problem, suggest
 from .scene import COUNT
-from .units import in_unit
 
 Numbers = Mapping[str, tuple[float, ...]]  # the numbers of a table by key, in SI units
 PIECES = {"articulated": "links", "continuum": "samples"}

@@ -7,6 +7,9 @@ others, such as the workspace of C functions.
 from collections.abc import Sequence
 from typing import Any
 
+from serpentail_scene.signatures.arguments import Argument
+from serpentail_scene.signatures.table import EXACT_DERIVATIVES, SIGNATURES
+
 from ..functions.function import Function
 from ..functions.tail import Tail
 from ..scene.parameters import ANY, BODY_INERTIA, NOT_NEGATIVE, POSITIVE, Parameter
@@ -14,8 +17,6 @@ from ..scene.parse import scene_to_dict
 from ..scene.passive import PARTS
 from ..scene.resolve import parameters_of
 from ..scene.scene import Scene
-from ..scene.signatures.arguments import Argument
-from ..scene.signatures.table import EXACT_DERIVATIVES, SIGNATURES
 from .target import Emission
 
 FORMAT = 2
@@ -89,7 +90,7 @@ def function_entry(function: Function, tail: Tail, emissions: Sequence[Emission]
     entry = {
         "doc": function.doc,
         "group": SIGNATURES[function.name].group,
-        "exact_derivatives": [] if tail.shape.fixed else list(map(list, exact)),
+        "exact_derivatives": [] if tail.fixed else list(map(list, exact)),
         "inputs": [argument_entry(a, tail) for a in function.inputs],
         "outputs": [argument_entry(a, tail) for a in function.outputs],
     }

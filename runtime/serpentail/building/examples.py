@@ -4,9 +4,10 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from serpentail_scene.source import tables_of
+
 from ..checks import did_you_mean, shown
 from ..errors import SerpentailError
-from .source import tables_of
 
 PACKAGE = Path(__file__).parents[1] / "examples"  # of a wheel
 CHECKOUT = Path(__file__).parents[3] / "scenes"

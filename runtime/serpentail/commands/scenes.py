@@ -12,8 +12,9 @@ from .outcome import Outcome
 
 def examples(arguments: argparse.Namespace) -> Outcome:
     """Return the scenes that come with the package."""
+    from serpentail_scene.source import tables_of
+
     from ..building.examples import example_paths, examples
-    from ..building.source import tables_of
 
     found, lines = examples(), []
     for name, path in example_paths().items():

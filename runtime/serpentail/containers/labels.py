@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping
 
-from ..model.layout import PER_SEGMENT
+from serpentail_scene.layout import PER_SEGMENT
+
 from ..model.model import Model
 
 TORSO_Q = {"x": "m", "y": "m", "z": "m", "qw": "1", "qx": "1", "qy": "1", "qz": "1"}

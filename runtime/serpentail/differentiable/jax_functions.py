@@ -7,8 +7,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, VELOCITY
+
 from ..errors import StateError
-from ..model.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, VELOCITY
 from ..model.model import Model
 from ..model.state_space import RATE
 from .jax_calls import TARGET, entered, library

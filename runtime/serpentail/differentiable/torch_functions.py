@@ -7,8 +7,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from serpentail_scene.layout import OMEGA, POSITION, TAIL_V, VELOCITY
+
 from ..errors import StateError
-from ..model.layout import OMEGA, POSITION, TAIL_V, VELOCITY
 from ..model.model import Model
 from ..model.state_space import RATE
 from .rules import RULES

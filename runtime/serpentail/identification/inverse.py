@@ -11,10 +11,11 @@ import numpy as np
 from scipy.interpolate import BSpline
 from scipy.linalg import solveh_banded
 
+from serpentail_scene.layout import QUATERNION
+
 from ..attitude import sign_continuous
 from ..checks import number
 from ..errors import IdentificationError
-from ..model.layout import QUATERNION
 from ..model.model import Model
 from ..model.state_space import product_matrix
 from ..motion.trajectory import Trajectory

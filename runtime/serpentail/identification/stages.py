@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model.layout import OMEGA, QUATERNION, TAIL_Q
+from serpentail_scene.layout import OMEGA, QUATERNION, TAIL_Q
+
 from ..model.model import Model
 from ..model.state_space import product_matrix
 

@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from serpentail_scene.layout import OMEGA, QUATERNION, TAIL_Q
+
 from ..attitude import rotation_matrix, sign_continuous
-from ..model.layout import OMEGA, QUATERNION, TAIL_Q
 from ..model.model import Model
 from .placement import Placements
 from .points import CROSS, body_points, body_positions, geometry_of, on_torso

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from serpentail_scene.units import MEASURES, plain
+
 from ..checks import finite_array, needed, one_of, real_array, refusal, shown
 from ..errors import IdentificationError
-from ..units import MEASURES, plain
 
 UNITS: dict[str, Fraction] = MEASURES["m"][1]
 ZEROS = ("refuse", "gap")

@@ -10,9 +10,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from serpentail_scene.layout import OMEGA, QUATERNION, TAIL_Q
+
 from ..attitude import rotation_matrix
 from ..errors import IdentificationError
-from ..model.layout import OMEGA, QUATERNION, TAIL_Q
 from ..model.model import Model
 from . import stages as radau
 from .placement import Placements

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from serpentail_scene.layout import OMEGA, QUATERNION
+
 from ..attitude import from_angles
 from ..checks import measured, number, numbers_in, whole_number
 from ..errors import ModelError, SimulationError
-from ..model.layout import OMEGA, QUATERNION
 from ..model.model import Model
 
 Array = np.ndarray

@@ -4,9 +4,10 @@ from typing import Any
 
 import numpy as np
 
+from serpentail_scene.layout import OMEGA, QUATERNION, TAIL_Q, TAIL_V
+
 from ..checks import real_array, refuse_not_finite
 from ..errors import StateError
-from ..model.layout import OMEGA, QUATERNION, TAIL_Q, TAIL_V
 from ..model.model import Model
 from .tasks import DRAWS, Task, standing_legs
 

@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import casadi
 
+from serpentail_scene.layout import OMEGA, QUATERNION, TAIL_V, VELOCITY
+
 from ..checks import one_of, whole_number
 from ..errors import ModelError
 from .cores import threads
 from .kept import kept
-from .layout import OMEGA, QUATERNION, TAIL_V, VELOCITY
 from .nodes.function import MOST_NODES, RESULTS, nodes_function
 from .parameters import flat, flat_names
 from .state_space import RATE

@@ -11,11 +11,12 @@ import numpy as np
 from numpy import ndarray
 from numpy.typing import ArrayLike, DTypeLike
 
+from serpentail_scene.layout import PER_SEGMENT, QUATERNION
+
 from ..checks import real_array, refuse_not_finite
 from ..errors import StateError
 from .batch import BatchLibrary, RecordFunction
 from .calls import Call, call_of, declined
-from .layout import PER_SEGMENT, QUATERNION
 from .library import NOT_POSITIVE_DEFINITE, OUT_OF_RANGE
 from .workers import shared
 

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from serpentail_scene.layout import Layout
+
 from ..errors import SerpentailError
 from ..extras import needed
 from .batch import BatchLibrary
@@ -18,7 +20,6 @@ from .cache import cache_folder
 from .functions import Functions
 from .kept import kept
 from .kernel import Kernel
-from .layout import Layout
 from .manifest import CheckedFolder
 from .methods.steps import StepMethods
 from .parameters import (

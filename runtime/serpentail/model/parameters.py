@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from serpentail_scene.units import in_unit
+
 from ..checks import did_you_mean, numbers_in, shown
 from ..errors import ModelError
-from ..units import in_unit
 
 Value = float | tuple[float, ...]
 Values = Mapping[str, Any]  # name -> number or numbers, SI; of many runs (k,) or (k, size)

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, VELOCITY, Layout
+
 from ..errors import StateError
-from .layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, VELOCITY, Layout
 
 Array = NDArray[Any]
 RATE = 1.0  # 1/s: an error e of the norm decays as exp(-2 RATE t)

@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from ..attitude import Array
-from ..model.layout import POSITION
+from serpentail_scene.layout import POSITION
+
+from ..attitude import Array, pose_of
 from ..model.model import Model
 from ..model.parameters import total_mass
 from ..model.polar import polar_to_bend
@@ -34,7 +35,7 @@ def centre_of_mass(model: Model, q: Array, v: Array) -> Array:
     ``center_of_mass``; on a fixed base the place of the base.
     """
     if model.fixed or "center_of_mass" not in model.kernels:
-        return model.layout.pose(q)[:, POSITION]
+        return pose_of(q, model.layout)[:, POSITION]
     return np.asarray(model.center_of_mass(q, v)[0])
 
 

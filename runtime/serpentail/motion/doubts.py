@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from serpentail_scene.layout import PER_SEGMENT, POSITION, QUATERNION
+
 from ..attitude import Array, rotation_matrix
 from ..errors import StateError
-from ..model.layout import PER_SEGMENT, POSITION, QUATERNION
 from ..model.model import Model
 from .body import semi_axes, weight
 from .through_torso import sunk

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from serpentail_scene.layout import QUATERNION, VELOCITY
+
 from ..attitude import Array, rotation_matrix
-from ..model.layout import QUATERNION, VELOCITY
 from ..model.model import Model
 from .body import weight
 from .feet import feet_times, feet_touching

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, VELOCITY, Layout
+
 from ..attitude import Array, quaternion_rate, sign_continuous
-from ..model.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, VELOCITY, Layout
 
 
 def inside(times: Array, span: Array) -> Array:

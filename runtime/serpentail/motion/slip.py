@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, VELOCITY
+
 from ..attitude import Array, rotation_matrix
-from ..model.layout import OMEGA, POSITION, QUATERNION, VELOCITY
 from ..model.model import Model
 from .trajectory import Trajectory
 

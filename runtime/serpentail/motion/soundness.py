@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from serpentail_scene.layout import Layout
+
 from ..attitude import Array
 from ..checks import finite_array, shown
-from ..model.layout import Layout
 
 # entries of info on which others build, and what each entry of these lists has
 LISTS: dict[str, tuple[type, tuple[str, ...]]] = {

@@ -11,8 +11,9 @@ from typing import Any, Self
 
 from numpy.typing import ArrayLike
 
-from ..attitude import Array
-from ..model.layout import QUATERNION, Layout
+from serpentail_scene.layout import QUATERNION, Layout
+
+from ..attitude import Array, pose_of
 from ..model.model import Model
 from . import archive
 from .account import account
@@ -157,7 +158,7 @@ class Trajectory(Exports, Showable):
 
         A fixed base is at the origin.
         """
-        return self.layout.pose(self.q)
+        return pose_of(self.q, self.layout)
 
     @property
     def attitude(self) -> Array:

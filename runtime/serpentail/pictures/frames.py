@@ -6,8 +6,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from serpentail_scene.layout import POSITION
+
 from ..attitude import rotation_matrix
-from ..model.layout import POSITION
 from ..model.model import Model
 from ..motion.body import centre_of_mass, leg_points
 from ..motion.trajectory import Trajectory

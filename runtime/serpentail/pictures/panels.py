@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from serpentail_scene.layout import OMEGA
+
 from ..attitude import pitch_roll_yaw, tilt_deg
-from ..model.layout import OMEGA
 from ..model.model import Model
 from ..motion.body import bends
 from ..motion.trajectory import Trajectory

@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from serpentail_scene.layout import POSITION, VELOCITY
+
 from ..errors import SimulationError
-from ..model.layout import POSITION, VELOCITY
 from ..model.model import Model
 from ..model.parameters import total_mass
 from ..motion.trajectory import Trajectory

@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from ..model.layout import OMEGA, POSITION, TAIL_Q, TAIL_V, VELOCITY
+from serpentail_scene.layout import OMEGA, POSITION, TAIL_Q, TAIL_V, VELOCITY
+
 from ..model.model import Model
 from .free_start import part_of, with_parts
 from .nlp.coordinates import attitude

@@ -7,9 +7,10 @@ and the yaw of an upright end, are left to carry h.
 
 import numpy as np
 
+from serpentail_scene.layout import OMEGA, VELOCITY
+
 from ..attitude import rotation_matrix
 from ..errors import PlanningError
-from ..model.layout import OMEGA, VELOCITY
 from ..model.model import Model
 from .nlp.coordinates import IDENTITY_POSE
 from .problem import PlanningProblem

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from serpentail_scene.layout import QUATERNION, TAIL_Q, TAIL_V
+
 from ..brief import brief
 from ..checks import Refusals, number, numbers, numbers_in, one_of, refusal, shown
 from ..errors import PlanningError
-from ..model.layout import QUATERNION, TAIL_Q, TAIL_V
 from ..model.model import Model
 from ..model.passive import behind_stops
 from ..simulation.schedules import Legs

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from ..model.layout import TAIL_V
+from serpentail_scene.layout import TAIL_V
+
 from ..motion.trajectory import Trajectory
 from .problem import PlanningProblem
 from .result.plan import Plan

@@ -5,6 +5,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from serpentail_scene.units import in_unit
+
 from ..building.build import built
 from ..building.examples import tables_of_scene
 from ..checks import refusal, shown
@@ -13,7 +15,6 @@ from ..model.load import load, model_from
 from ..model.manifest import read_manifest
 from ..model.model import Model
 from ..model.parameters import merged
-from ..units import in_unit
 
 # keys of a scene that its generated code depends on, and that a folder is compared by
 MADE_OF = (

@@ -8,9 +8,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from serpentail_scene.units import dimensions, in_unit
+
 from ..checks import Refusals, needed, none_of, shown
 from ..magnitudes import warn_of_unusual
-from ..units import dimensions, in_unit
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,8 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from ..building.source import tables_in
+from serpentail_scene.source import tables_in
+
 from ..checks import one_line, shown
 from ..errors import SimulationError
 

@@ -4,6 +4,8 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+from serpentail_scene.units import in_unit
+
 from .. import extras
 from ..checks import Refusals, needed, refusal, shown
 from ..errors import PlanningError
@@ -11,7 +13,6 @@ from ..model.model import Model
 from ..planning.goal import Bounds, Goal
 from ..planning.planner import plan
 from ..planning.result.plan import Plan
-from ..units import in_unit
 from .file import model_of, read_scene, size_of, subtable
 from .keys import Key, read, sized
 from .plan_keys import FREE, PLAN

@@ -4,8 +4,9 @@ import json
 import subprocess
 from typing import Any
 
+from serpentail_scene.units import MEASURES, choices, pattern, plain
+
 from ..building.generator import command
-from ..units import MEASURES, choices, pattern, plain
 from .identify_keys import IDENTIFY
 from .keys import Key
 from .phase_keys import PHASES

@@ -5,9 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from serpentail_scene.layout import OMEGA, VELOCITY
+
 from ..checks import finite_array, number, refusal
 from ..errors import SimulationError
-from ..model.layout import OMEGA, VELOCITY
 from ..model.model import Model
 from ..simulation.schedules import shared_among_links
 from ..simulation.settle import check_settling

@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 
+from serpentail_scene.layout import QUATERNION, TAIL_Q
+
 from ..errors import SimulationError
-from ..model.layout import QUATERNION, TAIL_Q
 from ..model.model import Model
 from ..planning.goal import Goal
 from ..planning.result.full_state import com_at_start

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from serpentail_scene.layout import TAIL_V
+
 from ..model.cores import threads as allowed
 from ..model.kernel import aligned
-from ..model.layout import TAIL_V
 from ..model.model import Model
 from ..model.structures import structure
 from .acting import Acting

@@ -8,9 +8,10 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from serpentail_scene.layout import TORSO_V
+
 from ..checks import measured, number, numbers, refusal
 from ..errors import SimulationError
-from ..model.layout import TORSO_V
 from ..model.model import Model
 from .piecewise import Piecewise, checked_nodes, spline
 from .schedules import Reference

@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from serpentail_scene.layout import QUATERNION
+
 from ..errors import SimulationError
-from ..model.layout import QUATERNION
 from ..model.library import NOT_FINITE
 from .compiled_run import CompiledRun, Samples, failed
 from .methods import IntegrationMethod

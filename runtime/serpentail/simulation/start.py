@@ -6,10 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from serpentail_scene.layout import QUATERNION
+
 from ..checks import finite_array, number, real_array, refusal, refuse_not_finite
 from ..errors import SimulationError, StateError
 from ..model.kept import kept
-from ..model.layout import QUATERNION
 from ..model.model import Model
 from ..model.parameters import Values
 from ..model.passive import behind_stops

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from serpentail_scene.units import MEASURES, in_unit
+
 from ..checks import finite_array, measured, one_of, refusal, shown
 from ..errors import SweepError
-from ..units import MEASURES, in_unit
 
 LAWS = ("uniform", "log")
 

@@ -4,8 +4,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from serpentail_scene.layout import OMEGA, QUATERNION, TAIL_V
+
 from ..attitude import quaternion_rate
-from ..model.layout import OMEGA, QUATERNION, TAIL_V
 from ..model.model import Model
 from .derivative_laws import along
 from .errors import relative, sensitivity

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..model.layout import POSITION, TORSO_NV, VELOCITY
+from serpentail_scene.layout import POSITION, TORSO_NV, VELOCITY
+
 from ..model.model import Model
 from .errors import relative, sensitivity, worst
 from .law import PIECEWISE, SLOPE_LIMIT, VALUE_LIMIT, Errors, Law, fastest, moved, registry, slope

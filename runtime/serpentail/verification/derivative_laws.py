@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..model.layout import OMEGA
+from serpentail_scene.layout import OMEGA
+
 from ..model.model import Model
 from .errors import block_error, blocks_of, relative, worst
 from .law import PIECEWISE, SLOPE_LIMIT, Errors, Law, fastest, moved, registry, slope

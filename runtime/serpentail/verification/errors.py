@@ -6,7 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..model.layout import OMEGA, TAIL_V, VELOCITY
+from serpentail_scene.layout import OMEGA, TAIL_V, VELOCITY
+
+from ..attitude import pose_of
 from ..model.model import Model
 from ..model.parameters import total_mass
 from .states import State, outputs
@@ -145,7 +147,7 @@ def difference(
         return block_error(x, reference, blocks=blocks_of(model)) / sensitivity(model, q)
     if output == "potential":
         mount = np.linalg.norm(model.parameters["tail_mount"])
-        height = abs(model.layout.pose(q)[2]) + model.parameters["tail_length"] + mount
+        height = abs(pose_of(q, model.layout)[2]) + model.parameters["tail_length"] + mount
         return relative(
             x, reference, total_mass(model.parameters) * model.parameters["gravity"] * height
         )

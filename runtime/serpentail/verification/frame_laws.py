@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..attitude import product, rotation_matrix
-from ..model.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TORSO_NV, VELOCITY
+from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TORSO_NV, VELOCITY
+
+from ..attitude import pose_of, product, rotation_matrix
 from ..model.model import Model
 from ..model.parameters import total_mass
 from .errors import (
@@ -105,7 +106,7 @@ def links_have_their_length(model: Model, s: State) -> Errors:
     length.
     """
     points = model.tail_points(s.q).astype(float)
-    pose = model.layout.pose(s.q)
+    pose = pose_of(s.q, model.layout)
     mount = pose[POSITION] + rotation_matrix(pose[QUATERNION]) @ model.parameters["tail_mount"]
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     even = model.parameters["tail_length"] / len(lengths)

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, VELOCITY
+
 from ..attitude import product
 from ..errors import UnusualSize
-from ..model.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, VELOCITY
 from ..model.model import Model
 from ..model.passive import idle
 from .errors import rounding

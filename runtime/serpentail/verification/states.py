@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, Layout
+
 from ..errors import ModelError
-from ..model.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, Layout
 from ..model.model import Model
 from ..model.parameters import total_mass
 

@@ -4,8 +4,9 @@ from typing import Any
 
 import numpy as np
 
+from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_V, VELOCITY
+
 from ..attitude import rotation_matrix
-from ..model.layout import OMEGA, POSITION, QUATERNION, TAIL_V, VELOCITY
 from ..model.model import Model
 from ..model.parameters import total_mass
 from ..model.passive import PARTS

@@ -4,11 +4,12 @@ from typing import Any, Self
 
 import numpy as np
 
-from ..attitude import Array
+from serpentail_scene.layout import POSITION
+
+from ..attitude import Array, pose_of
 from ..checks import refusal
 from ..errors import ViewError
 from ..extras import needed
-from ..model.layout import POSITION
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
 from ..planning.result.plan import Plan
@@ -106,7 +107,7 @@ class Live:
     def _show(self, q: Array, legs: Array | None, text: str) -> None:
         """Show poses (n, nq), as one change of the scene."""
         if not self.nodes:
-            self._aim(self.model.layout.pose(q)[0, POSITION])
+            self._aim(pose_of(q, self.model.layout)[0, POSITION])
         with self.server.atomic():
             for name, instances in animal(self.model, q, legs).items():
                 self._place(name, instances)

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..attitude import Array, rotation_matrix
-from ..model.layout import POSITION, QUATERNION
+from serpentail_scene.layout import POSITION, QUATERNION
+
+from ..attitude import Array, pose_of, rotation_matrix
 from ..model.model import Model
 from ..motion.body import leg_points
 from ..viewer.shape import shape
@@ -38,7 +39,7 @@ def animal(model: Model, q: Array, legs: Array | None) -> dict[str, Instances]:
     """
     look = shape(model)
     semi_axes = np.array(look["semi_axes"])
-    found = {name: _ball(model.layout.pose(q), semi_axes, name) for name in PARTS}
+    found = {name: _ball(pose_of(q, model.layout), semi_axes, name) for name in PARTS}
     found["tail"] = rods(model.tail_points(q), np.array(look["tail_radii"]))
     joints = leg_points(model, q, legs)
     if joints is not None:

@@ -16,8 +16,8 @@ from serpentail_codegen.functions.catalogue import CATALOGUE
 from serpentail_codegen.ir.interpret import Run
 from serpentail_codegen.pipeline import tail_of
 from serpentail_codegen.scene.parse import parse_scene
-from serpentail_codegen.scene.signatures.table import ALL, DEFAULT, VALUES
 from serpentail_codegen.targets.c.form import in_form
+from serpentail_scene.signatures.table import ALL, DEFAULT, VALUES
 from tests.references.parameters import random_states
 from tests.support import zoo
 from tests.support.compile_once import compile_once

@@ -5,7 +5,7 @@ from itertools import product
 
 import pytest
 
-from serpentail_codegen.scene.signatures.table import DERIVATIVES
+from serpentail_scene.signatures.table import DERIVATIVES
 from tests.support import zoo
 from tests.support.models import folder_of, model_folder
 from tests.support.rows import row

@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import serpentail as st
-from serpentail_codegen.scene.signatures.table import ALL, NEEDS
+from serpentail_scene.signatures.table import ALL, NEEDS
 from tests.support import zoo
 from tests.support.forms import SOUND, Foreign
 

@@ -4,10 +4,12 @@ tail.
 
 from dataclasses import dataclass
 
+from serpentail_scene.layout import OMEGA, VELOCITY
+
 from ...ir.program import Array, Index, Ref, padded
 from ...mechanics import airborne, rotations, translation
 from ..draft import Draft
-from ..layout import OMEGA, VELOCITY, block, segment_v, tail_v
+from ..layout import block, segment_v, tail_v
 from ..passive import add_passive_forces
 from ..scope import State, Vectors
 from ..sweeps.inertia import column_of, tail_inertia

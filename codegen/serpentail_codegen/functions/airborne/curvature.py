@@ -6,6 +6,8 @@ hold. Their multipliers follow from mu, so that no second derivative of these un
 
 from dataclasses import dataclass
 
+from serpentail_scene.layout import OMEGA, PER_SEGMENT, TORSO_NQ, TORSO_NV, VELOCITY
+
 from ...ir.program import Array, Index, Ref
 from ...mechanics import airborne, rotations
 from ..derivatives.differentiated import VIRTUAL_POWER
@@ -13,16 +15,7 @@ from ..derivatives.directions import Directions
 from ..derivatives.hessian import tangents_of_gradient
 from ..draft import Draft
 from ..function import Assembly
-from ..layout import (
-    OMEGA,
-    PER_SEGMENT,
-    TORSO_NQ,
-    TORSO_NV,
-    VELOCITY,
-    block,
-    coordinate,
-    tail_v,
-)
+from ..layout import block, coordinate, tail_v
 from .balance import (
     QUATERNION,
     TURN,

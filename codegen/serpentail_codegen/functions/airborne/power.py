@@ -4,13 +4,15 @@ Its weights are Lagrange's multipliers of the two sets of equations that determi
 omega: H v_dot + C = loads, and A_r v = R^T h.
 """
 
+from serpentail_scene.layout import OMEGA
+from serpentail_scene.signatures.arguments import MULTIPLIER, V_DOT, Argument, Q, V
+
 from ...ir.program import Array
 from ...mechanics import airborne_power, mount, torso
-from ...scene.signatures.arguments import MULTIPLIER, V_DOT, Argument, Q, V
 from ..derivatives.differentiated import POWER, U_VIRTUAL, A
 from ..draft import Draft
 from ..function import Function
-from ..layout import OMEGA, block, segment_v
+from ..layout import block, segment_v
 from ..passive import add_passive_power
 from ..scope import State, Vectors
 from ..sweeps.pieces import across, each_piece, mechanism

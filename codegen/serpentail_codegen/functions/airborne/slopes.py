@@ -6,6 +6,8 @@ after segment. The quaternion acts only through that momentum.
 
 from dataclasses import dataclass
 
+from serpentail_scene.layout import OMEGA, PER_SEGMENT, TORSO_NV, VELOCITY
+
 from ...autodiff.forward import tangent_program
 from ...ir.program import Array, Index, Ref
 from ...mechanics import airborne
@@ -13,7 +15,7 @@ from ..derivatives.differentiated import CORE
 from ..derivatives.directions import Directions
 from ..draft import Draft
 from ..function import assemble
-from ..layout import OMEGA, PER_SEGMENT, TORSO_NV, VELOCITY, block, coordinate, tail_v
+from ..layout import block, coordinate, tail_v
 from ..sweeps.inertia import column_of
 from .balance import (
     TURN,

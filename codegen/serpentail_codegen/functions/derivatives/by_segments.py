@@ -10,16 +10,18 @@ all torques.
 
 from dataclasses import dataclass
 
+from serpentail_scene.layout import OMEGA, PER_SEGMENT, VELOCITY
+from serpentail_scene.signatures.arguments import V_DOT, Argument, Q, V
+
 from ...autodiff.angles import SinesAndCosines, sines_and_cosines_of
 from ...autodiff.step import tangent
 from ...ir.program import Array, Index, Ref
 from ...ir.step import Step
 from ...mechanics import link, rotations, segment_slopes, torso, translation
 from ...mechanics.lower import derive
-from ...scene.signatures.arguments import V_DOT, Argument, Q, V
 from ..draft import Draft
 from ..function import Function, assemble
-from ..layout import OMEGA, PER_SEGMENT, VELOCITY, block, coordinate, segment_v
+from ..layout import block, coordinate, segment_v
 from ..passive import add_passive_slopes, net_torques
 from ..scope import Motion, State, Vectors
 from ..sweeps.pieces import mechanism

@@ -3,12 +3,14 @@
 In torso axes nothing depends on attitude or gravity: R^T (p_b_ddot + g z) stands for p_b_ddot.
 """
 
+from serpentail_scene.layout import OMEGA
+from serpentail_scene.signatures.arguments import FORCE, MULTIPLIER, V_DOT, Argument, Q, V
+
 from ...ir.program import Array, Ref
-from ...scene.signatures.arguments import FORCE, MULTIPLIER, V_DOT, Argument, Q, V
 from ..draft import Draft
 from ..dynamics import inertial_forces
 from ..function import Function
-from ..layout import OMEGA, block, segment_v
+from ..layout import block, segment_v
 from ..passive import add_passive_forces, add_passive_power
 from ..scope import Motion, State, Vectors
 from ..sweeps.momentum import gather_moment

@@ -6,20 +6,12 @@ body axes, tail coordinates. The columns of such a matrix are those of a velocit
 
 from dataclasses import dataclass
 
+from serpentail_scene.layout import OMEGA, PER_SEGMENT, QUATERNION, TORSO_NV, VELOCITY
+
 from ...ir.program import Array, Index, Loop, Ref
 from ...mechanics import rotations
 from ..draft import Draft
-from ..layout import (
-    OMEGA,
-    PER_SEGMENT,
-    QUATERNION,
-    TORSO_NV,
-    VELOCITY,
-    block,
-    coordinate,
-    segment_q,
-    segment_v,
-)
+from ..layout import block, coordinate, segment_q, segment_v
 from ..tail import Tail
 
 # directions of the torso: their position in the tangent of q or v, and whether it is q

@@ -3,13 +3,15 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
+from serpentail_scene.layout import OMEGA, TORSO_NV, VELOCITY
+
 from ...autodiff.forward import tangent_program
 from ...autodiff.reverse import adjoint_program
 from ...ir.program import Array, Ref
 from ...mechanics import rotations, turns
 from ..draft import Draft
 from ..function import Function, assemble
-from ..layout import OMEGA, TORSO_NV, VELOCITY, block
+from ..layout import block
 from ..scope import Vectors
 from .differentiated import MOMENT, VIRTUAL_POWER
 from .directions import Directions

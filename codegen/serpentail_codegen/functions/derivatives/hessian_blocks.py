@@ -2,9 +2,11 @@
 
 from dataclasses import dataclass
 
+from serpentail_scene.layout import OMEGA, PER_SEGMENT, TORSO_NQ, TORSO_NV
+
 from ...ir.program import Array, Index, Ref
 from ..draft import Draft
-from ..layout import OMEGA, PER_SEGMENT, TORSO_NQ, TORSO_NV, coordinate
+from ..layout import coordinate
 from .directions import Directions
 
 BLOCKS = ("qq", "qv", "vv", "aq")

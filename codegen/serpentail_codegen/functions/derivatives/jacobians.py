@@ -5,6 +5,8 @@ No result depends on the position or the velocity of B.
 
 from collections.abc import Callable
 
+from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, VELOCITY
+
 from ...autodiff.forward import tangent_program
 from ...autodiff.reverse import adjoint_program
 from ...ir.program import Array, Index, Ref
@@ -13,7 +15,7 @@ from ..draft import Draft
 from ..dynamics import assemble_forward_dynamics
 from ..factored import FactoredDynamics, Loads
 from ..function import assemble
-from ..layout import OMEGA, POSITION, QUATERNION, VELOCITY, block, tail_v
+from ..layout import block, tail_v
 from ..plain import FUNCTIONS
 from ..scope import State, Vectors
 from ..sweeps.pieces import attitude

@@ -5,10 +5,12 @@ It also has the effect of a rotation of the torso on them.
 
 from dataclasses import dataclass
 
+from serpentail_scene.layout import VELOCITY
+
 from ...ir.program import Array, Ref
 from ...mechanics import torso, turns
 from ..draft import Draft
-from ..layout import VELOCITY, block
+from ..layout import block
 from ..scope import State, Vectors
 from ..sweeps.pieces import attitude
 

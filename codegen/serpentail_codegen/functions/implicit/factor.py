@@ -10,6 +10,8 @@ The first three pivots of S eliminate translation.
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from serpentail_scene.layout import TORSO_NQ, TORSO_NV
+
 from ...ir.program import Array, Index, Ref, padded
 from ...ir.step import Step
 from ...mechanics import contact, loads, passive
@@ -18,7 +20,7 @@ from ...mechanics.lower import derive
 from ..contact import Points, gather_points
 from ..draft import Draft
 from ..dynamics import fill_mass_matrix
-from ..layout import TORSO_NQ, TORSO_NV, coordinate
+from ..layout import coordinate
 from ..passive import SLOPES, passive_parameters
 from ..scope import State, Torso, Vectors
 from ..sweeps.pieces import each_segment, points_of

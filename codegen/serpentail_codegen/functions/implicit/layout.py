@@ -3,9 +3,10 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from serpentail_scene.layout import PER_SEGMENT
+
 from ...ir.program import Array, Index, Ref
 from ..draft import Draft
-from ..layout import PER_SEGMENT
 from ..sweeps.pieces import each_point
 from ..tail import Tail
 

@@ -6,11 +6,13 @@ for the bristles; k_q, k_v and k_u are the solution.
 
 from dataclasses import dataclass
 
+from serpentail_scene.layout import OMEGA, TORSO_NV, VELOCITY
+
 from ...ir.program import Array, Index, Ref
 from ...mechanics import contact, passive
 from ...mechanics import contact_stiffness as stiffness
 from ..draft import Draft
-from ..layout import OMEGA, TORSO_NV, VELOCITY, block, coordinate, tail_v
+from ..layout import block, coordinate, tail_v
 from .layout import Factors, each_contact, first_tail_point
 
 

@@ -7,10 +7,12 @@ vectors hold several numbers: a column is a lane.
 
 from collections.abc import Callable
 
+from serpentail_scene.layout import OMEGA, VELOCITY
+
 from ...ir.program import Array, Ref
 from ...mechanics import link_columns, mount, torso, translation
 from ..draft import Draft
-from ..layout import OMEGA, VELOCITY, block, coordinate, tail_v
+from ..layout import block, coordinate, tail_v
 from ..scope import Motion, State, Vectors
 from ..tails.mechanism import Segments, Wrenches
 from .inertia import column_of, columns_of

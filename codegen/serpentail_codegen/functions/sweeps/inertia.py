@@ -40,7 +40,7 @@ def gather_inertia(
         root = {name: array[i] for name, array in roots.items()}
         draft.step(torso.column_at_torso, root, momenta, columns=columns_of(columns, i))
     across(draft, mount.composite_at_mount, composite.only("h", "I").named)
-    if not draft.tail.shape.fixed:
+    if not draft.tail.fixed:
         draft.step(torso.torso_composite, composite, **composite)
     return composite
 

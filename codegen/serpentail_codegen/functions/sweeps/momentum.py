@@ -59,6 +59,6 @@ def gather_moment(draft: Draft, segments: Segments) -> Vectors:
     for place in each_piece(draft, downward=True):
         draft.step(mechanism(draft).gather_moment, segments.at(*place), moment, **moment)
     across(draft, mount.moment_at_mount, h=moment["h"])
-    if not draft.tail.shape.fixed:
+    if not draft.tail.fixed:
         draft.step(torso.torso_moment, moment, **moment)
     return moment

@@ -8,12 +8,14 @@ free coordinates. A last sweep carries accelerations from the torso to the tip.
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from serpentail_scene.layout import OMEGA, PER_SEGMENT, VELOCITY
+
 from ...ir.program import Array, Index, Ref, as_index
 from ...ir.tape import Number
 from ...mechanics import free_segment, link, link_chain, rotations, torso
 from ...mechanics.link_columns import torso_bias
 from ..draft import Draft
-from ..layout import OMEGA, PER_SEGMENT, VELOCITY, block, coordinates, segment_v
+from ..layout import block, coordinates, segment_v
 from ..scope import State, Vectors
 from ..tails.articulated import link_properties
 from ..tails.mechanism import simplified

@@ -2,10 +2,12 @@
 
 from collections.abc import Callable
 
+from serpentail_scene.layout import OMEGA, VELOCITY
+
 from ...ir.program import Array, Index, Ref
 from ...mechanics import mount, torso
 from ..draft import Draft
-from ..layout import OMEGA, VELOCITY, block, segment_v
+from ..layout import block, segment_v
 from ..scope import Motion, Vectors
 from ..tails.mechanism import Segments, Wrenches
 from .pieces import across, each_piece, each_segment, mechanism, pieces_of

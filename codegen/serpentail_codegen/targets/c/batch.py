@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from serpentail_scene.signatures.table import AIRBORNE
+
 from ...functions.function import Function, assemble
 from ...functions.tail import Tail
 from ...ir.cost import applied, branches, executed
@@ -12,7 +14,6 @@ from ...passes.batch import batched, unrolled_step, with_own_parameters
 from ...passes.directions import directions_in_turn, has_directions
 from ...passes.unrolled_ldl import unrolled_ldl
 from ...scene.scene import Scene
-from ...scene.signatures.table import AIRBORNE
 from ..templating import render
 from .form import UNROLLED_ROWS, PrintedFunction, baked_values
 from .loops import in_loops
@@ -125,7 +126,7 @@ class BatchView:
         )
         self.inputs = [ArgumentView(a, tail) for a in function.inputs]
         self.outputs = [ArgumentView(a, tail) for a in function.outputs]
-        free = not tail.shape.fixed
+        free = not tail.fixed
         self.quaternion = quaternion_in(function.inputs[0].name, " * STATES") if free else ""
         self.names = ", ".join(a.name for a in self.inputs + self.outputs)
         self.arguments_work = batch.arguments_work

@@ -93,7 +93,7 @@ def batch_rollout(
     scene: Scene, tail: Tail, printed: Sequence[PrintedFunction]
 ) -> BatchRollout | None:
     """Return the batch rollout of a scene with rollout and a free torso, but without contacts."""
-    if "rollout" not in scene.functions or scene.contacts or tail.shape.fixed:
+    if "rollout" not in scene.functions or scene.contacts or tail.fixed:
         return None
     (dynamics,) = (f.function for f in printed if f.function.name == "forward_dynamics")
 

@@ -50,8 +50,8 @@ def simulation_context(
         "has": has,
         "values": scene.parameters,  # where they are folded in
         # of an index that counts the tail's numbers of q, of v
-        "before_q": "" if tail.shape.fixed else "7 + ",
-        "before_v": "" if tail.shape.fixed else "6 + ",
+        "before_q": "" if tail.fixed else "7 + ",
+        "before_v": "" if tail.fixed else "6 + ",
         "turned_at": TURNED_AT[tail.kind],
         "own_lengths": own_lengths(scene),
         "part": 1.0

@@ -5,12 +5,13 @@ from collections.abc import Iterable, Sequence
 from itertools import groupby
 from typing import Any, Protocol
 
+from serpentail_scene.signatures.arguments import FACTORS, Argument
+
 from ...functions.tail import Tail, struct_parameters
 from ...ir.program import Program
 from ...ir.tape import operation_count
 from ...passes.fused import AFTER
 from ...scene.scene import Scene
-from ...scene.signatures.arguments import FACTORS, Argument
 from .form import PrintedFunction, values
 from .routine import CFunction, Routine, routine_arguments, routine_lines
 
@@ -55,7 +56,7 @@ class FunctionView:
         self.unchecked = f"{prefix}_unchecked_{self.name}(parameters, {self.names}, work)"
 
         # factors are many and not checked: the results of solving with them are
-        self.quaternion = "" if tail.shape.fixed else quaternion_in(self.inputs[0].name)
+        self.quaternion = "" if tail.fixed else quaternion_in(self.inputs[0].name)
         read = [a for a in self.inputs if a.name != FACTORS.name]
         self.arguments = zero_where_finite(f"{prefix}_zero_times", read)
         few = sum(a.length for a in self.outputs) < STORED_ONE_BY_ONE

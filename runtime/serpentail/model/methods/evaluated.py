@@ -6,10 +6,11 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from serpentail_scene.layout import Layout
+
 from ...errors import ModelError
 from ..kept import kept
 from ..kernel import Kernel
-from ..layout import Layout
 
 Array = NDArray[Any]  # of doubles, or of floats if the scene asks for them
 

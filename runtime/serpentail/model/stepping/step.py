@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from serpentail_scene.layout import QUATERNION
+
 from ...checks import none_of, number, one_of, real_array, refusal, refuse_not_finite, whole_number
 from ...errors import SimulationError, StateError
 from ..cores import checked_threads
-from ..layout import QUATERNION
 from ..library import WHY
 from ..parameters import RunParameters
 from ..workers import MIN_STATES_PER_THREAD, shared

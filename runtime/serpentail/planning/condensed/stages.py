@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...model.layout import OMEGA, VELOCITY
+from serpentail_scene.layout import OMEGA, VELOCITY
+
 from ...model.model import Model
 from ..nlp.coordinates import IDENTITY_POSE, Attitude, attitude
 from ..nlp.direct import goal_matrix

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from serpentail_scene.layout import POSITION
+
 from ...attitude import pitch_roll_yaw
-from ...model.layout import POSITION
 from ..goal import Goal
 from ..problem import PlanningProblem
 from .coordinates import Attitude

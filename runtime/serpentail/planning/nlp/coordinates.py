@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from serpentail_scene.layout import QUATERNION
+
 from ...attitude import from_angles, pitch_roll_yaw, product, quaternion_rate, sign_continuous
 from ...errors import PlanningError
-from ...model.layout import QUATERNION
 
 if TYPE_CHECKING:
     import casadi as ca

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from serpentail_scene.layout import OMEGA, TAIL_V, VELOCITY
+
 from ...model.kept import kept
-from ...model.layout import OMEGA, TAIL_V, VELOCITY
 from ...model.model import Model
 from ...model.parameters import total_mass
 from ..design import Design, refuse_unused

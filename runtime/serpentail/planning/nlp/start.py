@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from serpentail_scene.layout import OMEGA, VELOCITY
+
 from ...model.kept import kept
-from ...model.layout import OMEGA, VELOCITY
 from ...model.model import Model
 from .body import Body
 from .coordinates import COM_ENTRIES, IDENTITY_POSE, Attitude, rotated

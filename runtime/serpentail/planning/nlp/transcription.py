@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...model.layout import TAIL_Q
+from serpentail_scene.layout import TAIL_Q
+
 from ...model.model import Model
 from ..problem import PlanningProblem
 from .cache import memoised

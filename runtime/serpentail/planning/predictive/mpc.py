@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from serpentail_scene.layout import TAIL_V
+
 from ...checks import refusal
 from ...errors import SimulationError
 from ...model.kernel import aligned
-from ...model.layout import TAIL_V
 from ...model.model import Model
 from ...simulation.controllers import NativeTorque
 from ...simulation.parts import OwnState, Parts

@@ -6,8 +6,9 @@ the COM.
 
 import numpy as np
 
+from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, TORSO_NV, VELOCITY
+
 from ...attitude import rotation_matrix
-from ...model.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, TORSO_NV, VELOCITY
 from ...model.model import Model
 from ..nlp.coordinates import COM_ENTRIES, IDENTITY_POSE, Attitude
 

@@ -9,8 +9,9 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
+from serpentail_scene.layout import TAIL_V
+
 from ...errors import SimulationError
-from ...model.layout import TAIL_V
 from ...model.model import Model
 from ...motion.account import UNITS, framed, tail_of
 from ...motion.origin import origin

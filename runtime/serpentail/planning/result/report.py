@@ -4,9 +4,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from serpentail_scene.layout import POSITION, QUATERNION
+
 from ...attitude import pitch_roll_yaw
 from ...errors import SimulationError
-from ...model.layout import POSITION, QUATERNION
 from ...model.model import Model
 from ...motion.trajectory import Trajectory
 from ...simulation.pfl import Pfl

@@ -5,9 +5,10 @@ Its end shows the plan's error; its intervals show where the mesh is too coarse.
 
 import numpy as np
 
+from serpentail_scene.layout import OMEGA, QUATERNION, TAIL_Q, TAIL_V
+
 from ...attitude import angle_deg, tilt_deg
 from ...errors import SimulationError
-from ...model.layout import OMEGA, QUATERNION, TAIL_Q, TAIL_V
 from ...model.model import Model
 from ...motion.resample import smooth
 from ...simulation.controllers import TorqueCurve

@@ -3,7 +3,7 @@
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from ....scene.signatures.table import SIGNATURES
+from serpentail_scene.signatures.table import SIGNATURES
 
 # first number with an effect: neither the position of B nor its velocity
 # matters

@@ -1,0 +1,1 @@
+"""What generator and runtime both know of scenes: tables, units, layout, signatures."""

@@ -1,0 +1,71 @@
+"""The layout of q, v and tau; no other place depends on it.
+
+A velocity, its derivative, a generalised force and a row of H have the same layout.
+"""
+
+from dataclasses import dataclass
+
+POSITION = slice(0, 3)  # of B in q, world (m)
+QUATERNION = slice(3, 7)  # in q, (w, x, y, z)
+VELOCITY = slice(0, 3)  # of B in v, world (m/s); of forces in generalised forces (N)
+OMEGA = slice(3, 6)  # in v, body axes (rad/s); of moments in generalised forces (N m)
+TORSO_NQ, TORSO_NV = 7, 6  # numbers of the torso in q and in v
+TORSO_Q = slice(0, TORSO_NQ)  # in q
+TORSO_V = slice(0, TORSO_NV)  # in v and in generalised forces
+TAIL_Q, TAIL_V = slice(TORSO_NQ, None), slice(TORSO_NV, None)  # tail coordinates, and their rates
+PER_SEGMENT = 2  # coordinates of a segment
+# in q, of all segments: alpha, a or phi; and beta, b or theta
+FIRST_Q, SECOND_Q = slice(TORSO_NQ, None, PER_SEGMENT), slice(TORSO_NQ + 1, None, PER_SEGMENT)
+
+
+class Sizes:
+    """The sizes of a model of m segments: q (nq,), v (nv,), tau (nt,).
+
+    fixed: the base never moves, so that q and v are those of the tail alone.
+    """
+
+    segments: int
+    fixed: bool
+
+    @property
+    def nt(self) -> int:
+        """Number of tail coordinates and of torques, 2m for m segments."""
+        return PER_SEGMENT * self.segments
+
+    @property
+    def nq(self) -> int:
+        """Numbers of a configuration."""
+        return self.nt + (0 if self.fixed else TORSO_NQ)
+
+    @property
+    def nv(self) -> int:
+        """Numbers of a velocity."""
+        return self.nt + (0 if self.fixed else TORSO_NV)
+
+
+@dataclass(frozen=True)
+class Layout(Sizes):
+    """Where numbers lie in q, v and tau."""
+
+    segments: int
+    fixed: bool = False
+
+    @classmethod
+    def of_width(cls, nq: int) -> "Layout | None":
+        """Return the layout in which q has ``nq`` numbers; None if there is none.
+
+        With a free torso the number is odd.
+        """
+        fixed = nq % PER_SEGMENT == 0
+        segments = (nq if fixed else nq - TORSO_NQ) // PER_SEGMENT
+        return cls(segments, fixed) if segments >= fixed else None
+
+    @property
+    def tail_q(self) -> slice:
+        """Where the tail coordinates lie in q."""
+        return slice(self.nq - self.nt, None)
+
+    @property
+    def tail_v(self) -> slice:
+        """Where their rates lie in v, and their forces among generalised forces."""
+        return slice(self.nv - self.nt, None)
