@@ -6,31 +6,18 @@ made from another version of it.
 
 import hashlib
 import json
-import sys
-from importlib.util import find_spec
 from pathlib import Path
+
+from serpentail_scene.digest import generator_digest
 
 from .scene.parse import scene_to_dict
 from .scene.scene import Scene
 
-TOOLS = ("sympy", "jinja2")  # packages: another version of one may print another text
-
 
 def key_of(scene: Scene) -> str:
-    """Return the hash of everything that a scene's folder depends on: scene, generator, tools."""
-    home = Path(__file__).parent
-    sources = sorted(path for path in home.rglob("*") if path.suffix in (".py", ".jinja"))
-    tools = [sys.version, *(name for tool in TOOLS for name in _installed(tool))]
-    named = [(str(path.relative_to(home)), _digest(path.read_bytes())) for path in sources]
-    return _digest(json.dumps([scene_to_dict(scene), tools, named], sort_keys=True).encode())
-
-
-def _installed(tool: str) -> list[str]:
-    """Return a package's name and version; importlib.metadata would take 30 ms for this."""
-    found = find_spec(tool)
-    if found is None or found.origin is None:
-        return []
-    return sorted(path.name for path in Path(found.origin).parents[1].glob(f"{tool}-*-info"))
+    """Return the hash of everything that a scene's folder depends on."""
+    depends = [scene_to_dict(scene), generator_digest()]
+    return _digest(json.dumps(depends, sort_keys=True).encode())
 
 
 def is_made(folder: Path, key: str) -> bool:

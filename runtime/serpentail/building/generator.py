@@ -1,20 +1,17 @@
 """Runs the generator in its own process: this package imports neither it nor its libraries."""
 
-import hashlib
 import os
 import sys
 from contextlib import suppress
-from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
 
+from serpentail_scene.digest import GENERATOR, generator_digest
+
 from ..errors import ModelError
-from ..model.cache import digest
 from ..model.commands import run_all
 from ..stages import Stage
 
-PACKAGE = "serpentail_codegen"
-TOOLS = ("sympy", "jinja2")  # other versions of these may print other texts
 REMEDY = "pip install serpentail, or generate where it is and give the folder to st.load"
 
 
@@ -23,15 +20,10 @@ def identity() -> str:
 
     ModelError without a generator.
     """
-    home = _home()
-    content = hashlib.sha256()
-    for path in sorted(path for path in home.rglob("*") if path.suffix in (".py", ".jinja")):
-        content.update(f"{path.relative_to(home)}\0".encode() + path.read_bytes() + b"\0")
     try:
-        tools = [version(tool) for tool in TOOLS]
-    except PackageNotFoundError as error:
+        return generator_digest()
+    except ModuleNotFoundError as error:
         raise ModelError(f"no model can be generated without {error.name}: {REMEDY}") from error
-    return digest([content.hexdigest(), tools, sys.version])
 
 
 def generate(scene: Path, output: Path, given: Path) -> Path:
@@ -57,8 +49,9 @@ def generate(scene: Path, output: Path, given: Path) -> Path:
 
 def command() -> list[str]:
     """Return the command of the generator, without its arguments."""
-    _home()
-    return [sys.executable, "-P", "-m", PACKAGE]  # -P: do not import from the working folder
+    if find_spec(GENERATOR) is None:
+        raise ModelError(f"no model can be generated without {GENERATOR}: {REMEDY}")
+    return [sys.executable, "-P", "-m", GENERATOR]  # -P: do not import from the working folder
 
 
 def _tell(stage: Stage, noted: Path) -> None:
@@ -67,11 +60,3 @@ def _tell(stage: Stage, noted: Path) -> None:
         part, function = noted.read_text().split()
         return stage.tell(float(part), f"{stage.subject}: {function}")
     return stage.tell()
-
-
-def _home() -> Path:
-    """Return the folder of the generator's package."""
-    found = find_spec(PACKAGE)
-    if found is None or found.origin is None:
-        raise ModelError(f"no model can be generated without the package {PACKAGE}: {REMEDY}")
-    return Path(found.origin).parent
