@@ -34,6 +34,7 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--emission", help="auto, straight, loops, lanes or segments")
     p.add_argument("--profile", help="fast, or reproducible: the same bits on every machine")
     p.add_argument("--baked", action="store_true", help="fold the parameters into the code")
+    p.add_argument("--given", type=Path, help="scene file whose parameters are only checked")
     p.add_argument("--name", help="of the model; by default the scene's, and what options change")
     p.add_argument(
         "--output", type=Path, default=Path("generated"), help="parent of the generated folder"
@@ -87,6 +88,8 @@ def main(argv: list[str] | None = None) -> int:
             print(json.dumps(scene_schema()))
             return 0
         scene = scene_of(arguments)
+        if arguments.given:
+            load_scene(arguments.given)
     except SceneError as error:
         print(error, file=sys.stderr)
         return 2

@@ -1,35 +1,93 @@
 """Writes files whole or not at all, and checks before the work that they can be written."""
 
 import contextlib
+import fcntl
 import os
+import re
 import secrets
+import shutil
+import tempfile
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 from .errors import NotWritten
+
+PART = re.compile(r"\..+\.[0-9a-f]{8}\.part")
+LEFT_AFTER = 60.0  # s without a change, after which a part that no process holds was left by a kill
 
 
 @contextlib.contextmanager
 def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Provide a temporary file that replaces ``path`` on success and is removed on failure.
 
+    On success it is on the disk. A link is followed; a device or a pipe stays and gets the content.
     NotWritten if the system refuses.
     """
-    target = Path(path)
-    _refuse_unusable_name(target)
-    part = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
+    _refuse_unusable_name(Path(path))
+    target = Path(os.path.realpath(path))
+    special = _special(target)
+    with contextlib.ExitStack() as after:
+        try:
+            if special:
+                folder = Path(after.enter_context(tempfile.TemporaryDirectory()))
+            else:
+                folder = target.parent
+                folder.mkdir(parents=True, exist_ok=True)
+                _remove_left(folder)
+            part = after.enter_context(_held(folder, target.name))
+            yield part
+            if special:
+                with part.open("rb") as content, target.open("wb") as stream:
+                    shutil.copyfileobj(content, stream)
+            else:
+                _sync(part)
+                part.replace(target)
+                with contextlib.suppress(OSError):  # not every file system syncs folders
+                    _sync(folder)
+        except OSError as reason:
+            raise NotWritten(
+                f"{str(path)!r} is not written ({reason.strerror or reason}): make room, or name "
+                "another file"
+            ) from reason
+
+
+@contextlib.contextmanager
+def _held(folder: Path, name: str) -> Iterator[Path]:
+    """Make an empty part, locked while this process uses it, and remove it if it is still there."""
+    part = folder / f".{name}.{secrets.token_hex(4)}.part"
+    handle = os.open(part, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
     try:
-        target.parent.mkdir(parents=True, exist_ok=True)
+        fcntl.flock(handle, fcntl.LOCK_EX)
         yield part
-        part.replace(target)
-    except OSError as reason:
-        raise NotWritten(
-            f"{str(target)!r} is not written ({reason.strerror or reason}): make room, or name "
-            "another file"
-        ) from reason
     finally:
         with contextlib.suppress(OSError):  # its folder may be missing
             part.unlink(missing_ok=True)
+        os.close(handle)
+
+
+def _remove_left(folder: Path) -> None:
+    """Remove parts that killed processes left in a folder."""
+    with os.scandir(folder) as entries:
+        parts = [entry.path for entry in entries if PART.fullmatch(entry.name)]
+    for part in parts:
+        with contextlib.suppress(OSError):  # it is held, or gone
+            if time.time() - os.stat(part).st_mtime > LEFT_AFTER:
+                handle = os.open(part, os.O_RDWR)
+                try:
+                    fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    os.unlink(part)
+                finally:
+                    os.close(handle)
+
+
+def _sync(path: Path) -> None:
+    """Wait until a file or the entries of a folder are on the disk."""
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
 
 
 def refuse_unwritable(path: str | os.PathLike[str]) -> None:
@@ -38,7 +96,10 @@ def refuse_unwritable(path: str | os.PathLike[str]) -> None:
     _refuse_unusable_name(target)
     if target.is_dir():
         raise IsADirectoryError(f"{path} is a folder")
-    refuse_unusable(target.absolute().parent)
+    if not _special(target):
+        refuse_unusable(target.absolute().parent)
+    elif not os.access(target, os.W_OK):
+        raise PermissionError(f"{path} cannot be written to")
 
 
 def refuse_unusable(folder: str | os.PathLike[str]) -> None:
@@ -50,6 +111,11 @@ def refuse_unusable(folder: str | os.PathLike[str]) -> None:
         raise NotADirectoryError(f"{place} is not a folder")
     if not os.access(place, os.W_OK | os.X_OK):
         raise PermissionError(f"{place} cannot be written to")
+
+
+def _special(path: Path) -> bool:
+    """Tell if a path is that of a device, a pipe or a socket."""
+    return path.exists() and not path.is_file() and not path.is_dir()
 
 
 def _refuse_unusable_name(path: Path) -> None:

@@ -28,9 +28,12 @@ MEASURES: dict[str, tuple[str, dict[str, Fraction]]] = {
     "m/s2": ("an acceleration", {"m/s2": ONE, "cm/s2": CENTI, "mm/s2": MILLI}),
     "kg m2": (
         "a moment of inertia",
-        {"kg m2": ONE, "kg mm2": MICRO, "g cm2": MILLI * CENTI**2, "g mm2": MILLI * MICRO},
+        {
+            **{"kg m2": ONE, "kg cm2": CENTI**2, "kg mm2": MICRO},
+            **{"g cm2": MILLI * CENTI**2, "g mm2": MILLI * MICRO},
+        },
     ),
-    "N m": ("a torque", {"N m": ONE, "mN m": MILLI, "N mm": MILLI}),
+    "N m": ("a torque", {"N m": ONE, "N cm": CENTI, "mN m": MILLI, "N mm": MILLI}),
     "N m/s": ("a torque per time", {"N m/s": ONE, "mN m/s": MILLI, "N mm/s": MILLI}),
     "N m s": (
         "a damping of joints",
@@ -38,7 +41,10 @@ MEASURES: dict[str, tuple[str, dict[str, Fraction]]] = {
     ),
     "N m/rad": (
         "a stiffness of joints",
-        {"N m/rad": ONE, "mN m/rad": MILLI, "N mm/rad": MILLI, "N m/deg": 1 / DEGREE},
+        {
+            **{"N m/rad": ONE, "N cm/rad": CENTI, "mN m/rad": MILLI, "N mm/rad": MILLI},
+            "N m/deg": 1 / DEGREE,
+        },
     ),
     "N/m": ("a stiffness", {"N/m": ONE, "kN/m": KILO, "N/mm": KILO}),
     "N/m1.5": ("a stiffness of contact", {"N/m1.5": ONE, "kN/m1.5": KILO}),

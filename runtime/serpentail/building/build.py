@@ -130,13 +130,14 @@ def built(
     scene = {key: value for key, value in tables.items() if key not in LEFT_OUT}
     own = scene.get("parameters", {})
     if not isinstance(own, Mapping):
-        return generated(scene, name), parameters or None
+        return generated(scene, name, {}), parameters or None
     if scene.get("baked") is True and parameters:
-        return generated(scene | {"parameters": merged(own, parameters)}, name), None
+        return generated(scene | {"parameters": merged(own, parameters)}, name, {}), None
     shaping = {n: x for n, x in parameters.items() if _shapes(n, scene, own)}
     if shaping:
         scene |= {"parameters": merged(own, shaping)}
-    return generated(scene, name), {n: x for n, x in parameters.items() if n not in shaping} or None
+    given = {n: x for n, x in parameters.items() if n not in shaping}
+    return generated(scene, name, given), given or None
 
 
 def _shapes(name: str, scene: Mapping[str, Any], own: Mapping[str, Any]) -> bool:
@@ -150,25 +151,36 @@ def _shapes(name: str, scene: Mapping[str, Any], own: Mapping[str, Any]) -> bool
     return "taper" not in scene and all(set(table) <= {"kind", "links"} for table in tables)
 
 
-def generated(scene: Mapping[str, Any], name: str) -> CheckedFolder:
-    """Return the checked files of a scene's model, generated unless the cache has them."""
+def generated(scene: Mapping[str, Any], name: str, given: Mapping[str, object]) -> CheckedFolder:
+    """Return the checked files of a scene's model, generated unless the cache has them.
+
+    given: parameters for the load, which are checked before a generation.
+    """
     text, cache = scene_text(scene), cache_folder(None)
     key = digest([identity(), name, text])
     found = _noted(cache, key)
     if found:
         return found
+    own = scene.get("parameters", {})
+    with_given = scene_text(scene | {"parameters": merged(own, given)}) if given else text
     with alone(cache, key):
-        return _noted(cache, key) or _made(cache, key, text, name)
+        return _noted(cache, key) or _made(cache, key, text, name, with_given)
 
 
-def _made(cache: Path, key: str, text: str, name: str) -> CheckedFolder:
-    """Generate a model, put its files into the cache, and store their hash under a key."""
+def _made(cache: Path, key: str, text: str, name: str, given: str) -> CheckedFolder:
+    """Generate a model, put its files into the cache, and store their hash under a key.
+
+    given: the scene's text with the parameters for the load.
+    """
     refuse_others(cache)
     try:
         with workshop(cache) as part:
             scene, note = part / f"{name}.toml", part / f"{key}.json"
+            checked = part / "given" / f"{name}.toml"
+            checked.parent.mkdir()
             scene.write_text(text, encoding="utf-8")
-            found = read_folder(generate(scene, part / "made"))
+            checked.write_text(given, encoding="utf-8")
+            found = read_folder(generate(scene, part / "made", checked))
             place = snapshot(found, cache)
             note.write_text(found.manifest_hash)
             publish(note, _note(cache, key), lambda _: False)

@@ -34,20 +34,23 @@ def identity() -> str:
     return digest([content.hexdigest(), tools, sys.version])
 
 
-def generate(scene: Path, output: Path) -> Path:
+def generate(scene: Path, output: Path, given: Path) -> Path:
     """Generate the model of a scene file below a folder, and return the model's own folder.
 
-    ModelError has the generator's message if it refuses the scene.
+    given: the scene with the parameters for the load, which are checked before. ModelError has the
+    generator's message if it refuses a scene.
     """
     noted = output.with_name("progress")
-    options = ["--output", str(output), "--progress", str(noted)]
+    options = ["--output", str(output), "--progress", str(noted), "--given", str(given)]
     with Stage("derive", scene.stem) as stage:
         done = run_all(
             [[*command(), *options, "--", str(scene)]], os.environ, lambda: _tell(stage, noted)
         )[0]
     folders = [path.parent for path in output.glob("*/manifest.json")]
     if done.returncode or len(folders) != 1:
-        words = (done.stderr or done.stdout).strip().replace(f"{scene}", scene.name)
+        words = (done.stderr or done.stdout).strip()
+        for path in (scene, given):
+            words = words.replace(f"{path}", scene.name)
         raise ModelError(f"{scene.stem} could not be generated: {words}")
     return folders[0]
 

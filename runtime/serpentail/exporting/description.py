@@ -24,6 +24,8 @@ UNITS: dict[str, tuple[str, dict[str, int] | None]] = {
     "N/m": ("N/m", {"kg": 1, "s": -2}),
     "N/m^1.5": ("N/m1.5", None),  # FMI has whole exponents alone
     "N m": ("N.m", {"kg": 1, "m": 2, "s": -2}),
+    "N m s": ("N.m.s", {"kg": 1, "m": 2, "s": -1}),
+    "N m/rad": ("N.m/rad", {"kg": 1, "m": 2, "s": -2, "rad": -1}),
     "kg m^2": ("kg.m2", {"kg": 1, "m": 2}),
 }
 RATES = {"m": "m/s", "1": "1/s", "rad": "rad/s", "m/s": "m/s^2", "rad/s": "rad/s^2"}

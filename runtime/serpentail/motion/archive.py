@@ -3,10 +3,9 @@
 import json
 import os
 import zipfile
-import zlib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -51,7 +50,7 @@ def read(path: str | os.PathLike[str], arrays: Iterable[str]) -> tuple[Path, dic
     fields = _stored(source, arrays)
     try:
         return source, _parsed(fields)
-    except ValueError as error:
+    except (KeyError, RecursionError, TypeError, ValueError) as error:
         raise ValueError(f"{str(source)!r} does not hold a valid trajectory: {error}") from error
 
 
@@ -64,31 +63,30 @@ def _npz(path: str | os.PathLike[str]) -> Path:
 
 def _stored(source: Path, arrays: Iterable[str]) -> dict[str, Any]:
     """The fields of a trajectory file, as stored, after a check of every checksum."""
-    try:
-        with zipfile.ZipFile(source) as archive:
-            size = sum(entry.file_size for entry in archive.infolist())
-            if size > MOST_EXPANSION * source.stat().st_size:
-                raise ValueError(f"it would unpack to {size / 1e9:.2g} GB")
-            damaged = archive.testzip()
-        if damaged:
-            raise ValueError(f"the checksum of {damaged} is wrong")
-        with np.load(source, allow_pickle=False) as stored:
-            touching = [name for name in stored.files if name.startswith(CONTACT)]
-            return {name: stored[name] for name in (*arrays, "info", *touching)}
-    except KeyError as error:
-        raise ValueError(f"{str(source)!r} is not a trajectory: {error.args[0]}") from error
-    except (
-        ValueError,
-        EOFError,
-        MemoryError,
-        NotImplementedError,
-        RuntimeError,
-        zipfile.BadZipFile,
-        zlib.error,
-    ) as error:
-        raise ValueError(
-            f"{str(source)!r} is damaged or not a trajectory ({error}): save it again"
-        ) from error
+    with source.open("rb") as stream:
+        try:
+            return _checked(stream, source.stat().st_size, (*arrays, "info"))
+        except KeyError as error:
+            raise ValueError(f"{str(source)!r} is not a trajectory: {error.args[0]}") from error
+        except Exception as error:  # zip and NumPy raise a dozen kinds for damaged bytes
+            raise ValueError(
+                f"{str(source)!r} is damaged or not a trajectory ({error}): save it again"
+            ) from error
+
+
+def _checked(stream: BinaryIO, size: int, needed: Iterable[str]) -> dict[str, Any]:
+    """The fields of a file of so many bytes, and those of a contact."""
+    with zipfile.ZipFile(stream) as archive:
+        unpacked = sum(entry.file_size for entry in archive.infolist())
+        if unpacked > MOST_EXPANSION * size:
+            raise ValueError(f"it would unpack to {unpacked / 1e9:.2g} GB")
+        damaged = archive.testzip()
+    if damaged:
+        raise ValueError(f"the checksum of {damaged} is wrong")
+    stream.seek(0)
+    with np.load(stream, allow_pickle=False) as stored:
+        touching = [name for name in stored.files if name.startswith(CONTACT)]
+        return {name: stored[name] for name in (*needed, *touching)}
 
 
 def _parsed(fields: dict[str, Any]) -> dict[str, Any]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..brief import brief
+from ..checks import shown
 
 Array = NDArray[np.float64]
 
@@ -40,11 +41,25 @@ class Contact:
     legs: Array | None = None
 
     def __post_init__(self) -> None:
-        """Keep read-only copies."""
+        """Check the fields, and keep read-only copies."""
         for name, value in self.arrays.items():
             array = np.array(value, float)
             array.setflags(write=False)
             object.__setattr__(self, name, array)
+        known = isinstance(self.groups, dict) and set(self.groups) <= set(GROUPS)
+        if not known or not all(type(n) is int and n > 0 for n in self.groups.values()):
+            raise ValueError(
+                f"contact.groups: value {shown(self.groups)}: needs a count of points of each of "
+                f"{', '.join(GROUPS)}"
+            )
+        samples, count = len(self.points), sum(self.groups.values())
+        widths = {"points": (count, 3), "forces": (count, 3), "bristles": (count, 2), "legs": (4,)}
+        for name, array in self.arrays.items():
+            if array.shape != (samples, *widths[name]):
+                raise ValueError(
+                    f"contact.{name} has shape {array.shape}: give {(samples, *widths[name])}, as "
+                    "its groups say"
+                )
 
     __repr__ = brief
 
@@ -100,4 +115,5 @@ class Contact:
         return replace(self, **changed)
 
 
+GROUPS = ("feet", "tail", "torso")
 OF_POINTS = ("points", "forces", "bristles")

@@ -7,9 +7,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..attitude import Array
-from ..checks import finite_array
+from ..checks import finite_array, shown
 from ..model.layout import Layout
 
+# entries of info on which others build, and what each entry of these lists has
+LISTS: dict[str, tuple[type, tuple[str, ...]]] = {
+    "warnings": (str, ()),
+    "doubts": (str, ()),
+    "events": (dict, ("time", "group", "kind")),
+    "phases": (dict, ()),
+}
 UNIT_TOLERANCE = 1e-3  # how far a stored quaternion's norm may drift from 1
 
 
@@ -75,9 +82,23 @@ def json_text(info: Any) -> str:
     """Return the text of info, a dict of plain JSON values; ValueError otherwise."""
     try:
         if isinstance(info, dict):
+            _check_lists(info)
             return json.dumps(info, allow_nan=False)
     except (TypeError, ValueError) as error:
         raise ValueError(
             f"info is not JSON-ready ({error}): convert arrays by tolist(), use None for nan"
         ) from error
     raise ValueError(f"info is a {type(info).__name__}: give a dict of plain JSON values")
+
+
+def _check_lists(info: dict[str, Any]) -> None:
+    """ValueError unless the lists of info that others read are such lists."""
+    for name, (kind, keys) in LISTS.items():
+        entries = info.get(name, [])
+        listed = isinstance(entries, list) and all(isinstance(each, kind) for each in entries)
+        if not listed or not all(key in each for each in entries for key in keys):
+            what = "tables" if kind is dict else "texts"
+            of = f" with {', '.join(keys)}" if keys else ""
+            raise ValueError(
+                f"info[{name!r}] has value {shown(entries)}: give a list of {what}{of}"
+            )

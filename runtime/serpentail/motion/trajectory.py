@@ -91,6 +91,10 @@ class Trajectory(Exports, Showable):
                 raise ValueError(
                     f"{name} has shape {actual}: give {shape}, to match the shapes of t and q"
                 )
+        if self.contact is not None and len(self.contact.points) != len(self.t):
+            raise ValueError(
+                f"contact has {len(self.contact.points)} samples: give {len(self.t)}, as t has"
+            )
         check_time(self.t)
         check_unit(self.attitude)
         object.__setattr__(self, "info", json.loads(json_text(self.info)))

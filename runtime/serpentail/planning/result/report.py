@@ -129,7 +129,7 @@ def tracked(model: Model, problem: PlanningProblem, planned: Trajectory) -> Traj
         (problem.q0, problem.v0),
         Pfl(model, planned, torque=problem.bounds.torque),
         planned.t[-1],
-        method="dop853",
+        method="tsit5",
         rtol=1e-8,
         atol=1e-10,
         output_step=planned.t[-1] / TRACKED_SAMPLES,
