@@ -13,6 +13,7 @@ from ..errors import StateError
 from ..model.layout import PER_SEGMENT, POSITION, QUATERNION
 from ..model.model import Model
 from .body import semi_axes, weight
+from .forces import peaks
 from .through_torso import sunk
 
 if TYPE_CHECKING:
@@ -120,15 +121,14 @@ def _through_the_torso(model: Model, motion: "Trajectory") -> list[str]:
 
 def _blows(model: Model, motion: "Trajectory") -> list[str]:
     """A force of the ground that no animal stands."""
-    contact, whole = motion.contact, weight(model)
-    if contact is None or not whole:
+    found, whole = peaks(motion), weight(model)
+    if not found or not whole:
         return []
-    forces = contact.total
-    k = int(forces.argmax())
-    if not forces[k] > MOST_WEIGHTS * whole:
+    force, time = found["all"]
+    if not force > MOST_WEIGHTS * whole:
         return []
     return [
-        f"ground: pushes with {forces[k]:.4g} N at t = {motion.t[k]:.4g} s, {forces[k] / whole:.3g}"
+        f"ground: pushes with {force:.4g} N at t = {time:.4g} s, {force / whole:.3g}"
         f" body weights, more than {MOST_WEIGHTS:g}: let the legs move, or the animal land, more "
         "slowly, or make the ground softer by K_n and D_n"
     ]

@@ -48,6 +48,9 @@ def _info(parts: Sequence[dict[str, Any]]) -> dict[str, Any]:
     if all("events" in part for part in parts):
         info["events"] = [event for part in parts for event in part["events"]]
     info["warnings"] = list(dict.fromkeys(w for part in parts for w in part.get("warnings", [])))
+    peaks = [item for part in parts for item in part.get("peaks", {}).items()]
+    if peaks:  # sorted by force, so that the largest of each name is kept
+        info["peaks"] = dict(sorted(peaks, key=lambda item: item[1][0]))
     if all("imbalance" in part for part in parts):
         for name in BOOKS:
             info[name] = {

@@ -155,6 +155,11 @@ SAMPLES = fields(
 )
 EVENT_FIELDS = fields(
     (
+        "peaks",
+        "real *",
+        "[parts][2] largest force (N) so far on all points, each group, each foot, its time (s)",
+    ),
+    (
         "stop_at",
         "int",
         "sum of 1 << event for events that end the run; event = 2 group + (0: it begins to press, "

@@ -28,6 +28,17 @@ class SimulationFeatures:
         return tuple((name, 1) for name in works) + tuple((name, 3) for name, _ in self.groups)
 
     @property
+    def parts(self) -> tuple[tuple[str, int, int], ...]:
+        """Return what a run keeps the largest force of: all points, groups, feet; their limits."""
+        found, first = [("all", 0, self.contacts)], 0
+        for name, count in self.groups:
+            found.append((name, first, first + count))
+            first += count
+        half = dict(self.groups).get("feet", 0) // 2  # they come first
+        feet = [("right_foot", 0, half), ("left_foot", half, 2 * half)]
+        return tuple(found + feet * bool(half))
+
+    @property
     def implicit(self) -> bool:
         """Tell if it can take implicit steps."""
         return self.factors > 0
