@@ -73,6 +73,8 @@ def _of_motions(verbs: argparse._SubParsersAction) -> None:
     )
     film = "draw it to this file: .mp4 or .gif (film), .png, .svg or .pdf (filmstrip), .html (page)"
     simulate.add_argument("--film", help=film)
+    words = "estimate the error of each number: the motion is made again, less exactly"
+    simulate.add_argument("--errors", action="store_true", help=words)
     plan = verbs.add_parser("plan", help="plan the motion of a scene's table [plan]")
     _add_scene(plan, "scenes/righting_m1_n3.toml")
     words = "estimate parameters and torques from marker tracks, as the table [identify] says"

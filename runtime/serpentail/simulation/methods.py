@@ -1,7 +1,7 @@
 """Integration methods, their settings, and the choice of "auto"."""
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,8 @@ SETTINGS = {
 }
 # 1/s: a fastest decay beyond this limits the steps of an explicit method, not their accuracy
 STIFF_DECAY = 5e3
+# times the tolerances, times the steps, of runs that are made again to estimate errors
+LOOSER, LONGER = (4.0, 10.0), (2, 3)
 MIN_ROUNDINGS = 100  # rounding errors that a relative tolerance must allow, as in SciPy's methods
 # default tolerances
 SINGLE_RTOL = {"tsit5": 1e-4, "ros34pw2": 1e-3}
@@ -45,6 +47,20 @@ class IntegrationMethod:
         """What a trajectory's info says of it."""
         finite = {name: x for name, x in self.settings.items() if x is not np.inf}
         return finite | {"method": self.name, "reason": self.reason}
+
+    def coarser(self, coarse: int, interval: float) -> "IntegrationMethod":
+        """Return this method at some times its error, for samples so far apart (s).
+
+        Where so few steps fill an interval that they cannot be longer, there is one more.
+        """
+        settings = dict(self.settings)
+        for name in ("rtol", "atol", "least_step", "most_step"):
+            if np.isfinite(settings.get(name, np.inf)):
+                settings[name] *= LOOSER[coarse]
+        if "step" in settings:
+            steps = round(interval / settings["step"])
+            settings["step"] = interval / (steps // LONGER[coarse] or steps + 1)
+        return replace(self, settings=settings)
 
 
 def checked_method(

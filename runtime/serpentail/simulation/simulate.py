@@ -14,14 +14,18 @@ from ..errors import SimulationError
 from ..magnitudes import warn_of_degrees
 from ..model.cores import checked_threads
 from ..model.model import Model
+from ..motion.derived import AGAIN
 from ..motion.trajectory import Trajectory
 from ..stages import Stage
+from .acting import Acting
 from .choice import prepared, still_chosen
-from .compiled_run import CompiledRun, Samples
-from .controllers import Controller
+from .compiled_run import CompiledRun, Memory, Samples
+from .controllers import Controller, remembers
+from .ground import Ground
 from .measured import trajectory_or_error
-from .methods import SCIPY
+from .methods import SCIPY, IntegrationMethod
 from .parallel_runs import run_parallel
+from .records import Records
 from .rollouts import Rollouts
 from .start import Start
 from .waiting import asked_for, let_wait, taken
@@ -168,8 +172,41 @@ def simulate(
     samples = integrate(run, watch)
     info = samples.info | run.method.info | spent(clocks)
     motion = trajectory_or_error(model, replace(samples, info=info), run.ground)
+    if not remembers(controller):
+        made_of = run.start, run.ground, run.method
+        vars(motion)[AGAIN] = partial(
+            _again, model, controller, made_of, (samples.q[0], samples.v[0])
+        )
     let_wait(model, asked, run)
     return motion
+
+
+def _again(
+    model: Model,
+    controller: Controller,
+    made_of: tuple[Start, Ground, IntegrationMethod],
+    state: tuple[np.ndarray, np.ndarray],
+    coarse: int,
+    last: Trajectory | None = None,
+) -> Trajectory:
+    """Return a run from a state made again, less exactly; of a sequence from the last part's end.
+
+    SimulationError if it fails, or the last part ends too late.
+    """
+    start, ground, method = made_of
+    (q0, v0), begin = state, start.start
+    if last is not None:
+        q0, v0, begin = last.q[-1], last.v[-1], float(last.t[-1])
+        if last.contact is not None:
+            ground = replace(ground, bristles=last.contact.bristles[-1:])
+        if begin >= start.end:
+            raise SimulationError(f"at t = {begin:.6g} s a phase ends after the next one")
+    start = replace(start, q0=q0[None], v0=v0[None], start=begin)
+    acting = Acting(Records(model), controller, start, ground.legs.curve if ground.legs else None)
+    memory = Memory(acting.records, start, ground, model.parameters_of_runs(None, 1))
+    method = method.coarser(coarse, start.interval)
+    samples = integrate(CompiledRun(memory, acting, method))
+    return trajectory_or_error(model, replace(samples, info=samples.info | method.info), ground)
 
 
 def _doubt(model: Model, start: Start) -> None:
