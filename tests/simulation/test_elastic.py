@@ -48,7 +48,7 @@ def test_energy_balances_over_long_runs_and_better_with_tolerance(name):
                 with row(part, method, rtol):
                     most = 500 if method == "ros34pw2" else 100  # of low order, and the run is long
                     assert share < most * rtol
-                    assert bool(run.info["warnings"]) == (share > 100 * rtol)
+                    assert bool(run.info["warnings"]) == (share > min(100 * rtol, 0.01))
                     left = run.energy[-1] - run.energy[0] - work["damping"] - work["torques"]
                     told = run.info["imbalance"]["energy_J"]
                     assert left == pytest.approx(told, abs=1e-12) and work["torques"] == 0
