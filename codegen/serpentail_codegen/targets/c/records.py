@@ -157,7 +157,8 @@ EVENT_FIELDS = fields(
     (
         "peaks",
         "real *",
-        "[parts][2] largest force (N) so far on all points, each group, each foot, its time (s)",
+        "[parts][2] largest force (N) so far on all points, each group, each foot, and its time "
+        "(s); or NULL",
     ),
     (
         "stop_at",
