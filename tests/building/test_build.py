@@ -19,6 +19,7 @@ import serpentail as st
 from serpentail import cli
 from serpentail.building import build as building
 from serpentail.building.fewer_contacts import FUNCTIONS, NEEDED, with_contacts
+from serpentail.building.generator import generate
 from serpentail.building.options import Parameters, SceneKeys
 from serpentail.building.scene_text import scene_text
 from serpentail_codegen.scene.parameters import PARAMETERS
@@ -46,7 +47,7 @@ def generations(cache, monkeypatch):
     """Return a list that grows by each run of the generator, which makes each text once a day."""
     runs = []
 
-    def generate(scene, output):
+    def generate(scene, output, given):
         runs.append(scene)
         return shutil.copytree(folder_of(load_scene(scene)), output / scene.stem)
 
@@ -96,7 +97,7 @@ REFUSED = [
     (None, {"segmens": 3}, "segmens: value 3: .*'segments'"),
     (None, {"m": 2}, "m: value 2.*'segments'"),
     (None, {**TINY, "torso_mas": 1}, "torso_mas: .*'torso_mass'"),
-    (None, {**TINY, "mu": 1}, "mu: no such parameter"),
+    (None, {**TINY, "mu": 1}, "mu: value 1: nothing touches the ground by it"),
     (None, {"tail": "articulatd", "segments": 0}, "(?s)kind: .*segments: .*links: "),
     (None, {**TINY, "links": 10**30}, "links: value 1000.*64 bits"),
     (None, {**TINY, "contacts": {1j}}, "contacts: value {1j}"),
@@ -114,6 +115,37 @@ def test_what_cannot_be_built_is_refused_by_name(cache, monkeypatch):
     monkeypatch.setattr("serpentail.building.generator.find_spec", lambda name: None)
     with pytest.raises(st.ModelError, match="without the package serpentail_codegen"):
         made(**TINY)
+
+
+MASS = "parameters.tail_mass: value "
+WRONG = {  # and what is told of a value
+    "3 oz": MASS + "'3 oz': unknown unit 'oz': give kg, g",
+    -1: MASS + "-1: needs a finite number above 0, in kg",
+    "3 kg cm2": MASS + ".*a moment of inertia where a mass is needed",
+    "3 N cm": MASS + ".*a torque where a mass is needed",
+    "3 N cm/rad": MASS + ".*a stiffness of joints where a mass is needed",
+}
+
+
+def test_wrong_parameters_are_refused_before_anything_is_derived(cache, monkeypatch):
+    """In less than a second of processor time; the shortest derivation takes several."""
+    derived = []
+
+    def spied(scene, output, given):
+        try:
+            return generate(scene, output, given)
+        finally:
+            derived.extend(output.glob("*"))
+
+    monkeypatch.setattr(building, "generate", spied)
+    before = os.times()
+    for value, words in WRONG.items():
+        with row(value), pytest.raises(st.ModelError, match=words) as caught:
+            st.build(**TINY, tail_mass=value)
+        assert "\n" not in str(caught.value) and str(cache) not in str(caught.value)
+    after = os.times()
+    spent = sum(after[:4]) - sum(before[:4])  # with that of children
+    assert not derived and spent < len(WRONG)
 
 
 def test_a_built_model_is_the_generated_one_and_nothing_else_is_imported(cache, tmp_path):
