@@ -1,12 +1,10 @@
 """Peaks of the ground's forces at a motion's samples: of points, feet, groups and all together."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from ..model.model import Model
 from .body import weight
-from .contact import Contact
+from .contact import Array
 from .trajectory import Trajectory
 
 FEET = ("right_foot", "left_foot")
@@ -27,18 +25,17 @@ def peaks(motion: Trajectory) -> dict[str, float] | None:
     """The largest force (N) on each group, and on each foot; None in flight."""
     if motion.contact is None:
         return None
-    groups = {group: motion.contact.of(group) for group in motion.contact.groups}
-    parts = groups | feet(motion)
-    return {name: float(part.total.max()) for name, part in parts.items()}
+    groups = {group: motion.contact.of(group).forces for group in motion.contact.groups}
+    totals = {name: forces.sum(axis=1) for name, forces in (groups | feet(motion)).items()}
+    return {name: float(np.linalg.norm(total, axis=1).max()) for name, total in totals.items()}
 
 
-def feet(motion: Trajectory) -> dict[str, Contact]:
-    """Return the points of the right and of the left foot; nothing without feet."""
+def feet(motion: Trajectory) -> dict[str, Array]:
+    """Return the forces (K, points, 3) on the right and on the left foot; nothing without feet."""
     if motion.contact is None or "feet" not in motion.contact.groups:
         return {}
-    both = motion.contact.of("feet")
-    sides = np.split(both.forces, 2, axis=1)
-    return {name: replace(both, forces=side) for name, side in zip(FEET, sides, strict=True)}
+    sides = np.split(motion.contact.of("feet").forces, 2, axis=1)
+    return dict(zip(FEET, sides, strict=True))
 
 
 def peak_force(motion: Trajectory, group: str) -> float | None:
