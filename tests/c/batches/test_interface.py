@@ -71,6 +71,10 @@ def test_the_state_that_is_wrong_is_named():
     bent[17, 9] = 7.0
     with pytest.raises(st.StateError, match="segment 2 of state 17 is bent by 7"):
         model_of("arcs2").mass_matrix(bent)
+    straight = states(model_of("mixed"), 20)["q"]  # its arcs are segments 1 and 3
+    straight[17, 7:] = [6.3, 0, 9, 0, 1, 0, 9, 0]
+    with pytest.raises(st.StateError, match=r"segment 1 of state 17 is bent by 6\.3 "):
+        model_of("mixed").mass_matrix(straight)
     touching = model_of("ground")
     values = on_ground(touching, TOUCHING * 4)
     values["bristles"][7, 3] = np.nan
