@@ -16,11 +16,7 @@ from tests.support.rows import row
 
 from .tails import TOUCHING, alone, evaluated, given, on_ground, states
 
-
-@cache
-def model_of(name):
-    """A model that other files of tests do not have: once it has lanes, they are used."""
-    return st.load(zoo.folder(name))
+model_of = cache(zoo.own)  # once a model has lanes, they are used
 
 
 @pytest.fixture(autouse=True)
@@ -32,7 +28,7 @@ def test_a_few_states_compile_nothing_and_many_do_once(monkeypatch):
     monkeypatch.setattr("serpentail.model.batch.MIN_BATCH", 1000)
     built, place = [], "serpentail.model.batch.model_library"
     monkeypatch.setattr(place, lambda *a: built.append(a) or model_library(*a))
-    found = st.load(zoo.folder("m1_n1"))
+    found = zoo.own("m1_n1")
     found.mass_matrix(states(found, 999)["q"])
     assert not built
     found.mass_matrix(states(found, 1000)["q"])
