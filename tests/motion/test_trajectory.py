@@ -11,7 +11,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from serpentail.attitude import pitch_roll_yaw, product, quaternion_rate, rotation_matrix
-from serpentail.motion.contact import Contact
 from serpentail.motion.trajectory import Trajectory
 from tests.support.rows import row
 
@@ -84,20 +83,6 @@ def test_unsound_fields_are_named():
     ):
         with row(name, words), pytest.raises(ValueError, match=words):
             Trajectory(**given | {name: change(given[name])})
-
-    points, two = np.zeros((41, 2, 3)), {"feet": 2}
-    sound = {"points": points, "forces": points, "bristles": points[..., :2], "groups": two}
-    for name, value, words in (
-        *(("groups", g, "groups: value") for g in ([], {"ear": 2}, {"feet": 0}, {"feet": 2.0})),
-        ("groups", {"feet": 3}, r"points has shape \(41, 2, 3\): give \(41, 3, 3\)"),
-        ("forces", points[:, :1], r"forces has shape \(41, 1, 3\): give \(41, 2, 3\)"),
-        ("bristles", points, r"bristles has shape .*: give \(41, 2, 2\)"),
-        ("legs", points[:, 0], r"legs has shape \(41, 3\): give \(41, 4\)"),
-    ):
-        with row(name, words), pytest.raises(ValueError, match=f"contact.{words}"):
-            Contact(**sound | {name: value})
-    with pytest.raises(ValueError, match="contact has 41 samples: give 40"):
-        dataclasses.replace(FLIGHT.resample(FLIGHT.t[1:]), contact=Contact(**sound))
 
     # quaternions may drift from unit norm by a thousandth
     q = FLIGHT.q.copy()
