@@ -1,7 +1,6 @@
 """Writes files whole or not at all, and checks before the work that they can be written."""
 
 import contextlib
-import fcntl
 import os
 import re
 import secrets
@@ -12,6 +11,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from .errors import NotWritten
+
+try:
+    import fcntl
+except ImportError:  # Windows, where no part is locked, and none is swept
+    fcntl = None  # type: ignore[assignment]
 
 PART = re.compile(r"\..+\.[0-9a-f]{8}\.part")
 LEFT_AFTER = 60.0  # s without a change, after which a part that no process holds was left by a kill
@@ -58,16 +62,22 @@ def _held(folder: Path, name: str) -> Iterator[Path]:
     part = folder / f".{name}.{secrets.token_hex(4)}.part"
     handle = os.open(part, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX)
+        if fcntl is None:
+            os.close(handle)  # an open file cannot be renamed there
+        else:
+            fcntl.flock(handle, fcntl.LOCK_EX)
         yield part
     finally:
         with contextlib.suppress(OSError):  # its folder may be missing
             part.unlink(missing_ok=True)
-        os.close(handle)
+        if fcntl is not None:
+            os.close(handle)
 
 
 def _remove_left(folder: Path) -> None:
-    """Remove parts that killed processes left in a folder."""
+    """Remove parts that killed processes left in a folder, where locks tell which these are."""
+    if fcntl is None:
+        return
     with os.scandir(folder) as entries:
         parts = [entry.path for entry in entries if PART.fullmatch(entry.name)]
     for part in parts:
@@ -83,7 +93,7 @@ def _remove_left(folder: Path) -> None:
 
 def _sync(path: Path) -> None:
     """Wait until a file or the entries of a folder are on the disk."""
-    handle = os.open(path, os.O_RDONLY)
+    handle = os.open(path, os.O_RDWR if path.is_file() else os.O_RDONLY)
     try:
         os.fsync(handle)
     finally:

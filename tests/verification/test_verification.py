@@ -15,7 +15,7 @@ from serpentail_codegen.functions.catalogue import CATALOGUE
 from serpentail_codegen.scene.signatures.table import AIRBORNE, DERIVATIVES, NEEDS
 from tests.references import metrics
 from tests.support import models, zoo
-from tests.support.faults import TAKING_MORE, alone, broken, failed, not_a_number
+from tests.support.faults import TAKING_MORE, broken, failed, not_a_number
 from tests.support.rows import row
 from tests.verification import verify_model
 
@@ -52,7 +52,7 @@ def missing_in(model, reason):
 def test_laws_hold_for_other_animals():
     for name, numbers in OTHER_NUMBERS.items():
         with row(name):
-            checks = verify.laws(alone(name).with_parameters(**numbers))
+            checks = verify.laws(zoo.own(name).with_parameters(**numbers))
             assert failed(checks) == set()
             assert len({c.name for c in checks}) == len(checks) == len(verify.LAWS)
 
@@ -70,7 +70,7 @@ def test_long_tails_and_long_segments_pass(segments, links):
 
 def test_what_was_left_out_is_said():
     pytest.importorskip("pinocchio")
-    model = alone("bare")
+    model = zoo.own("bare")
     checks = verify_model.judge(model)
     omitted = {c.name: c.omitted for c in checks if c.omitted}
     assert omitted["kinetic energy is half v H v"] == "not generated: mass_matrix, energy"
@@ -105,7 +105,7 @@ def test_a_model_of_one_function_is_checked():
 
 
 def test_summary_is_strict_json():
-    model = alone("m1_n1")
+    model = zoo.own("m1_n1")
     for faulty in (True, False):
         judged = broken(model, "bias_force", not_a_number) if faulty else model
         told = verify.summary(judged, verify.laws(judged))

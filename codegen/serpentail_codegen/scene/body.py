@@ -87,7 +87,8 @@ def body_of(table: Any, parameters: Any) -> Body:
     named = parameters if isinstance(parameters, Mapping) else {}
     if not isinstance(table, Mapping):
         return Body(problems=(Problem("body", table, "needs a table: scale or mass, torso"),))
-    problems = [Problem(f"body.{key}", table[key], _unknown(key)) for key in set(table) - {*KEYS}]
+    unknown = [key for key in table if key not in KEYS]
+    problems = [Problem(f"body.{key}", table[key], suggest(key, KEYS)) for key in unknown]
     if "scale" in table and "mass" in table:
         remedy = "given together with scale: each decides the size; remove one of the two"
         problems.append(Problem("body.mass", table["mass"], remedy))
@@ -95,11 +96,6 @@ def body_of(table: Any, parameters: Any) -> Body:
     mass = _number("body.mass", table.get("mass"), "kg", (1e-9, 1e9), problems)
     torso = _torso(table["torso"], named, problems) if "torso" in table else None
     return Body(scale, mass, torso, tuple(problems))
-
-
-def _unknown(key: object) -> str:
-    """Return a problem for each key that a table `body` cannot have."""
-    return suggest(str(key), KEYS) or f"unknown; needs {', '.join(KEYS)}"
 
 
 def _number(

@@ -144,6 +144,7 @@ class Kernel:
         self.parameters, self.work = parameters, manifest["work"][name]
         self.bend_range = manifest["scene"].get("bend_range")
         self.polar = manifest["scene"]["coordinates"] == "polar"
+        self.kinds = manifest["dimensions"].get("kinds") or ("continuum",)  # of all: arcs alone
         self.own = threading.local()  # buffers of each thread
         self.fast: Call | None = None  # made at the first call
 
@@ -283,6 +284,7 @@ class Kernel:
             tail = tail[: len(tail) // 2]
         first, second = tail[::PER_SEGMENT], tail[1::PER_SEGMENT]
         bends = abs(second) if self.polar else np.hypot(first, second)
+        bends = np.where(np.array(self.kinds) == "continuum", bends, 0.0)  # only arcs have a range
         least, worst = int(bends.argmin()), int(bends.argmax())
         if self.polar and bends[worst] <= self.bend_range:
             what = f"segment {least + 1}{state} has theta = {bends[least]:.6g} rad"

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..brief import brief
-from ..checks import Refusals, number, numbers, numbers_in, one_of, refusal, shown
+from ..checks import Refusals, number, numbers_in, one_of, refusal, refuse_not_finite, shown
 from ..errors import PlanningError
 from ..model.layout import QUATERNION, TAIL_Q, TAIL_V
 from ..model.model import Model
@@ -102,11 +102,12 @@ def checked_problem(
 
 
 def _vector(field: str, value: Any, size: int) -> np.ndarray:
-    """Return finite numbers (size,); PlanningError otherwise, also for a single number."""
+    """Return a copy of finite numbers (size,); PlanningError otherwise."""
     array = numbers_in(value)
-    if array is None or array.shape == ():
+    if array is None or array.shape != (size,):
         raise refusal(field, value, f"{size} numbers", PlanningError)
-    return numbers(field, value, size, PlanningError)
+    refuse_not_finite(field, array, PlanningError)
+    return array.copy()
 
 
 def _unit_quaternion(field: str, quaternion: np.ndarray) -> np.ndarray:
