@@ -65,6 +65,26 @@ def test_long_tails_and_long_segments_pass(segments, links):
     assert [c for c in checks if not c.passed] == []
 
 
+def test_batches_in_lanes_are_singles_but_for_rounding(monkeypatch):
+    """Compiled as a user's are, where other operations are fused; else one bit is a fault."""
+    monkeypatch.setenv("CC", "cc")
+    for profile, lanes, fault in (
+        ("fast", False, 3e-16),
+        ("fast", True, 1e-9),
+        ("reproducible", True, 3e-16),
+    ):
+
+        def last_only(x, q, *_, fault=fault):
+            return x * (1 + fault * (np.arange(len(x)) == 8)[:, None]) if q.ndim == 2 else x
+
+        model = st.load(zoo.folder("bare"), profile=profile)
+        assert not lanes or model.batch_library.entry("forward_dynamics", 1000)
+        with row(profile, lanes):
+            assert failed(verify.laws(model)) == set()
+            faulty = broken(model, "forward_dynamics", last_only)
+            assert "batches are singles" in failed(verify.laws(faulty))
+
+
 # Reports
 
 

@@ -129,7 +129,7 @@ def _of_models(verbs: argparse._SubParsersAction) -> None:
     export.add_argument("kind", choices=["urdf", "mjcf", "bundle", "fmu"], help=kinds)
     for verb in (info, verify, export):
         verb.add_argument("model", help="a generated folder, a scene file or an example's name")
-    file = "the file, ending in .urdf, .xml, .zip or .fmu; by default named after the model, here"
+    file = "the file, such as rat.urdf, rat.xml, rat.zip or rat.fmu; by default the model's name"
     export.add_argument("-o", "--output", metavar="FILE", help=file)
 
 

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, DTypeLike
 from ..checks import real_array, refuse_not_finite
 from ..errors import StateError
 from .batch import BatchLibrary, RecordFunction
-from .calls import Call, call_of, declined
+from .calls import Call, call_of, declined, waiting
 from .layout import PER_SEGMENT, QUATERNION
 from .library import NOT_POSITIVE_DEFINITE, OUT_OF_RANGE
 from .workers import shared
@@ -155,9 +155,12 @@ class Kernel:
 
     def _prepared(self) -> Call:
         """Return a fast call of the function; it returns None for arguments that it declines."""
+        if waiting():
+            return declined
         own = self._buffers()
         size = self.work + sum(array.size for array in (*own.inputs, *own.outputs))
-        self.fast = fast = declined if size > MOST_HELD else call_of(self.function, own)
+        fast = declined if size > MOST_HELD else call_of(self.function, own)
+        self.fast = None if waiting() else fast
         return fast
 
     def _buffers(self) -> Buffers:

@@ -1,0 +1,86 @@
+"""Every packaged scene in every kind of file: it is read as the model, or refused with a remedy
+that works.
+"""
+
+import zipfile
+
+import numpy as np
+import pytest
+
+import serpentail as st
+from serpentail.building.examples import example_paths, tables_of_scene
+from serpentail.exporting.export import SUFFIXES
+from tests.support.rows import row
+
+from .test_chains import mujoco, pin, unbalanced
+
+QUICK = ("identify_tail",)
+
+
+def read_urdf(model, path, _):
+    read = pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer(), True)
+    assert (read.nq, read.nv) == (model.nq, model.nv)
+
+
+def read_mjcf(model, path, _):
+    q, v = np.random.default_rng(5).normal(scale=0.1, size=(2, model.nq))
+    lacking = unbalanced(model, mujoco.MjModel.from_xml_path(str(path)), q, v[1:])
+    assert np.abs(lacking).max() < 1e-12
+
+
+def read_bundle(model, path, _):
+    folder = path.with_suffix("")
+    with zipfile.ZipFile(path) as archive:
+        archive.extractall(folder)
+    (unpacked,) = folder.iterdir()
+    assert st.load(unpacked).checked.manifest_hash == model.checked.manifest_hash
+
+
+def read_fmu(model, path, opened):
+    one, known, _ = opened(path, "Model")
+    q = one.getReal([known[f"q[{k + 1}]"] for k in range(model.nq)])
+    rates = one.getReal([known[f"der(v[{k + 1}])"] for k in range(model.nv)])
+    expected = model.forward_dynamics(q, np.zeros(model.nv), np.zeros(model.nv - 6))
+    np.testing.assert_allclose(rates, expected, rtol=1e-9, atol=1e-9)
+
+
+READERS = {"urdf": read_urdf, "mjcf": read_mjcf, "bundle": read_bundle, "fmu": read_fmu}
+REMEDIES = {  # words of a refusal -> the model and the kind that they lead to
+    'export an "fmu"': lambda model, _: (model, "fmu"),
+    'export an "mjcf"': lambda model, _: (model, "mjcf"),
+    "with tail_stiffness = 0": lambda model, kind: (model.with_parameters(tail_stiffness=0), kind),
+    "add it to `functions`": lambda model, kind: (
+        st.build(model.name, functions=[*tables_of_scene(model.name)[0]["functions"], "rollout"]),
+        kind,
+    ),
+    'kind = "articulated" and some links': lambda model, kind: (
+        st.build(tail="articulated", segments=model.segments, links=2),
+        kind,
+    ),
+}
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        each if each in QUICK else pytest.param(each, marks=pytest.mark.slow)
+        for each in example_paths()
+    ],
+)
+def test_a_packaged_scene_is_exported_or_a_remedy_of_its_refusal_works(name, tmp_path, opened):
+    model = st.build(name)
+    for kind, (usual, *_) in SUFFIXES.items():
+        path = tmp_path / f"{kind}{usual}"
+        try:
+            found = [(model, kind, st.export(model, kind, path))]
+        except st.SerpentailError as refusal:
+            found = [
+                (*way, st.export(*way, path.with_suffix(SUFFIXES[way[1]][-1])))
+                for way in (
+                    led(model, kind) for told, led in REMEDIES.items() if told in str(refusal)
+                )
+            ]
+            assert found, refusal
+        for way in found:
+            with row(kind, way[1]):
+                READERS[way[1]](way[0], way[2], opened)
