@@ -2,68 +2,81 @@
 
 import resource
 import signal
-import sqlite3
 import subprocess
 import sys
 import time
 from collections import Counter
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.sweeps.store import Row, Store
+from serpentail.sweeps.shards import Row, Shard
+from serpentail.sweeps.store import Store
 from tests.support import swept
 from tests.support.rows import row
+
+parquet = pytest.importorskip("pyarrow.parquet")
 
 ROOT = Path(__file__).parents[2]
 PATIENCE = 120  # s
 FAILED = {*swept.HANGS, *swept.CRASHES, *swept.RAISES}
+SPEC = {"family": [], "grids": [[["x"], ["1", "2"]]], "spreads": [], "points": 1, "seed": 0}
+SPEC |= {"models": [""], "varied": []}
 
 
-ROW = Row("k", '{"x":1}', '{"y":2}', None, 0.5)
+def shard(*numbers, failed=()):
+    told = [(None, "wrong") if n in failed else (f'{{"y":{n}}}', None) for n in numbers]
+    return Shard.of([Row(n, *each, 0.5) for n, each in zip(numbers, told, strict=True)])
 
 
-def test_a_row_that_is_there_stays_and_rows_are_written_all_or_none(tmp_path):
-    store = Store(tmp_path / "s.db")
-    with pytest.raises(st.NotWritten):
-        store.add([ROW, Row("l", None, None, None, 0.1)])  # a row without a point
-    assert store.known("kl") == {}
-    store.add([ROW, Row("l", "{}", None, "wrong", 0.1)])
-    store.add([ROW._replace(outcome='{"y":3}'), Row("m", "{}", "{}", None, 0.1)])
-    assert store.rows(["k"]) == {"k": ROW}
-    assert store.known(["k", "l", "n"]) == {"k": True, "l": False}
-    store.close()
-    with closing(Store(tmp_path / "s.db")) as again:
-        assert set(again.rows("klmn")) == set("klm")
-        again.forget(["l"])
-        assert again.known("klm") == {"k": True, "m": True}
-        again.add([ROW._replace(key=str(k)) for k in range(1203)])
-        assert len(again.rows(map(str, range(1203)))) == 1203
+def numbers_of(store):
+    return [row.number for row in store.rows()]
+
+
+def test_rows_are_read_in_order_and_once_and_can_be_forgotten(tmp_path):
+    """Also if a worker that was thought to be lost wrote its shard after others did its work."""
+    for path in (None, tmp_path / "s"):
+        store = Store(path, SPEC, 300_000)
+        with row(path), store.writing():
+            for part in (shard(7, 9, 250_000, failed=[9]), shard(*range(7)), shard(8, failed=[8])):
+                store.accept(part)
+            assert numbers_of(store) == [*range(10), 250_000] and store.failed == 2
+            assert store.row(9) == Row(9, None, "wrong", 0.5) and store.row(10) is None
+            assert np.flatnonzero(store.done).tolist() == numbers_of(store)
+            store.forget()
+            store.forget([3, 250_000])
+            assert numbers_of(store) == [0, 1, 2, 4, 5, 6, 7] and store.failed == 0
+    shard(6, 7, 8).written(store.folder)
+    again = Store(path, SPEC, 300_000)
+    assert numbers_of(again) == [0, 1, 2, 4, 5, 6, 7]
+    (path / "not.parquet").touch()
+    with again.writing():
+        again.accept(shard(8))
+    assert numbers_of(Store(path, SPEC, 300_000)) == [0, 1, 2, 4, 5, 6, 7, 8]
+    for file in path.rglob("00000008*.parquet"):
+        file.write_bytes(b"no rows")
+    with pytest.raises(st.SweepError, match=r"0*8-.*cannot be read.*delete it"):
+        numbers_of(Store(path, SPEC, 300_000))
 
 
 def test_one_process_writes_and_other_files_are_refused(tmp_path):
-    with closing(Store(tmp_path / "s.db")) as first, closing(Store(tmp_path / "s.db")) as second:
-        with first.writing():
-            with pytest.raises(st.SweepError, match="another process is writing"), second.writing():
-                pass
-            first.add([ROW])
-            assert second.known("k") == {"k": True}  # who reads may
-        with second.writing():
+    first, second = (Store(tmp_path / "s", SPEC, 2) for _ in range(2))
+    with first.writing():
+        with pytest.raises(st.SweepError, match="another process is writing"), second.writing():
             pass
-    (tmp_path / "text.db").write_text("no database at all, but a text of some length\n" * 50)
-    with closing(sqlite3.connect(tmp_path / "other.db")) as other:
-        other.execute("create table t (x)")
-        other.commit()
-    for words, name in (
-        ("not a store", "text.db"),
-        ("another program's", "other.db"),
-        ("folder", "."),
-    ):
+        first.accept(shard(1))
+        second.look()
+        assert numbers_of(second) == [1]  # who reads may
+    with second.writing():
+        pass
+    (tmp_path / "old.db").write_text("SQLite format 3")
+    for words, name in (("is a file, of an earlier version", "old.db"), ("of other files", ".")):
         with row(words), pytest.raises(st.SweepError, match=words):
-            Store(tmp_path / name)
+            Store(tmp_path / name, SPEC, 2)
 
 
 def driver(folder, executor, **settings):
@@ -78,14 +91,12 @@ def driver(folder, executor, **settings):
 
 
 def rows(folder):
-    path = folder / "s.db"
-    if not path.exists():
-        return []
-    with closing(sqlite3.connect(f"file:{path}?mode=ro", uri=True, timeout=10)) as base:
-        try:
-            return base.execute("select point, outcome, error from rows").fetchall()
-        except sqlite3.OperationalError:  # it is being made
-            return []
+    """Read all shards as another program does: number, outcome, error."""
+    found = []
+    for path in (folder / "s.rows").glob("*/*/[0-9]*.parquet"):
+        columns = parquet.read_table(path).to_pydict()
+        found += zip(columns["number"], columns["outcome"], columns["error"], strict=True)
+    return found
 
 
 def wait_for(count, folder, process):
@@ -94,10 +105,6 @@ def wait_for(count, folder, process):
         assert time.monotonic() < end, process.args
         time.sleep(0.02)
     assert process.poll() is None, process.communicate()
-
-
-def number_of(point):
-    return int(point.split(":")[1][:-1])
 
 
 def logged(folder):
@@ -114,21 +121,19 @@ def finish(folder, executor):
     counts = logged(folder)
     assert driver(folder, executor).communicate(timeout=PATIENCE)[0] == told
     assert logged(folder) == counts
-    found = {number_of(point): (outcome, error) for point, outcome, error in rows(folder)}
+    found = {number: told for number, *told in rows(folder)}
     assert sorted(found) == list(range(swept.POINTS)) and len(rows(folder)) == swept.POINTS
     for number, (outcome, error) in found.items():
         assert (error is not None) == (number in FAILED), (number, error)
         assert outcome == (None if number in FAILED else f'{{"twice": {2 * number}}}')
     assert all(found[n][1].startswith("TimeLimit") for n in swept.HANGS)
     assert all(found[n][1].startswith("ProcessEnded") for n in swept.CRASHES)
-    with closing(sqlite3.connect(folder / "s.db")) as base:
-        assert base.execute("pragma integrity_check").fetchone() == ("ok",)
     return counts
 
 
 def check_full(folder, executor):
-    """No file may grow beyond a few rows, as on a full disk."""
-    few = (36_000, 36_000)
+    """No file may be larger than a shard of few rows, as on a full disk."""
+    few = (1990, 1990)
     limited = {"preexec_fn": lambda: resource.setrlimit(resource.RLIMIT_FSIZE, few)}
     process = driver(folder, executor, **limited)
     _, errors = process.communicate(timeout=PATIENCE)
@@ -151,7 +156,7 @@ def test_a_full_disk_kills_and_ctrl_c_keep_the_rows(tmp_path):
         process.communicate(timeout=PATIENCE)  # ends when its processes have, which hold its pipes
         assert process.returncode and count <= len(rows(tmp_path)) < swept.POINTS
         begun = logged(tmp_path)
-        kept = {number_of(p): begun[number_of(p)] for p, *_ in rows(tmp_path)} | kept
+        kept = {number: begun[number] for number, *_ in rows(tmp_path)} | kept
     counts = finish(tmp_path, "processes:2")
     assert all(counts[number] == count for number, count in kept.items())
 

@@ -121,7 +121,7 @@ def test_a_block_that_a_worker_lost_runs_again_and_an_executor_that_is_gone_is_n
 
 
 def test_a_second_call_runs_what_is_missing_only(tmp_path):
-    store = tmp_path / "rows.db"
+    store = tmp_path / "rows"
     first = flights(2, store=store)
     again = flights(2, store=store)
     assert again.spent.points == 0 and again.rows() == first.rows()
@@ -132,7 +132,7 @@ def test_a_second_call_runs_what_is_missing_only(tmp_path):
 
 def test_failures_are_rows_and_can_be_run_again(tmp_path):
     axes = {"tail_mass": st.grid([0.003, -1.0]), "v0": st.random(LOW, HIGH)}
-    given = {"points": 4, "settings": SETTINGS, "store": tmp_path / "rows.db"}
+    given = {"points": 4, "settings": SETTINGS, "store": tmp_path / "rows"}
     found = st.sweep(model(), axes, **given)
     assert found.status() == Status(8, 8, 4)
     assert str(found.status()) == "8 of 8 points done, 4 of them failed, 0 left"
@@ -144,7 +144,7 @@ def test_failures_are_rows_and_can_be_run_again(tmp_path):
 
 def test_functions_are_run_with_and_without_a_model_and_tell_progress(worker, tmp_path):
     """What their rows depend on is part of their keys."""
-    given = {"store": tmp_path / "s.db", "executor": worker}
+    given = {"store": tmp_path / "s", "executor": worker}
     for of, points in (("1", 2), ("1", 0), ("2", 2)):
         found = st.sweep(None, {"x": st.grid([3, 4])}, swept.square, of=of, **given)
         assert found.spent.points == points

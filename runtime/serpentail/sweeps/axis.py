@@ -194,6 +194,14 @@ def plain(field: str, value: Any) -> Any:
         ) from None
 
 
+def as_json(value: Any) -> str:
+    """Return plain data as JSON, the same text for the same data."""
+    return _ENCODER.encode(value)
+
+
+_ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"))
+
+
 def in_units(field: str, value: Any, unit: str | Sequence[str] | None = None) -> Any:
     """Return a value with each text such as "2 g", also in lists, as a number in a unit.
 
