@@ -18,6 +18,11 @@ def square(point):
     return {"square": point["x"] ** 2}
 
 
+def numbers(point):
+    """The numbers of a point."""
+    return {"told": [point["a"], point.get("d"), point["b"]]}
+
+
 def troubled(pause, log, point):
     """Return twice a number; some numbers take for ever, crash, raise or sleep."""
     number = point["number_of"]

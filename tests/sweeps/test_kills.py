@@ -1,13 +1,16 @@
 """The store of a sweep: each row once, whole, by one writer, also where parts are killed."""
 
+import os
 import resource
 import signal
 import subprocess
 import sys
 import time
 from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -131,11 +134,14 @@ def finish(folder, executor):
     return counts
 
 
-def check_full(folder, executor):
-    """No file may be larger than a shard of few rows, as on a full disk."""
-    few = (1990, 1990)
-    limited = {"preexec_fn": lambda: resource.setrlimit(resource.RLIMIT_FSIZE, few)}
-    process = driver(folder, executor, **limited)
+def few_rows():
+    """Let no file be larger than a shard of few rows."""
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1450, 1450))
+
+
+def check_full(folder, executor, **settings):
+    """A full disk, for the driver or for workers, ends the sweep in one line."""
+    process = driver(folder, executor, **settings)
     _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 1
     told = errors.splitlines()[-1]
@@ -143,10 +149,37 @@ def check_full(folder, executor):
     assert 0 < len(rows(folder)) < swept.POINTS
 
 
+def killed_at_rename(path):
+    """Have this process die where it would give a file of rows its name."""
+
+    def die(*_):
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    if not path.exists():
+        path.touch()
+        Path.replace = die
+
+
+def test_a_worker_that_dies_between_write_and_rename_leaves_no_row(tmp_path):
+    """The block is made by the next call, and the part of its file is no shard."""
+    given = {"over": {"x": st.grid([3, 4, 5])}, "run": swept.square, "store": tmp_path / "s.rows"}
+    once, spawn = tmp_path / "once", get_context("spawn")
+    for died in (True, False):
+        with ProcessPoolExecutor(1, spawn, killed_at_rename, (once,)) as pool:
+            if died:
+                with pytest.raises(st.SweepError, match="its workers are gone"):
+                    st.sweep(None, **given, executor=pool)
+                assert rows(tmp_path) == [] and [*tmp_path.rglob(".*.parquet.*.part")]
+            else:
+                found = st.sweep(None, **given, executor=pool)
+    assert sorted(rows(tmp_path)) == [(k, f'{{"square": {(k + 3) ** 2}}}', None) for k in range(3)]
+    assert found.spent.points == 3 and st.sweep(None, **given).spent.points == 0
+
+
 @pytest.mark.slow
 def test_a_full_disk_kills_and_ctrl_c_keep_the_rows(tmp_path):
     """On the same rows, one after the other: none is lost, and none that is there made again."""
-    check_full(tmp_path, "processes:2")
+    check_full(tmp_path, "processes:2", preexec_fn=few_rows)
     kept = {}
     for ending in (signal.SIGKILL, signal.SIGKILL, signal.SIGINT):
         count = len(rows(tmp_path)) + 5
@@ -162,19 +195,20 @@ def test_a_full_disk_kills_and_ctrl_c_keep_the_rows(tmp_path):
 
 
 @contextmanager
-def cluster(folder):
+def cluster(folder, limited=None):
     """Yield the name of Dask's scheduler, the scheduler and workers, as real processes, and what
-    starts a worker, one without a nanny.
+    starts a worker, one without a nanny. limited: called in each worker first.
     """
     file, parts = folder / f"{time.monotonic_ns()}.json", []
 
-    def begin(kind, *options):
+    def begin(kind, *options, **settings):
         command = [sys.executable, "-m", f"distributed.cli.dask_{kind}", "--no-dashboard", *options]
         command += ["--scheduler-file", file, "--host", "127.0.0.1"]
-        with file.with_suffix(".log").open("a") as log:
-            parts.append(subprocess.Popen(command, cwd=ROOT, stdout=log, stderr=log))
+        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        parts.append(subprocess.Popen(command, cwd=ROOT, **quiet, **settings))
 
     worker = partial(begin, "worker", "--nthreads", "1", "--no-nanny", "--death-timeout", "60")
+    worker = partial(worker, preexec_fn=limited)
     begin("scheduler", "--port", "0", "--no-show")
     try:
         worker()
@@ -208,5 +242,7 @@ def test_dask_survives_kills_of_all_its_parts_and_a_full_disk(tmp_path):
         assert process.returncode == 1 and "its workers are gone" in errors.splitlines()[-1], errors
         assert kept < set(rows(tmp_path)) and len(rows(tmp_path)) < swept.POINTS
     with cluster(tmp_path) as (name, *_):
-        check_full(tmp_path, name)
         finish(tmp_path, name)
+    (tmp_path / "full").mkdir()
+    with cluster(tmp_path, few_rows) as (name, *_):
+        check_full(tmp_path / "full", name)

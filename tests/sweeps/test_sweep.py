@@ -3,6 +3,7 @@ themselves return, however and wherever they are made.
 """
 
 import math
+import tracemalloc
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import nullcontext
 from functools import partial
@@ -15,8 +16,11 @@ from scipy.stats import kstest
 import serpentail as st
 from serpentail.sweeps import driver, supervision
 from serpentail.sweeps.axes import axes_of
+from serpentail.sweeps.draws import permuted
 from serpentail.sweeps.executors import Place
 from serpentail.sweeps.result import Status
+from serpentail.sweeps.shards import Row, Shard
+from serpentail.sweeps.sweep import posed
 from tests.support import swept, zoo
 from tests.support.rows import row as named
 
@@ -79,6 +83,14 @@ def test_points_that_hang_crash_or_raise_are_rows(worker, tmp_path):
     assert crashed == [2, 2] and log.count(str(swept.HANGS[0])) == 1 and found.status().failed == 4
 
 
+def test_a_limit_is_of_processor_time_and_what_sleeps_is_given_up_without_a_row(worker, tmp_path):
+    run = partial(swept.troubled, 0.9, str(tmp_path / "log"))  # s on the clock
+    over = {"number_of": st.grid([1, *swept.SLEEPS])}
+    found = st.sweep(None, over, run, limit=0.3, executor=worker)
+    assert found[0]["error"] is None and found[0]["seconds"] >= 0.9
+    assert found.status() == Status(2, 1, 0) and found.spent.hung == 1
+
+
 class Forgetful(ThreadPoolExecutor):
     """Loses the first blocks that it gets."""
 
@@ -127,7 +139,28 @@ def test_a_second_call_runs_what_is_missing_only(tmp_path):
     assert again.spent.points == 0 and again.rows() == first.rows()
     more = flights(4, store=store)  # Sobol's first points stay
     assert more.spent.points == 4 and more.status() == Status(8, 8, 0)
+    assert [more[k] | {"number": 0} for k in (0, 5)] == [first[k] | {"number": 0} for k in (0, 3)]
     assert flights(2, model().with_parameters(torso_mass=0.2), store=store).spent.points == 4
+
+
+def test_other_grids_orders_and_numbers_of_points_keep_the_rows_that_they_have(tmp_path):
+    """A Latin hypercube of another number of points has other points."""
+    give = partial(st.sweep, None, run=swept.numbers, store=tmp_path / "rows")
+    a, b, pair = st.grid([1, 2]), st.random(0, 1), st.grid([(1, "x"), (2, "y")])
+    for over, points, made in (
+        ({"a": a, "c,d": pair, "b": b}, 3, 12),
+        ({"c, d": pair, "a": st.grid([3, 2]), "b": b}, 4, 16 - 2 * 3),
+        ({"a": st.grid([1, 2, 3]), "c,d": pair, "b": b}, 2, 0),
+        ({"a": a, "c,d": pair, "b": st.random(0, 2)}, 2, 8),
+        ({"a": a, "b": st.latin(0, 1)}, 4, 8),
+        ({"a": a, "b": st.latin(0, 1)}, 3, 6),
+    ):
+        found = give(over, points=points)
+        with named((list(over), points)):
+            assert found.spent.points == made
+            for k, row in enumerate(found):
+                assert row["number"] == k and row["told"] == [row["a"], row.get("d"), row["b"]]
+    assert give({"a": a, "b": b}, points=4, seed=1).spent.points == 8
 
 
 def test_failures_are_rows_and_can_be_run_again(tmp_path):
@@ -206,6 +239,44 @@ def test_what_cannot_be_is_refused_in_one_line():
         with named(words), pytest.raises(st.SweepError, match=words) as caught:
             st.sweep(**usual | changes)
         assert "\n" not in str(caught.value)
+
+
+def test_exports_and_iteration_hold_few_rows(tmp_path):
+    count = 40_000
+    found = posed(None, {"x": st.grid(range(count))}, swept.square, tmp_path / "rows")
+    with found.store.writing():
+        for first in range(0, count, 10_000):
+            told = [
+                Row(k, f'{{"square": {k * k}}}', None, 0.1) for k in range(first, first + 10**4)
+            ]
+            found.store.accept(Shard.of(told))
+    for name in ("rows.csv", "rows.parquet", None):
+        tracemalloc.start()
+        try:
+            if name:
+                found.save(tmp_path / name)
+            else:
+                assert sum(row["square"] == row["x"] ** 2 for row in found) == count
+            assert tracemalloc.get_traced_memory()[1] < 10e6  # all rows have 25 MB
+        finally:
+            tracemalloc.stop()
+
+
+def test_points_need_no_list_and_each_follows_from_its_number():
+    over = {"a": st.grid(range(2500)), "b": st.latin([0] * 3, [1] * 3), "c": st.latin(1, 2)}
+    axes = axes_of(over, 4000, 0)  # 10 million
+    tracemalloc.start()
+    try:
+        numbers = np.array([9_999_999, 3, 4_000_003, 5_000_000])
+        found = axes.at(numbers)
+        part, places = axes.part(numbers)
+        assert part.at(places) == found and len(next(iter(part.grids.values())).values) == 4
+        assert [x["a"] for x in found] == [2499, 0, 1000, 1250]
+        assert found[1]["b"] == found[2]["b"] != found[3]["b"]
+        assert tracemalloc.get_traced_memory()[1] < 2e6
+    finally:
+        tracemalloc.stop()
+    assert sorted(permuted(np.arange(1000), 1000, [0, 1])) == list(range(1000))
 
 
 def points(over, count=None, seed=0):

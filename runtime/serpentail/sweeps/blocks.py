@@ -12,21 +12,34 @@ MOST_TASKS_PER_S = 180  # that are sent
 BURST = 20  # tasks that are sent at once in the beginning
 GROWTH = 8  # times more points than in the block before
 MOST_IN_BLOCK = 50_000
-SHARE = 4  # blocks a worker that what is left is cut into, so that all end at about one time
-SHORTEST = 0.3  # of its usual time that a block has in the end
+SHARE = 3  # blocks a worker that what is left is cut into, so that all end at about one time
+OLDER = 0.98  # weight of what is known when a block comes back
+SHORTEST = 0.25  # of its usual time that a block has in the end
 
 
-def block_size(pace: float | None, largest: int, left: int, workers: int) -> int:
-    """Return how many points the next block has.
+@dataclass
+class Pace:
+    """How long points take: seconds of recent points, and the points of the largest block."""
 
-    pace: seconds for a point, None if not known; largest: points of the largest block that came
-    back; left: points that are not sent yet.
-    """
-    if pace is None:
-        return 1
-    usual = min(max(LEAST_S, workers / TASKS_PER_S), MOST_S) / max(pace, 1e-9)
-    in_the_end = max(SHORTEST * usual, left / (SHARE * workers))
-    return max(1, round(min(usual, in_the_end, GROWTH * largest, MOST_IN_BLOCK)))
+    seconds: float = 0.0
+    points: float = 0.0
+    largest: int = 0
+
+    def learn(self, points: int, seconds: float) -> None:
+        """Note how long a block took; of a much larger one, the start of workers is a less part."""
+        kept = OLDER if points < 2 * self.largest else 0.0
+        self.seconds = kept * self.seconds + seconds
+        self.points = kept * self.points + points
+        self.largest = max(self.largest, points)
+
+    def block(self, left: int, workers: int) -> int:
+        """Return how many points the next block has, of those that are not sent yet."""
+        if not self.points:
+            return 1
+        pace = max(self.seconds / self.points, 1e-9)
+        usual = min(max(LEAST_S, workers / TASKS_PER_S), MOST_S) / pace
+        in_the_end = max(SHORTEST * usual, left / (SHARE * workers))
+        return max(1, round(min(usual, in_the_end, GROWTH * self.largest, MOST_IN_BLOCK, left)))
 
 
 @dataclass

@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import NotWritten, SweepError
 from ..stages import Stage
 from .axes import Axes
-from .blocks import Gate, Missing, block_size
+from .blocks import Gate, Missing, Pace
 from .bundles import Bundle, model_of
 from .executors import Place, place_of
 from .job import Job
@@ -39,20 +39,15 @@ class Work(NamedTuple):
 
 @dataclass
 class Group:
-    """Points of one model that are still to be run; pace: seconds for a point, if known."""
+    """Points of one model that are still to be run."""
 
     bundle: Bundle | None
     missing: Missing
-    pace: float | None = None
-    largest: int = 0  # points of the largest block that came back
+    pace: Pace = field(default_factory=Pace)
 
     def take(self, workers: int) -> np.ndarray:
         """Return the numbers of the points of the next block."""
-        return self.missing.take(block_size(self.pace, self.largest, self.missing.left, workers))
-
-    def learn(self, points: int, seconds: float) -> None:
-        """Note how long points took."""
-        self.pace, self.largest = seconds / points, max(self.largest, points)
+        return self.missing.take(self.pace.block(self.missing.left, workers))
 
 
 @dataclass
@@ -198,7 +193,7 @@ class Driver:
             self.store.accept(ran.shard)
             self.done += ran.shard.size
             self.failed += ran.shard.failed
-        group.learn(len(numbers), ran.seconds)
+        group.pace.learn(len(numbers), ran.seconds)
         self.spent.points += len(numbers) - ran.hung
         self.spent.hung += ran.hung
         self.spent.blocks += 1
