@@ -110,6 +110,15 @@ def wait_for(count, folder, process):
     assert process.poll() is None, process.communicate()
 
 
+def settled(folder):
+    """Wait until workers whose driver is gone write no more, and return the rows."""
+    found = None
+    while found != set(rows(folder)):
+        found = set(rows(folder))
+        time.sleep(3)
+    return found
+
+
 def logged(folder):
     return Counter(map(int, (folder / "log").read_text().split()))
 
@@ -234,7 +243,7 @@ def test_dask_survives_kills_of_all_its_parts_and_a_full_disk(tmp_path):
         worker()
         process.kill()
         process.communicate(timeout=PATIENCE)
-        kept = set(rows(tmp_path))
+        kept = settled(tmp_path)
         process = driver(tmp_path, name)
         wait_for(len(kept) + 5, tmp_path, process)
         parts[0].kill()  # the scheduler

@@ -117,7 +117,7 @@ def random(low: Any, high: Any, law: str = "uniform") -> Spread:
 def latin(low: Any, high: Any, law: str = "uniform") -> Spread:
     """Make an axis whose points are a Latin hypercube: each of k equal parts has one point.
 
-    scipy.stats.qmc.LatinHypercube makes the points.
+    Another number of points gives other points.
 
     Parameters
     ----------

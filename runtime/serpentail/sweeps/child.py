@@ -63,8 +63,11 @@ def _as_main(script: str | None) -> None:
     if script is None or getattr(sys.modules["__main__"], "__file__", None) == script:
         return
     module = types.ModuleType("__mp_main__")
-    with importing():
+    importing.set()
+    try:
         module.__dict__.update(runpy.run_path(script, run_name="__mp_main__"))
+    finally:
+        importing.clear()
     sys.modules["__main__"] = sys.modules["__mp_main__"] = module
 
 

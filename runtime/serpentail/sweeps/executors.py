@@ -84,7 +84,11 @@ def _dask(address: str) -> Iterator[Place]:
     else:
         # threads of this process, because each block has a process of its own
         cluster = distributed.LocalCluster(
-            n_workers=1, threads_per_worker=threads(), processes=False, dashboard_address=None
+            n_workers=1,
+            threads_per_worker=threads(),
+            processes=False,
+            dashboard_address=None,
+            scheduler_kwargs={"dashboard_address": ":0"},  # any port: others may have sweeps
         )
         where = {"address": cluster}
     try:

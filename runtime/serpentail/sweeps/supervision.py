@@ -105,6 +105,7 @@ class Child:
 _idle: list[Child] = []
 _all: set[Child] = set()
 _lock = threading.Lock()
+importing = threading.Event()  # in a worker process, while it imports the driver's main program
 _ending = threading.Event()  # while all are ended, and no new one is to begin
 
 
@@ -211,28 +212,6 @@ def _why(status: int, limit: float | None) -> str:
         return f"TimeLimit: took more than {limit:g} s of processor time"
     how = f"signal {-status}" if status < 0 else f"status {status}"
     return f"ProcessEnded: the process that ran it ended with {how}, {TRIES} times"
-
-
-_importing = threading.Event()  # while a worker process imports the driver's main program
-
-
-@contextmanager
-def importing() -> Iterator[None]:
-    """Import the driver's main program, which must not begin a sweep meanwhile."""
-    _importing.set()
-    try:
-        yield
-    finally:
-        _importing.clear()
-
-
-def refuse_without_guard() -> None:
-    """SweepError for a sweep that begins while a worker process imports the main program."""
-    if _importing.is_set():
-        raise SweepError(
-            "the main program calls sweep when a worker imports its functions: put the call below "
-            'the line if __name__ == "__main__":'
-        )
 
 
 def _taken() -> Child:

@@ -18,7 +18,7 @@ from .groups import pose
 from .job import RUNS, STARTS, Job
 from .result import Sweep
 from .store import Store
-from .supervision import refuse_without_guard
+from .supervision import importing
 
 WITHOUT = ("watch", "threads", "parameters")  # settings of a run that a sweep has itself
 
@@ -102,7 +102,11 @@ def sweep(  # noqa: PLR0913 - the public face names all that it takes
     >>> sweep = st.sweep("kick", over, points=8, store="kick.db")  # doctest: +SKIP
     >>> sweep.to_pandas()  # doctest: +SKIP
     """
-    refuse_without_guard()
+    if importing.is_set():
+        raise SweepError(
+            "the main program calls sweep where a worker imports its functions: put the call below "
+            'the line if __name__ == "__main__":'
+        )
     found = posed(
         model, over, run, store, points=points, seed=seed, settings=settings, outputs=outputs, of=of
     )

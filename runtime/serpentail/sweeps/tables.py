@@ -2,7 +2,7 @@
 
 import csv
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import islice
 from os import PathLike
 from pathlib import Path
@@ -70,21 +70,18 @@ def _write_csv(sweep: "Sweep", path: Path) -> None:
 
 
 def _write_parquet(sweep: "Sweep", path: Path) -> None:
-    """Write a column for each entry; what has no kind that suits all rows becomes text."""
+    """Write a column for each entry; SweepError if one has texts and numbers."""
     arrow, parquet = parquet_library()
     schema = arrow.schema([])
-    for part in _parts(sweep):
-        found = arrow.schema([(name, _kind(arrow, x)) for name, x in _columns(part).items()])
-        schema = _unified(arrow, schema, found)
+    try:
+        for part in _parts(sweep):
+            schemas = [schema, arrow.table(_columns(part)).schema]
+            schema = arrow.unify_schemas(schemas, promote_options="permissive")
+    except (arrow.ArrowInvalid, arrow.ArrowTypeError) as reason:
+        raise SweepError(f"export: {reason}: write a .csv file") from None
     with parquet.ParquetWriter(path, schema, compression="zstd") as writer:
         for part in _parts(sweep):
-            columns = _columns(part)
-            empty = [None] * len(part)
-            arrays = [
-                arrow.array(_texts(columns.get(each.name, empty), each.type), each.type)
-                for each in schema
-            ]
-            writer.write_table(arrow.Table.from_arrays(arrays, schema=schema))
+            writer.write_table(arrow.table(_columns(part, schema.names), schema))
 
 
 def _parts(sweep: "Sweep") -> Iterator[Rows]:
@@ -94,36 +91,10 @@ def _parts(sweep: "Sweep") -> Iterator[Rows]:
         yield part
 
 
-def _columns(part: Rows) -> dict[str, list]:
-    """Return rows by columns; None where a row has no value."""
-    names = dict.fromkeys(name for row in part for name in row)
+def _columns(part: Rows, names: Iterable[str] = ()) -> dict[str, list]:
+    """Return rows by columns, by default by all that they have; None where one has no value."""
+    names = names or dict.fromkeys(name for row in part for name in row)
     return {name: [row.get(name) for row in part] for name in names}
-
-
-def _kind(arrow: Any, values: list) -> Any:
-    """Return the type of a column: text if its values are of several kinds."""
-    try:
-        return arrow.infer_type(values)
-    except (arrow.ArrowInvalid, arrow.ArrowTypeError):
-        return arrow.string()
-
-
-def _unified(arrow: Any, first: Any, second: Any) -> Any:
-    """Return the schema of both; a column of which they differ in kind is of numbers or text."""
-    kinds = {each.name: each.type for each in first}
-    for each in second:
-        kind = kinds.setdefault(each.name, each.type)
-        if kind != each.type and not arrow.types.is_null(each.type):
-            both = {kind, each.type}
-            numbers = both == {arrow.int64(), arrow.float64()}
-            other = arrow.float64() if numbers else arrow.string()
-            kinds[each.name] = each.type if arrow.types.is_null(kind) else other
-    return arrow.schema(list(kinds.items()))
-
-
-def _texts(values: list, kind: Any) -> list:
-    """Return values as texts if their column is of text."""
-    return [None if x is None else str(x) for x in values] if str(kind) == "string" else values
 
 
 def flat(row: dict[str, Any], before: str = "") -> dict[str, Any]:
