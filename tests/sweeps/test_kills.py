@@ -59,6 +59,8 @@ def test_rows_are_read_in_order_and_once_and_can_be_forgotten(tmp_path):
     (path / "not.parquet").touch()
     with again.writing():
         again.accept(shard(8))
+        shard(8, 9).written(store.folder)
+    assert [each.name[:17] for each in sorted(path.glob("*/*/0*8*.parquet"))] == [f"{8:08}-{8:08}"]
     assert numbers_of(Store(path, SPEC, 300_000)) == [0, 1, 2, 4, 5, 6, 7, 8]
     for file in path.rglob("00000008*.parquet"):
         file.write_bytes(b"no rows")

@@ -98,8 +98,13 @@ def test_rows_are_saved_for_other_tools(study):
 
 def test_shapes_and_parameters_of_links_make_models_of_their_own(study):
     axes = {("segments", "links"): st.grid([(1, 1), (2, 1)]), "start.height": st.grid([0.1, 0.2])}
-    found = st.sweep(study, axes, outputs=["q_end"])
-    assert [len(row["q_end"]) for row in found.rows()] == [9, 9, 11, 11]
+    store = study.with_suffix(".rows")
+    found = st.sweep(study, axes, outputs=["q_end"], store=store)
+    assert [len(row["q_end"]) for row in found] == [9, 9, 11, 11]
+    again = dict(reversed(axes.items())) | {("segments", "links"): st.grid([(2, 1), (1, 1)])}
+    again = st.sweep(study, again, outputs=["q_end"], store=store)  # another order, the same rows
+    assert again.spent.points == 0
+    assert [row["q_end"] for row in again] == [found[k]["q_end"] for k in (2, 0, 3, 1)]
     first = found[0]["q_end"][2]
     assert found[1]["q_end"][2] == pytest.approx(first + 0.1, abs=1e-6)
     axes = {"tail_damping": st.grid([1e-5, 1e-3])}  # there is other code for these

@@ -172,9 +172,9 @@ def test_a_second_call_runs_what_is_missing_only(tmp_path):
     assert flights(2, model().with_parameters(torso_mass=0.2), store=store).spent.points == 4
 
 
-def test_other_grids_orders_and_numbers_of_points_keep_the_rows_that_they_have(tmp_path):
+def test_other_grids_orders_and_numbers_of_points_keep_the_rows_they_have(worker, tmp_path):
     """A Latin hypercube of another number of points has other points."""
-    give = partial(st.sweep, None, run=swept.numbers, store=tmp_path / "rows")
+    give = partial(st.sweep, None, run=swept.numbers, store=tmp_path / "rows", executor=worker)
     a, b, pair = st.grid([1, 2]), st.random(0, 1), st.grid([(1, "x"), (2, "y")])
     for over, points, made in (
         ({"a": a, "c,d": pair, "b": b}, 3, 12),

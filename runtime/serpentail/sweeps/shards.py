@@ -37,12 +37,9 @@ class Shard(NamedTuple):
     where: Any  # path of the file, or the rows themselves
 
     @classmethod
-    def at(cls, path: Path) -> "Shard | None":
-        """Return the shard of a file, from its name; None if it is no shard's."""
-        found = NAME.fullmatch(path.name)
-        if found is None:
-            return None
-        first, last, size, failed = map(int, found.groups())
+    def at(cls, path: Path) -> "Shard":
+        """Return the shard of a file, from its name."""
+        first, last, size, failed = map(int, path.name.split("-")[:4])
         return cls(first, last, size, failed, path)
 
     @classmethod

@@ -16,7 +16,7 @@ from ..errors import SweepError
 from ..files import refuse_unusable, replacing
 from .adoption import Mapped
 from .axis import as_json
-from .shards import Row, Shard, in_order, parquet_library
+from .shards import NAME, Row, Shard, in_order, parquet_library
 from .supervision import ShardFolder
 
 MARK = "store.json"  # tells that a folder is a store, and which one
@@ -59,6 +59,7 @@ class Store:
             with FileLock(self.path / LOCK, timeout=0):
                 self._begin(self.path)
                 yield
+                self._remove_others()
         except Timeout:
             raise SweepError(
                 f"store: another process is writing {self.path}: wait for its end, look with "
@@ -75,15 +76,20 @@ class Store:
             for other in sorted(path.glob(f"{self.folder.name[:16]}-*/{SPEC}")):
                 self._adopt(other)
             _write(self.folder / SPEC, self.spec)
-        for shard in self.look():
-            shard.where.unlink(missing_ok=True)
+        self.look()
+        self._remove_others()
+
+    def _remove_others(self) -> None:
+        """Remove shards whose rows others have: of workers that were thought to be lost."""
+        own = {shard.where for shard in self.shards}
+        for path in set(_files(self.folder)) - own:
+            path.unlink(missing_ok=True)
 
     def _adopt(self, other: Path) -> None:
         """Take the rows of another sweep that are rows of this one, too."""
         spec = json.loads(other.read_bytes())
         mapped = Mapped(spec, self.spec)
-        shards, _ = _accepted(other.parent, np.zeros(mapped.old_total, bool))
-        for shard in shards:
+        for shard in _accepted(other.parent, np.zeros(mapped.old_total, bool)):
             rows = [
                 row._replace(number=number)
                 for row, number in zip(shard.rows(), mapped(shard), strict=True)
@@ -100,13 +106,11 @@ class Store:
         marked = self.path / MARK
         return ShardFolder(self.folder, marked, marked.read_bytes())
 
-    def look(self) -> list[Shard]:
-        """Find the rows that there are; return shards some of whose rows others have, too."""
-        if self.path is None:
-            return []
-        self.done[:] = False
-        self.shards, double = _accepted(self.folder, self.done)
-        return double
+    def look(self) -> None:
+        """Find the rows that there are now."""
+        if self.path is not None:
+            self.done[:] = False
+            self.shards = _accepted(self.folder, self.done)
 
     def accept(self, shard: Shard) -> None:
         """Take notice of a shard, and write it if that was not done."""
@@ -156,24 +160,20 @@ class Store:
             shard.where.unlink()
 
 
-def _accepted(folder: Path, done: np.ndarray) -> tuple[list[Shard], list[Shard]]:
-    """Return the shards of a folder, and those that have rows of others; mark rows as done.
+def _files(folder: Path) -> list[Path]:
+    """Return the files of shards in a folder, in the order of their first numbers."""
+    return sorted(path for path in folder.glob("*/*.parquet") if NAME.fullmatch(path.name))
 
-    A worker that was thought to be lost may write its shard late, when others have its rows.
-    """
-    accepted: list[Shard] = []
-    double: list[Shard] = []
-    for path in sorted(folder.glob("*/*.parquet")):
-        shard = Shard.at(path)
-        if shard is None:
-            continue
+
+def _accepted(folder: Path, done: np.ndarray) -> list[Shard]:
+    """Return the shards of a folder but those that have rows of others, and mark rows as done."""
+    accepted = []
+    for shard in map(Shard.at, _files(folder)):
         numbers = shard.numbers()
-        if done[numbers].any():
-            double.append(shard)
-        else:
+        if not done[numbers].any():
             done[numbers] = True
             accepted.append(shard)
-    return accepted, double
+    return accepted
 
 
 def _refuse_other(path: Path) -> None:
@@ -184,7 +184,8 @@ def _refuse_other(path: Path) -> None:
                 f"store: {path} is a file, of an earlier version or of another program: a store "
                 "is a folder: name another"
             )
-        if path.is_dir() and any(path.iterdir()) and not (path / LOCK).exists():
+        names = {each.name for each in path.iterdir()} if path.is_dir() else set()
+        if names and not names & {MARK, LOCK}:
             raise SweepError(f"store: {path} is a folder of other files: name another")
         refuse_unusable(path)
     except OSError as reason:

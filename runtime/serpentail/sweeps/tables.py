@@ -113,8 +113,7 @@ def flat(row: dict[str, Any], before: str = "") -> dict[str, Any]:
 def frame(sweep: "Sweep") -> "pandas.DataFrame":
     """Return the rows as a table of pandas."""
     pandas = needed("pandas", "pandas")
-    parts = [pandas.DataFrame(part) for part in _parts(sweep)]
-    return pandas.concat(parts, ignore_index=True) if parts else pandas.DataFrame()
+    return pandas.DataFrame([flat(row) for row in sweep])
 
 
 def dataset(sweep: "Sweep") -> "xarray.Dataset":
