@@ -37,6 +37,7 @@ def shard(*numbers, failed=()):
 
 
 def numbers_of(store):
+    store.look()
     return [row.number for row in store.rows()]
 
 

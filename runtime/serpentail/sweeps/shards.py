@@ -1,5 +1,6 @@
 """Shards: parts of a sweep's rows in Parquet files, whose names tell which rows they have."""
 
+import os
 import re
 import zlib
 from collections.abc import Iterator, Sequence
@@ -37,9 +38,9 @@ class Shard(NamedTuple):
     where: Any  # path of the file, or the rows themselves
 
     @classmethod
-    def at(cls, path: Path) -> "Shard":
+    def at(cls, path: str) -> "Shard":
         """Return the shard of a file, from its name."""
-        first, last, size, failed = map(int, path.name.split("-")[:4])
+        first, last, size, failed = map(int, os.path.basename(path).split("-")[:4])
         return cls(first, last, size, failed, path)
 
     @classmethod
@@ -60,7 +61,7 @@ class Shard(NamedTuple):
         path = folder / f"{self.first // IN_FOLDER:03d}" / name
         with replacing(path) as part:
             parquet.write_table(table, part, compression="zstd")
-        return self._replace(where=path)
+        return self._replace(where=str(path))
 
     def numbers(self) -> slice | np.ndarray:
         """Return the numbers of its rows."""
@@ -70,7 +71,7 @@ class Shard(NamedTuple):
 
     def rows(self) -> Iterator[Row]:
         """Yield its rows; SweepError if its file cannot be read."""
-        if not isinstance(self.where, Path):
+        if not isinstance(self.where, str):
             yield from self.where
             return
         arrow, parquet = parquet_library()

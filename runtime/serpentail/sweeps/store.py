@@ -30,7 +30,7 @@ class Store:
 
     spec: plain data on which the rows depend, which tells one sweep from others; "family" is what
     sweeps have in common whose rows can be the same. One process writes at a time, any number may
-    read. An existing row is never replaced.
+    read. An existing row is never replaced. ``look`` finds the rows, as ``writing`` does.
     """
 
     def __init__(self, path: str | os.PathLike[str] | None, spec: Mapping[str, Any], total: int):
@@ -46,7 +46,6 @@ class Store:
             hashlib.sha256(as_json(x).encode()).hexdigest()[:16] for x in (spec["family"], spec)
         )
         self.folder = self.path / f"{family}-{own}"
-        self.look()
 
     @contextmanager
     def writing(self) -> Iterator[None]:
@@ -54,12 +53,10 @@ class Store:
         if self.path is None:
             yield
             return
+        lock = FileLock(self.path / LOCK)
         try:
             self.path.mkdir(parents=True, exist_ok=True)
-            with FileLock(self.path / LOCK, timeout=0):
-                self._begin(self.path)
-                yield
-                self._remove_others()
+            lock.acquire(timeout=0)
         except Timeout:
             raise SweepError(
                 f"store: another process is writing {self.path}: wait for its end, look with "
@@ -67,9 +64,15 @@ class Store:
             ) from None
         except OSError as reason:
             raise SweepError(f"store: {reason}: name another folder") from None
+        try:
+            self._begin(self.path)
+            yield
+            self._remove_others()
+        finally:
+            lock.release()
 
     def _begin(self, path: Path) -> None:
-        """Mark the folder, take rows of sweeps that have the same, and delete what is double."""
+        """Mark the folder, take rows of sweeps that have the same, and find all rows."""
         if not (path / MARK).exists():
             _write(path / MARK, {"format": FORMAT, "id": secrets.token_hex(8)})
         if not (self.folder / SPEC).exists():
@@ -77,13 +80,12 @@ class Store:
                 self._adopt(other)
             _write(self.folder / SPEC, self.spec)
         self.look()
-        self._remove_others()
 
     def _remove_others(self) -> None:
         """Remove shards whose rows others have: of workers that were thought to be lost."""
         own = {shard.where for shard in self.shards}
         for path in set(_files(self.folder)) - own:
-            path.unlink(missing_ok=True)
+            Path(path).unlink(missing_ok=True)
 
     def _adopt(self, other: Path) -> None:
         """Take the rows of another sweep that are rows of this one, too."""
@@ -114,7 +116,7 @@ class Store:
 
     def accept(self, shard: Shard) -> None:
         """Take notice of a shard, and write it if that was not done."""
-        if self.path is not None and not isinstance(shard.where, Path):
+        if self.path is not None and not isinstance(shard.where, str):
             shard = shard.written(self.folder)
         self.done[shard.numbers()] = True
         self.shards.append(shard)
@@ -157,12 +159,16 @@ class Store:
         if kept:
             self.accept(Shard.of(kept))
         if self.path is not None:
-            shard.where.unlink()
+            os.unlink(shard.where)
 
 
-def _files(folder: Path) -> list[Path]:
-    """Return the files of shards in a folder, in the order of their first numbers."""
-    return sorted(path for path in folder.glob("*/*.parquet") if NAME.fullmatch(path.name))
+def _files(folder: Path) -> list[str]:
+    """Return the paths of shards in a folder, in the order of their first numbers."""
+    found: list[str] = []
+    for inner in folder.glob("[0-9]*"):
+        with os.scandir(inner) as entries:
+            found += [entry.path for entry in entries if NAME.fullmatch(entry.name)]
+    return sorted(found)
 
 
 def _accepted(folder: Path, done: np.ndarray) -> list[Shard]:

@@ -127,7 +127,7 @@ def sweep(  # noqa: PLR0913 - the public face names all that it takes
 
 
 def posed(model: Any, over: Any, run: Any, store: Any, **rest: Any) -> Sweep:
-    """Return a sweep with checked points, and the rows that its store has; run nothing."""
+    """Return a sweep with checked points; ``status`` finds the rows of its store. Run nothing."""
     names = ("points", "settings", "outputs", "of")
     points, settings, outputs, of = (rest.get(name) for name in names)
     if isinstance(run, str):
