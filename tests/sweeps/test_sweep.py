@@ -192,6 +192,14 @@ def test_other_grids_orders_and_numbers_of_points_keep_the_rows_they_have(worker
     assert give({"a": a, "b": b}, points=4, seed=1).spent.points == 8
 
 
+def test_rows_of_workers_that_do_not_see_the_store_are_written_here(worker, tmp_path, monkeypatch):
+    monkeypatch.setattr(supervision.ShardFolder, "is_here", lambda _: False)
+    given = {"over": {"x": st.grid([3, 4])}, "run": swept.square, "store": tmp_path / "rows"}
+    for points in (2, 0):
+        found = st.sweep(None, **given, executor=worker)
+        assert found.spent.points == points and [row["square"] for row in found] == [9, 16]
+
+
 def test_failures_are_rows_and_can_be_run_again(tmp_path):
     axes = {"tail_mass": st.grid([0.003, -1.0]), "v0": st.random(LOW, HIGH)}
     given = {"points": 4, "settings": SETTINGS, "store": tmp_path / "rows"}
