@@ -8,6 +8,8 @@ import time
 from functools import partial
 from pathlib import Path
 
+import pytest
+
 import serpentail as st
 from serpentail.sweeps import supervision
 from serpentail.sweeps.result import Status
@@ -16,6 +18,7 @@ from tests.support import swept
 ROOT = Path(__file__).parents[2]
 
 
+@pytest.mark.slow
 def test_dask_needs_no_main_guard_and_functions_of_the_program_tell_that_they_do(tmp_path):
     """A sweep without a guard would begin another one in each worker."""
     script = tmp_path / "script.py"
