@@ -98,9 +98,7 @@ def _add_sweep(verbs: argparse._SubParsersAction) -> None:
     told = "make the runs of a scene's table [sweep]; the same command resumes where it stopped"
     sweep = verbs.add_parser("sweep", help=told)
     sweep.add_argument("scene", help="a scene file with a table [sweep], such as study.toml")
-    sweep.add_argument(
-        "--store", type=Path, metavar="FILE", help="SQLite file for the rows, ending in .db"
-    )
+    sweep.add_argument("--store", type=Path, metavar="FOLDER", help="folder for the rows")
     where = "processes:4, dask (on this machine), dask:tcp://host:8786 or dask:scheduler.json"
     sweep.add_argument("--executor", metavar="WHERE", help=f"{where}; by default processes")
     sweep.add_argument(

@@ -40,7 +40,7 @@ def arguments_of(path: str) -> dict[str, Any]:
         for name, axis in over.items()
     }
     refused.tell()
-    store = place.parent / table.get("store", f"{place.stem}.db")
+    store = place.parent / table.get("store", f"{place.stem}.rows")
     given = {name: table[name] for name in ("points", "seed", "outputs", "limit") if name in table}
     return {"model": str(place), "over": axes, "run": run, "store": Path(store)} | given
 
