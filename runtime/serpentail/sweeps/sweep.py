@@ -99,7 +99,7 @@ def sweep(  # noqa: PLR0913 - the public face names all that it takes
     --------
     >>> import serpentail as st
     >>> over = {"tail_mass": st.grid(["2 g", "3 g"]), "start.pitch": st.random(-1.0, 1.0)}
-    >>> sweep = st.sweep("kick", over, points=8, store="kick.db")  # doctest: +SKIP
+    >>> sweep = st.sweep("kick", over, points=8, store="kick.rows")  # doctest: +SKIP
     >>> sweep.to_pandas()  # doctest: +SKIP
     """
     if importing.is_set():
