@@ -155,11 +155,9 @@ class Kernel:
 
     def _prepared(self) -> Call:
         """Return a fast call of the function; it returns None for arguments that it declines."""
-        if waiting():
-            return declined
         own = self._buffers()
         size = self.work + sum(array.size for array in (*own.inputs, *own.outputs))
-        fast = declined if size > MOST_HELD else call_of(self.function, own)
+        fast = declined if waiting() or size > MOST_HELD else call_of(self.function, own)
         self.fast = None if waiting() else fast
         return fast
 
@@ -295,8 +293,7 @@ class Kernel:
                 f"{what}: polar coordinates have no value at theta = 0; use "
                 f'coordinates = "bend" in the scene'
             )
-        what = (
+        return (
             f"segment {worst + 1}{state} is bent by {bends[worst]:.6g} rad, beyond the scene's "
-            f"{self.bend_range:.6g}"
+            f"{self.bend_range:.6g}: set a larger `bend_range`, then generate the model again"
         )
-        return f"{what}: set a larger `bend_range` in the scene, then generate the model again"
