@@ -102,13 +102,10 @@ def opened(compiled: Callable[[], Path], kind: type[ctypes.CDLL] = ctypes.CDLL) 
     errors as of the call.
     """
     path = compiled()
-    try:
+    with contextlib.suppress(OSError):
         return kind(str(path))
-    except OSError:
-        try:
-            path.unlink()
-        except OSError as error:
-            raise unwritable(path.parents[2], error) from error
+    with contextlib.suppress(OSError):
+        path.unlink()
     try:
         return kind(str(compiled()))
     except OSError as error:
