@@ -27,6 +27,7 @@ from .unknowns import unknowns
 LONGEST = 0.01  # s: of the intervals of the first mesh
 FIRST_NOISE = 1e-3  # m
 FUNCTIONS = ("forward_dynamics", "forward_dynamics_derivatives", "energy", "momentum")
+FUNCTIONS += ("tail_points",)
 Data = MarkerTracks | str | PathLike[str]
 
 
@@ -53,9 +54,9 @@ def identify(
     Parameters
     ----------
     model : Model
-        The model, with the parameters to begin with. Its scene needs "forward_dynamics",
-        "forward_dynamics_derivatives", "energy", "momentum" and, if parameters are estimated,
-        "forward_dynamics_parameter_derivatives".
+        The model, with the parameters to begin with. Its scene needs "tail_points",
+        "forward_dynamics", "forward_dynamics_derivatives", "energy", "momentum" and, if parameters
+        are estimated, "forward_dynamics_parameter_derivatives".
     data : MarkerTracks, str, path, or a sequence of these
         Tracks, or TRC, CSV or C3D files; several are trials of one animal.
     markers : mapping of str to Marker
@@ -149,18 +150,21 @@ def check_model(model: Any, estimate: Any) -> None:
     """Raise an error if a model cannot be identified, because of its kind or missing functions."""
     if not isinstance(model, Model):
         raise refusal("model", model, "a Model, as serpentail.load returns", IdentificationError)
-    model.refuse_fixed("identify")
-    if model.manifest["scene"].get("coordinates") == "polar":
-        raise ModelError(
-            f'identify: {model.name} has coordinates = "polar": generate it with "bend"'
-        )
-    if model.manifest["real"] != "double":
-        raise ModelError(f'identify: {model.name} has real = "float": generate it with "double"')
+    refuse_unlike(model, "identify")
     for name in FUNCTIONS:
         model.kernel(name)
     names = list(estimate) if isinstance(estimate, Mapping | Sequence) else []
     if any(not str(name).startswith("marker:") for name in names):
         model.kernel("forward_dynamics_parameter_derivatives")
+
+
+def refuse_unlike(model: Model, who: str) -> None:
+    """ModelError if a model has a fixed base, polar coordinates, or computes with float."""
+    model.refuse_fixed(who)
+    if model.manifest["scene"].get("coordinates") == "polar":
+        raise ModelError(f'{who}: {model.name} has coordinates = "polar": generate it with "bend"')
+    if model.manifest["real"] != "double":
+        raise ModelError(f'{who}: {model.name} has real = "float": generate it with "double"')
 
 
 def tracks_of(data: Any, placed: Placements, settings: Mapping[str, Any]) -> list[MarkerTracks]:

@@ -17,6 +17,8 @@ from .points import STEP
 
 MARKER = "marker:"
 SAME = "same"
+GEOMETRY = ("tail_mount", "mount_angles", "tail_length", "link_lengths", "arc_lengths")
+TINY = 1e-30  # of complex steps
 NAME = re.compile(r"([A-Za-z_]\w*)(?:\[(\d+|same)\])?")
 
 
@@ -91,23 +93,20 @@ class Unknowns:
                 jacobian[:, k] = _struct_direction(model, each)
         return jacobian
 
-    def geometry_jacobian(self, model: Model, numbers: int) -> np.ndarray:
-        """Return d(mount, angles, lengths) / d(unknowns), (numbers, P)."""
-        jacobian = np.zeros((numbers, len(self.each)))
-        for k, each in enumerate(self.each):
-            rows = _geometry_rows(each.of, numbers - 6)
-            if each.of == "tail_length":
-                jacobian[rows, k] = 1 / len(rows)  # of equal pieces
-            elif rows:
-                jacobian[[rows[entry] for entry in each.entries], k] = 1.0
-        return jacobian
+    def geometry(self, model: Model) -> tuple[list[int], list[tuple[np.ndarray, np.ndarray]]]:
+        """Return the indices of numbers that move places on the tail, and a small step of each.
 
-
-def _geometry_rows(of: str, pieces: int) -> list[int]:
-    """Return which numbers of the geometry a parameter's entries are."""
-    lengths = list(range(6, 6 + pieces))
-    known = {"tail_mount": [0, 1, 2], "mount_angles": [3, 4, 5], "tail_length": lengths}
-    return known.get(of, lengths if of in ("link_lengths", "arc_lengths") else [])
+        A step is of the parameter struct, and of the mount's angles (3,), rad.
+        """
+        by = self.struct_jacobian(model)
+        which = [k for k, each in enumerate(self.each) if each.of in GEOMETRY]
+        steps = []
+        for k in which:
+            each, angles = self.each[k], np.zeros(3)
+            if each.of == "mount_angles":
+                angles[list(each.entries)] = STEP * each.size
+            steps.append((STEP * each.size * by[:, k], angles))
+        return which, steps
 
 
 def _with(values: np.ndarray, entries: tuple[int, ...], value: float) -> Any:
@@ -124,15 +123,15 @@ def _struct_direction(model: Model, unknown: Unknown) -> np.ndarray:
     values: dict[str, Any] = dict(model.parameters)
     moved = np.array(values[unknown.of], complex)
     if moved.ndim:
-        moved[list(unknown.entries)] += 1j * STEP
+        moved[list(unknown.entries)] += 1j * TINY
     else:
-        moved = moved + 1j * STEP
+        moved = moved + 1j * TINY
     values[unknown.of] = moved
     if "link_radius" in values:
         pieces = int(np.sum(model.joints_each))
         values["link_inertia"] = np.array(ellipsoid(values, pieces))
     as_tuples = {name: tuple(np.atleast_1d(x)) for name, x in values.items()}
-    return np.array(flat(model.manifest, as_tuples)).imag / STEP
+    return np.array(flat(model.manifest, as_tuples)).imag / TINY
 
 
 def unknowns(model: Model, placed: Placements, estimate: Any) -> Unknowns:
