@@ -1,15 +1,18 @@
 """Looks for markers that were swapped, or that fit worse than the others."""
 
 import warnings
+from collections.abc import Collection
 from itertools import combinations
 
 import numpy as np
 
 from ..errors import DoubtfulMarkers, IdentificationError
+from ..model.layout import REST
 from ..model.model import Model
 from .placement import Placements
+from .points import world_points
 from .start import fitted
-from .tracks import MarkerTracks
+from .tracks import UNITS, MarkerTracks
 
 FRAMES = 3  # frames at which swaps during a whole trial are checked
 LOOSE = 0.01  # of the tail's length: swaps are checked for larger misfits
@@ -18,6 +21,8 @@ CLEAR = 8.0  # times the usual residual that a swapped marker is off
 WORSE = 4.0  # a marker is reported if its residual is so many times the others'
 SMALL = 1e-3  # of the markers' extent: smaller residuals are not reported
 FEWEST = 3  # markers that are seen at once
+RIGID, BENDABLE = 2.0, 5.0  # factors of distances on a torso, and on a body with its tail
+ALIKE = 1.5  # factor within which a unit explains distances
 
 
 def refuse_too_few(placed: Placements, tracks: MarkerTracks, nq: int) -> None:
@@ -33,6 +38,44 @@ def refuse_too_few(placed: Placements, tracks: MarkerTracks, nq: int) -> None:
         f"data: too few markers: {tracks.source} shows at most {seen[best]} at once"
         f"{', on a line' if seen[best] >= FEWEST else ''}: a configuration has {nq - 1} numbers; "
         "it needs three markers or more that are not on a line, some of them on the tail"
+    )
+
+
+def refuse_scale(
+    model: Model, placed: Placements, tracks: MarkerTracks, moving: Collection[int] = ()
+) -> None:
+    """IdentificationError if markers are apart by another order of magnitude than their places.
+
+    Those on the torso are compared, the median of all pairs and frames; if there are too few, all
+    markers with a straight tail. moving: markers whose places are estimated.
+    """
+    straight = np.concatenate([REST, np.zeros(model.layout.nt)])
+    body = world_points(model, placed, straight[None])[0]
+    held = np.array([k not in moving for k in range(len(body))])
+    for use, most in ((held & placed.on_torso, RIGID), (held, BENDABLE)):
+        pairs = [*combinations(np.flatnonzero(use), 2)]
+        ratios = [
+            np.linalg.norm(tracks.positions[:, a] - tracks.positions[:, b], axis=1) / apart
+            for a, b in pairs
+            if (apart := np.linalg.norm(body[a] - body[b])) > 0
+        ]
+        if np.isfinite(ratios).any():
+            ratio = float(np.nanmedian(ratios))
+            if not 1 / most < ratio < most:
+                raise IdentificationError(_of_scale(tracks, ratio))
+            return
+
+
+def _of_scale(tracks: MarkerTracks, ratio: float) -> str:
+    """Return in words that positions are too large or too small, and the unit that would fit."""
+    right = {name: float(value / UNITS[tracks.unit]) * ratio for name, value in UNITS.items()}
+    unit = min(right, key=lambda name: abs(np.log(right[name])))
+    remedy = f"check the unit {tracks.unit!r}"
+    if abs(np.log(right[unit])) < np.log(ALIKE):
+        remedy = f'they look like {unit} read as {tracks.unit}: give unit="{unit}"'
+    return (
+        f"data: {tracks.source}: markers are {ratio:.4g} times as far apart as their places: "
+        f"{remedy}, or check the places, which are in m"
     )
 
 

@@ -12,7 +12,8 @@ from .tracks import MarkerTracks
 class Estimate:
     """One estimated number with its standard deviation and interval.
 
-    begin: the value at the start of the search; at_bound: the value went to its lower bound 0.
+    begin: the value at the start of the search; at_bound: the value went to its lower bound, 0 or
+    almost 0.
     """
 
     name: str

@@ -12,7 +12,7 @@ from ..errors import IdentificationError, ModelError
 from ..model.model import Model
 from ..stages import Stage
 from . import trial as trials
-from .doubts import refuse_too_few, tell_of_swaps
+from .doubts import refuse_scale, refuse_too_few, tell_of_swaps
 from .outcome import told
 from .placement import Marker, Placements, placements
 from .point import Point
@@ -22,12 +22,17 @@ from .search import Task, first_iterate, refined
 from .start import motion_shown
 from .torques import Known, TorquePrior, checked_prior, known_torques
 from .tracks import MarkerTracks
-from .unknowns import unknowns
+from .unknowns import Unknowns, unknowns
 
 LONGEST = 0.01  # s: of the intervals of the first mesh
 FIRST_NOISE = 1e-3  # m
-FUNCTIONS = ("forward_dynamics", "forward_dynamics_derivatives", "energy", "momentum")
-FUNCTIONS += ("tail_points",)
+FUNCTIONS = [
+    "forward_dynamics",
+    "forward_dynamics_derivatives",
+    "energy",
+    "momentum",
+    "tail_points",
+]
 Data = MarkerTracks | str | PathLike[str]
 
 
@@ -129,7 +134,7 @@ def identify(
     torques = torques_of(settings.get("torques"), len(tracks), model.layout.nt)
     noises, noise_known = noises_of(settings.get("noise"), tracks)
     with Stage("identify", model.name) as stage:
-        begun = [begin(model, placed, each) for each in tracks]
+        begun = [begin(wanted, each) for each in tracks]
         each = tuple(
             trials.trial_of(track, noise, torque, (model.layout.nt, LONGEST))
             for track, noise, torque in zip(tracks, noises, torques, strict=True)
@@ -151,7 +156,7 @@ def check_model(model: Any, estimate: Any) -> None:
     if not isinstance(model, Model):
         raise refusal("model", model, "a Model, as serpentail.load returns", IdentificationError)
     refuse_unlike(model, "identify")
-    for name in FUNCTIONS:
+    for name in (*FUNCTIONS, "tail_points"):
         model.kernel(name)
     names = list(estimate) if isinstance(estimate, Mapping | Sequence) else []
     if any(not str(name).startswith("marker:") for name in names):
@@ -210,9 +215,11 @@ def noises_of(noise: Any, tracks: list[MarkerTracks]) -> tuple[list[np.ndarray],
     return [np.broadcast_to(np.array(each), track.seen.shape) for track in tracks], True
 
 
-def begin(model: Model, placed: Placements, tracks: MarkerTracks) -> np.ndarray:
+def begin(wanted: Unknowns, tracks: MarkerTracks) -> np.ndarray:
     """Return the states (F, nx) that a trial's markers show; the error says if they are too few."""
+    model, placed = wanted.model, wanted.placed
     refuse_too_few(placed, tracks, model.nq)
+    refuse_scale(model, placed, tracks, {marker for marker, _, _ in wanted.offsets()})
     states = motion_shown(model, placed, tracks)
     tell_of_swaps(model, placed, tracks, states[:, : model.nq])
     return states

@@ -18,7 +18,7 @@ from ..model.layout import QUATERNION
 from ..model.model import Model
 from ..model.state_space import product_matrix
 from ..motion.trajectory import Trajectory
-from .doubts import refuse_too_few, tell_of_residuals
+from .doubts import refuse_scale, refuse_too_few, tell_of_residuals
 from .identify import refuse_unlike
 from .placement import Marker, placements
 from .points import world_points
@@ -111,6 +111,7 @@ def joint_torques(
         )
     tracks = tracks.of(placed.names)
     refuse_too_few(placed, tracks, model.nq)
+    refuse_scale(model, placed, tracks)
     q = configurations(model, placed, tracks)
     q[:, QUATERNION] = sign_continuous(q[:, QUATERNION])
     q, first, second = smoothed(tracks.times, q, cutoff)

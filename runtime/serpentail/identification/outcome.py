@@ -50,13 +50,13 @@ def told(task: Task, found: Fit, confidence: float, began: float) -> Identificat
             each.name,
             float(x),
             float(s),
-            *_interval(x, s * reach, bool(pinned)),
+            *_interval(x, s * reach, (bool(least == -np.inf), bool(pinned))),
             each.unit,
             float(first),
             bool(pinned),
         )
-        for each, x, s, first, pinned in zip(
-            wanted.each, values, std, wanted.start, found.pinned, strict=True
+        for each, x, s, first, pinned, least in zip(
+            wanted.each, values, std, wanted.start, found.pinned, wanted.least, strict=True
         )
     )
     C = relative_covariance(wanted, found)
@@ -85,9 +85,14 @@ def told(task: Task, found: Fit, confidence: float, began: float) -> Identificat
     )
 
 
-def _interval(value: float, reach: float, pinned: bool) -> tuple[float, float]:
-    """Return the ends of an interval; of a number at its bound, from there."""
-    return (0.0, float(reach)) if pinned else (float(value - reach), float(value + reach))
+def _interval(value: float, reach: float, kind: tuple[bool, bool]) -> tuple[float, float]:
+    """Return the ends of an interval, of a number that cannot be negative from 0 on.
+
+    kind: whether the number may be negative, and whether it is at its bound.
+    """
+    signed, pinned = kind
+    low = value - reach if signed else max(value - reach, 0.0)
+    return (0.0 if pinned else float(low)), float(value + reach)
 
 
 def refuse_unseen(model: Model, task: Task, found: Fit) -> None:

@@ -79,6 +79,7 @@ def by_parameters(
     steps: each of the parameter struct and of the mount's angles (3,).
     """
     found = np.zeros((len(tail), len(placed.names), 3, len(steps)))
+    assert model.library is not None  # else the model has no kernels, and the places none either
     libraries = model.library, model.batch_library
     for k, (struct, angles) in enumerate(steps):
         for sign in (1, -1):

@@ -18,6 +18,7 @@ from .points import STEP
 MARKER = "marker:"
 SAME = "same"
 GEOMETRY = ("tail_mount", "mount_angles", "tail_length", "link_lengths", "arc_lengths")
+LEAST = 1e-3  # of its size: bound of a positive number
 TINY = 1e-30  # of complex steps
 NAME = re.compile(r"([A-Za-z_]\w*)(?:\[(\d+|same)\])?")
 
@@ -54,6 +55,14 @@ class Unknowns:
     def sizes(self) -> np.ndarray:
         """The size of each, by which changes of different units are compared, (P,)."""
         return np.array([each.size for each in self.each])
+
+    @property
+    def least(self) -> np.ndarray:
+        """The bound of each (P,): 0, almost 0 if it must be positive, -inf if it has a sign."""
+        checks = {p["name"]: p["check"] for p in self.model.manifest["parameters"]}
+        bounds = {"not_negative": 0.0, "positive": LEAST, "body_inertia": LEAST}
+        each = [bounds.get(checks.get(each.of, ""), -np.inf) for each in self.each]
+        return np.array(each, float) * self.sizes
 
     def model_at(self, values: np.ndarray) -> Model:
         """Return the model with these parameters; ModelError if they are unphysical."""
