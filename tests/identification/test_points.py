@@ -122,13 +122,16 @@ def test_doubtful_markers_are_named(flight):
     model, states = flight
     data, markers = tracks(model, TIMES[:15], states[:15], 2e-4), placed(model)
     some, elsewhere = np.arange(8, 12)[:, None], {"nose": st.Marker(torso=(0, 0.06, 0.015))}
+    third = np.arange(5)[:, None]  # of 15 frames: not throughout
     for words, given, places in (
         (r"'tail2' .* 'tail3' .* 4 frames from 0.04 to 0.055", swapped(data, *TIPS, some), markers),
+        (r"'left' .* 'right' .* in 5 frames", swapped(data, "left", "right", third), markers),
         ("'left' and 'right' .* throughout", swapped(data, "left", "right"), markers),
         ("marker 'nose' is off by", data, markers | elsewhere),
     ):
-        with row(words), pytest.warns(st.DoubtfulMarkers, match=words):
+        with row(words), pytest.warns(st.DoubtfulMarkers, match=words) as told:
             st.identify(model, given, places, noise=2e-4)
+        assert len(told) == 1
 
 
 MODELS = ("m2_n2", "arcs2", "own_links", "own_arcs", "mixed")  # the last three on a tilted mount

@@ -1,20 +1,21 @@
 """Looks for markers that were swapped, or that fit worse than the others."""
 
 import warnings
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from itertools import combinations
 
 import numpy as np
 
 from ..errors import DoubtfulMarkers, IdentificationError
-from ..model.layout import REST
+from ..model.layout import REST, TAIL_Q
 from ..model.model import Model
 from .placement import Placements
 from .points import world_points
 from .start import fitted
 from .tracks import UNITS, MarkerTracks
 
-FRAMES = 3  # frames at which swaps during a whole trial are checked
+FRAMES = 3  # at which every exchange of two markers is tried
+ALWAYS = 0.8  # of the frames: a swap in more of them is one throughout
 LOOSE = 0.01  # of the tail's length: swaps are checked for larger misfits
 HALF = 0.5  # of the misfit that must be left once a swap is undone
 CLEAR = 8.0  # times the usual residual that a swapped marker is off
@@ -79,56 +80,83 @@ def _of_scale(tracks: MarkerTracks, ratio: float) -> str:
     )
 
 
-def tell_of_swaps(model: Model, placed: Placements, tracks: MarkerTracks, q: np.ndarray) -> None:
-    """Warn of two markers whose exchange makes frames of the whole trial fit much better."""
+def tell_of_swaps(
+    model: Model, placed: Placements, tracks: MarkerTracks, q: np.ndarray
+) -> tuple[int, ...]:
+    """Warn of two markers whose exchange makes frames fit much better; return them."""
     rows = np.flatnonzero(tracks.seen.sum(axis=1) == tracks.seen.sum(axis=1).max())
-    rows = rows[np.linspace(0, len(rows) - 1, min(FRAMES, len(rows))).astype(int)]
     positions = tracks.positions[rows]
-    before = np.median(fitted(model, placed, positions, q[rows])[1])
-    if before < LOOSE * float(model.parameters["tail_length"]):
-        return
-    best, pair = before, None
-    for a, b in combinations(range(len(tracks.names)), 2):
-        changed = positions.copy()
-        changed[:, [a, b]] = positions[:, [b, a]]
-        begin = q[rows].copy()
-        begin[:, 7:] = 0
-        after = min(np.median(fitted(model, placed, changed, at)[1]) for at in (begin, q[rows]))
-        if after < best:
-            best, pair = after, (a, b)
-    if pair is not None and best < HALF * before:
-        first, second = (tracks.names[k] for k in pair)
-        warnings.warn(
-            f"{tracks.source}: markers {first!r} and {second!r} look swapped throughout: with them "
-            f"exchanged the frames fit to {1e3 * best:.3g} mm in place of {1e3 * before:.3g} mm",
-            DoubtfulMarkers,
-            stacklevel=5,
-        )
+    misfits = fitted(model, placed, positions, q[rows])[1]
+    loose = np.flatnonzero(misfits >= LOOSE * float(model.parameters["tail_length"]))
+    if not len(loose):
+        return ()
+
+    def exchanged(pairs: Sequence[tuple[int, ...]], some: np.ndarray) -> np.ndarray:
+        changed = np.stack([positions[some]] * len(pairs))
+        for k, pair in enumerate(pairs):
+            changed[k][:, pair] = positions[some][:, pair[::-1]]
+        straight = q[rows[some]]
+        straight[:, TAIL_Q] = 0
+        begin = np.concatenate([q[rows[some]]] * len(pairs) + [straight] * len(pairs))
+        both = np.tile(changed.reshape(-1, *positions.shape[1:]), (2, 1, 1))
+        return fitted(model, placed, both, begin)[1].reshape(2, len(pairs), -1).min(axis=0)
+
+    # the pair that mends some frames best, and then how many it mends
+    few = loose[np.linspace(0, len(loose) - 1, min(FRAMES, len(loose))).astype(int)]
+    pairs = [*combinations(range(len(tracks.names)), 2)]
+    best = pairs[int(np.median(exchanged(pairs, few), axis=1).argmin())]
+    (after,) = exchanged([best], loose)
+    swapped = loose[after < HALF * misfits[loose]]
+    if len(swapped) <= len(loose) / 2:
+        return ()
+    where = "throughout"
+    if len(swapped) < ALWAYS * len(rows):
+        first, last = tracks.times[rows[swapped[[0, -1]]]]
+        where = f"in {len(swapped)} frames from {first:g} to {last:g} s"
+    names = [tracks.names[k] for k in best]
+    _tell(
+        f"{tracks.source}: markers {names[0]!r} and {names[1]!r} look swapped {where}: with them "
+        f"exchanged these frames fit to {1e3 * np.median(after):.3g} mm in place of "
+        f"{1e3 * np.median(misfits[loose]):.3g} mm"
+    )
+    return best
 
 
-def tell_of_residuals(tracks: MarkerTracks, modelled: np.ndarray) -> None:
-    """Warn of markers that look swapped in some frames, and of markers that fit badly.
+def tell_of_residuals(
+    tracks: MarkerTracks, modelled: np.ndarray, missing: bool = False, swapped: tuple[int, ...] = ()
+) -> None:
+    """Warn of markers that look swapped in some frames, and of torques or markers that fit badly.
 
-    modelled (F, M, 3): positions of the markers by the fit.
+    modelled (F, M, 3): positions of the markers by the fit; missing: residuals look as where
+    torques are missing, so that no marker is to blame; swapped: markers of which it is known.
     """
     off = np.linalg.norm(tracks.positions - modelled, axis=2)
-    usual, told = float(np.nanmedian(off)), set[int]()
+    usual, told = float(np.nanmedian(off)), set(swapped)
     for a, b in combinations(range(len(tracks.names)), 2):
         crossed = np.hypot(
             np.linalg.norm(tracks.positions[:, a] - modelled[:, b], axis=1),
             np.linalg.norm(tracks.positions[:, b] - modelled[:, a], axis=1),
         )
         own = np.hypot(off[:, a], off[:, b])
-        swapped = np.flatnonzero((crossed < HALF * own) & (own > CLEAR * usual))
-        if len(swapped):
+        rows = np.flatnonzero((crossed < HALF * own) & (own > CLEAR * usual))
+        if len(rows) and not told >= {a, b}:
             told |= {a, b}
-            first, last = tracks.times[swapped[[0, -1]]]
+            first, last = tracks.times[rows[[0, -1]]]
             _tell(
                 f"{tracks.source}: markers {tracks.names[a]!r} and {tracks.names[b]!r} look "
-                f"swapped in {len(swapped)} frames from {first:g} to {last:g} s: exchange them"
+                f"swapped in {len(rows)} frames from {first:g} to {last:g} s: exchange them"
             )
     rms = np.sqrt(np.nanmean(off**2, axis=0))
     extent = float(np.linalg.norm(np.ptp(modelled, axis=1), axis=-1).max())
+    if missing and not told and rms.max() > SMALL * extent:
+        worst = int(rms.argmax())
+        _tell(
+            f"{tracks.source}: residuals change smoothly over time and grow to the tip, to "
+            f"{1e3 * rms[worst]:.3g} mm at {tracks.names[worst]!r}, as where torques are missing: "
+            "if joints are driven give torques, or give torques=st.TorquePrior(std, time); if not, "
+            "estimate stiffness and damping"
+        )
+        return
     for k, name in enumerate(tracks.names):
         others = np.median(np.delete(rms, k)) if len(rms) > 1 else np.inf
         if k not in told and rms[k] > max(WORSE * others, SMALL * extent):

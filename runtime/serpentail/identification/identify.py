@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Mapping, Sequence
+from functools import partial
 from os import PathLike
 from typing import Any, TypedDict, Unpack
 
@@ -101,7 +102,7 @@ def identify(
     Warns
     -----
     DoubtfulMarkers
-        Markers look swapped, or fit badly.
+        Markers look swapped, or fit badly, or torques are missing.
 
     Notes
     -----
@@ -134,7 +135,7 @@ def identify(
     torques = torques_of(settings.get("torques"), len(tracks), model.layout.nt)
     noises, noise_known = noises_of(settings.get("noise"), tracks)
     with Stage("identify", model.name) as stage:
-        begun = [begin(wanted, each) for each in tracks]
+        begun = [*map(partial(begin, wanted), tracks)]  # no frame between, for places of warnings
         each = tuple(
             trials.trial_of(track, noise, torque, (model.layout.nt, LONGEST))
             for track, noise, torque in zip(tracks, noises, torques, strict=True)
@@ -144,11 +145,11 @@ def identify(
             wanted.start,
             tuple(
                 first_iterate(model, trial, states)
-                for trial, states in zip(each, begun, strict=True)
+                for trial, (states, _) in zip(each, begun, strict=True)
             ),
         )
         task, found = refined(task, start, stage)
-    return told(task, found, confidence, began)
+    return told(task, found, confidence, (began, [swapped for _, swapped in begun]))
 
 
 def check_model(model: Any, estimate: Any) -> None:
@@ -215,11 +216,13 @@ def noises_of(noise: Any, tracks: list[MarkerTracks]) -> tuple[list[np.ndarray],
     return [np.broadcast_to(np.array(each), track.seen.shape) for track in tracks], True
 
 
-def begin(wanted: Unknowns, tracks: MarkerTracks) -> np.ndarray:
-    """Return the states (F, nx) that a trial's markers show; the error says if they are too few."""
+def begin(wanted: Unknowns, tracks: MarkerTracks) -> tuple[np.ndarray, tuple[int, ...]]:
+    """Return the states (F, nx) that a trial's markers show, and markers that look swapped.
+
+    IdentificationError if they are too few, or of another scale.
+    """
     model, placed = wanted.model, wanted.placed
     refuse_too_few(placed, tracks, model.nq)
     refuse_scale(model, placed, tracks, {marker for marker, _, _ in wanted.offsets()})
     states = motion_shown(model, placed, tracks)
-    tell_of_swaps(model, placed, tracks, states[:, : model.nq])
-    return states
+    return states, tell_of_swaps(model, placed, tracks, states[:, : model.nq])

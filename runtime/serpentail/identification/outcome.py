@@ -19,6 +19,7 @@ from .certainty import (
 )
 from .doubts import tell_of_residuals
 from .estimates import Estimate, EstimatedTorques, IdentifiedTrial
+from .missing import torques_missing
 from .placement import Placements
 from .result import Identification, trajectory_of
 from .search import Task
@@ -28,8 +29,11 @@ from .trial import Iterate, Trial
 from .unknowns import Unknowns
 
 
-def told(task: Task, found: Fit, confidence: float, began: float) -> Identification:
-    """Return the result of the best fit."""
+def told(
+    task: Task, found: Fit, confidence: float, before: tuple[float, list[tuple[int, ...]]]
+) -> Identification:
+    """Return the result of the best fit; before: when it began, swapped markers of each trial."""
+    began, swaps = before
     wanted = task.unknowns
     model, placed = wanted.model_at(found.point.values), wanted.placed_at(found.point.values)
     refuse_unseen(model, task, found)
@@ -66,8 +70,11 @@ def told(task: Task, found: Fit, confidence: float, began: float) -> Identificat
             task.trials, found.point.iterates, task.torques, found.triangles, strict=True
         )
     )
-    for each in done:
-        tell_of_residuals(each.tracks, each.modelled)
+    for each, trial, at, linear, swapped in zip(
+        done, task.trials, found.point.iterates, found.linear, swaps, strict=True
+    ):
+        missing = not trial.unknown_torques and torques_missing(model, placed, trial, at, linear)
+        tell_of_residuals(each.tracks, each.modelled, missing, swapped)
     noise = float(np.median(np.concatenate([trial.noise.ravel() for trial in task.trials])))
     return Identification(
         model=model,
