@@ -1,4 +1,4 @@
-"""What is wrong with arguments and doubtful in data is told by name; where markers are on the body,
+"""What is wrong with arguments and data is told by name; where markers are on the body,
 against the model's own tail points and SciPy's rotations; derivatives against differences; and
 inverse dynamics against the torques that made the motion.
 """
@@ -19,7 +19,7 @@ from tests.identification.flights import flown, placed, start, tracks
 from tests.support import zoo
 from tests.support.rows import row
 
-TIMES, TIPS = np.linspace(0, 0.1, 21), ("tail2", "tail3")
+TIMES = np.linspace(0, 0.1, 21)
 
 
 @pytest.fixture(scope="module")
@@ -109,29 +109,6 @@ def test_too_few_markers_are_refused(flight):
     assert st.identify(model, data, torso, torques=prior, noise=1e-5).success
     with pytest.raises(st.IdentificationError, match="do not determine tail coordinate"):
         st.identify(model, data, torso, torques=prior, noise=3e-5)
-
-
-def swapped(data, a, b, frames=slice(None)):
-    positions = data.positions.copy()
-    i, j = data.names.index(a), data.names.index(b)
-    positions[frames, [i, j]] = data.positions[frames, [j, i]]
-    return st.marker_tracks(data.times, positions, data.names, unit="m")
-
-
-def test_doubtful_markers_are_named(flight):
-    model, states = flight
-    data, markers = tracks(model, TIMES[:15], states[:15], 2e-4), placed(model)
-    some, elsewhere = np.arange(8, 12)[:, None], {"nose": st.Marker(torso=(0, 0.06, 0.015))}
-    third = np.arange(5)[:, None]  # of 15 frames: not throughout
-    for words, given, places in (
-        (r"'tail2' .* 'tail3' .* 4 frames from 0.04 to 0.055", swapped(data, *TIPS, some), markers),
-        (r"'left' .* 'right' .* in 5 frames", swapped(data, "left", "right", third), markers),
-        ("'left' and 'right' .* throughout", swapped(data, "left", "right"), markers),
-        ("marker 'nose' is off by", data, markers | elsewhere),
-    ):
-        with row(words), pytest.warns(st.DoubtfulMarkers, match=words) as told:
-            st.identify(model, given, places, noise=2e-4)
-        assert len(told) == 1
 
 
 MODELS = ("m2_n2", "arcs2", "own_links", "own_arcs", "mixed")  # the last three on a tilted mount

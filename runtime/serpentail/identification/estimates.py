@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..brief import brief
 from ..motion.trajectory import Trajectory
 from .tracks import MarkerTracks
 
@@ -34,7 +35,7 @@ class Estimate:
 
 @dataclass(frozen=True, eq=False)
 class EstimatedTorques:
-    """Torques at the knots of a trial.
+    """Torques at the knots of a trial; ``torques[k]`` is that of tail coordinate k, (U,).
 
     times (U,) s; values, standard deviations, and interval limits low and high (U, 2m) N m.
     """
@@ -44,6 +45,12 @@ class EstimatedTorques:
     std: np.ndarray
     low: np.ndarray
     high: np.ndarray
+
+    def __getitem__(self, coordinate: int) -> np.ndarray:
+        """Return the values of a tail coordinate (U,); IndexError if there is none."""
+        return self.values[:, coordinate]
+
+    __repr__ = brief
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +65,8 @@ class IdentifiedTrial:
     trajectory: Trajectory
     modelled: np.ndarray
     torques: EstimatedTorques | None
+
+    __repr__ = brief
 
     @property
     def residuals(self) -> np.ndarray:

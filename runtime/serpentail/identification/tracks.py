@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..checks import finite_array, needed, one_of, real_array, refusal, shown
 from ..errors import IdentificationError
+from ..motion.account import framed
 from ..units import MEASURES, plain
 
 UNITS: dict[str, Fraction] = MEASURES["m"][1]
@@ -40,6 +41,17 @@ class MarkerTracks:
     names: tuple[str, ...]
     source: str = "arrays"
     unit: str = "m"
+
+    def __repr__(self) -> str:
+        frames, count = self.seen.shape
+        return framed(
+            [
+                f"MarkerTracks of {self.source}: {count} markers at {frames} times, "
+                f"{self.times[0]:.6g} to {self.times[-1]:.6g} s",
+                f"names {', '.join(self.names)}",
+                f"positions {self.positions.shape}; SI: s, m; {1 - self.seen.mean():.0%} not seen",
+            ]
+        )
 
     @property
     def seen(self) -> np.ndarray:

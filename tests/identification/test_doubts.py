@@ -1,4 +1,4 @@
-"""Missing torques are told from markers that are elsewhere than stated."""
+"""Markers that look swapped or are elsewhere than stated, and missing torques, are told apart."""
 
 from dataclasses import replace
 
@@ -10,7 +10,7 @@ from tests.identification.flights import flown, placed, start, tracks
 from tests.support import zoo
 from tests.support.rows import row
 
-TIMES = np.linspace(0, 0.15, 31)
+TIMES, TIPS = np.linspace(0, 0.15, 31), ("tail2", "tail3")
 MISSING, OFF = r"torques are missing: .*TorquePrior\(", "marker '{}' is off by"
 
 
@@ -47,4 +47,27 @@ def test_a_marker_that_is_elsewhere_is_still_blamed():
         places[name] = replace(places[name], offset=(0.0, 0.01, 0.0))
         with row(name), pytest.warns(st.DoubtfulMarkers, match=OFF.format(name)) as told:
             st.identify(model, data, places)
+        assert len(told) == 1
+
+
+def swapped(data, a, b, frames=slice(None)):
+    positions = data.positions.copy()
+    i, j = data.names.index(a), data.names.index(b)
+    positions[frames, [i, j]] = data.positions[frames, [j, i]]
+    return st.marker_tracks(data.times, positions, data.names, unit="m")
+
+
+def test_markers_that_look_swapped_or_misplaced_are_named_once():
+    model, times = zoo.model("m1_n3"), np.linspace(0, 0.07, 15)
+    data, markers = tracks(model, times, flown(model, times, start(model)), 2e-4), placed(model)
+    some, elsewhere = np.arange(8, 12)[:, None], {"nose": st.Marker(torso=(0, 0.06, 0.015))}
+    third = np.arange(5)[:, None]  # of 15 frames: not throughout
+    for words, given, places in (
+        (r"'tail2' .* 'tail3' .* 4 frames from 0.04 to 0.055", swapped(data, *TIPS, some), markers),
+        (r"'left' .* 'right' .* in 5 frames", swapped(data, "left", "right", third), markers),
+        ("'left' and 'right' .* throughout", swapped(data, "left", "right"), markers),
+        ("marker 'nose' is off by", data, markers | elsewhere),
+    ):
+        with row(words), pytest.warns(st.DoubtfulMarkers, match=words) as told:
+            st.identify(model, given, places, noise=2e-4)
         assert len(told) == 1
