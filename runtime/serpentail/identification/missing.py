@@ -15,6 +15,7 @@ from .trial import Iterate, Linear, Trial
 
 SMOOTH = 1.2  # squares of steps over squares of values; 2 for noise
 SURE = 3.5  # standard deviations of this ratio of noise
+FEWEST = 5  # steps of the marker at the tip
 GROWS = 1.4  # of the residual at the tip over that on the torso
 
 
@@ -38,8 +39,9 @@ def torques_missing(
     remainder = np.full((*seen.shape, 3), np.nan)
     remainder[seen] = left.reshape(-1, 3)
     sizes = np.sqrt(np.nanmean(remainder**2, axis=(0, 2)))
-    tip = int(np.argmax(placed.piece + placed.fraction))
+    torso, tip = placed.on_torso, int(np.argmax(placed.piece + placed.fraction))
     steps = np.diff(remainder[seen[:, tip], tip], axis=0)
-    ratio = float(np.mean(steps**2)) / float(sizes[tip]) ** 2
-    doubt = SURE * 2 / np.sqrt(steps.size)
-    return ratio < min(SMOOTH, 2 - doubt) and sizes[tip] > GROWS * np.median(sizes[placed.on_torso])
+    if torso[tip] or not torso.any() or len(steps) < FEWEST:
+        return False
+    smooth = min(SMOOTH, 2 * (1 - SURE / np.sqrt(steps.size))) * sizes[tip] ** 2
+    return bool(np.mean(steps**2) < smooth and sizes[tip] > GROWS * np.median(sizes[torso]))
