@@ -6,8 +6,6 @@ A missing torque leaves residuals that change smoothly over time, most of all at
 
 import numpy as np
 
-from ..attitude import rotation_matrix
-from ..model.layout import QUATERNION, TAIL_Q
 from ..model.model import Model
 from .placement import Placements
 from .points import offset_axes
@@ -26,8 +24,7 @@ def torques_missing(
     seen = trial.tracks.seen
     rows = 3 * int(seen.sum())
     q = iterate.states[trial.frames, : model.nq]
-    R = rotation_matrix(q[:, QUATERNION])[:, None]
-    axes = R @ offset_axes(model, q[:, TAIL_Q], placed) / trial.noise[..., None, None]
+    axes = offset_axes(model, placed, q) / trial.noise[..., None, None]
     # offsets of all markers as further columns
     markers = seen.shape[1]
     offsets = np.einsum("fmij,mn->fminj", axes, np.eye(markers))[seen].reshape(rows, -1)

@@ -7,10 +7,7 @@ it bent by x times as much. Only the axes of offsets are turned here. Derivative
 differences.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -31,19 +28,10 @@ CROSS = np.array(
 STEP = 1e-5  # of differences, in rad or relative to sizes; their error is about its square
 
 
-@dataclass(frozen=True, eq=False)
-class MarkerPoints:
-    """Markers in the world: points (F, M, 3) m, their derivatives by q in its tangent space
-    (F, M, 3, nv), and the attitudes (F, 1, 3, 3) of the torso.
+def marker_points(model: Model, placed: Placements, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return markers at configurations (F, nq): points (F, M, 3) m in the world, and their
+    derivatives by q in its tangent space (F, M, 3, nv).
     """
-
-    points: np.ndarray
-    by_q: np.ndarray
-    attitudes: np.ndarray
-
-
-def marker_points(model: Model, placed: Placements, q: np.ndarray) -> MarkerPoints:
-    """Return markers at configurations (F, nq), with derivatives."""
     tail, nt = q[:, TAIL_Q], model.layout.nt
     steps = STEP * np.concatenate([np.zeros((1, nt)), np.eye(nt), -np.eye(nt)])
     places = _in_body(model, (tail + steps[:, None]).reshape(-1, nt), placed)
@@ -54,7 +42,7 @@ def marker_points(model: Model, placed: Placements, q: np.ndarray) -> MarkerPoin
     by_q[..., OMEGA] = -R @ np.einsum("fmk,kij->fmij", body[0], CROSS)
     slopes = (body[1 : nt + 1] - body[nt + 1 :]) / (2 * STEP)
     by_q[..., TAIL_V] = R @ np.moveaxis(slopes, 0, -1)
-    return MarkerPoints(_in_world(q, R, body[0]), by_q, R)
+    return _in_world(q, R, body[0]), by_q
 
 
 def world_points(model: Model, placed: Placements, q: np.ndarray) -> np.ndarray:
@@ -68,38 +56,20 @@ def _in_world(q: np.ndarray, R: np.ndarray, body: np.ndarray) -> np.ndarray:
     return q[:, None, :3] + (R @ body[..., None])[..., 0]
 
 
-def by_parameters(
-    model: Model,
-    tail: np.ndarray,
-    placed: Placements,
-    steps: Sequence[tuple[np.ndarray, np.ndarray]],
-) -> np.ndarray:
-    """Return differences of the markers in B over steps of parameters, (F, M, 3, len(steps)).
-
-    steps: each of the parameter struct and of the mount's angles (3,).
-    """
-    found = np.zeros((len(tail), len(placed.names), 3, len(steps)))
-    assert model.library is not None  # else the model has no kernels, and the places none either
-    libraries = model.library, model.batch_library
-    for k, (struct, angles) in enumerate(steps):
-        for sign in (1, -1):
-            vector = model.parameter_vector + sign * struct
-            kernel = Kernel(libraries, model.manifest, "tail_points", vector)
-            found[..., k] += sign * _in_body(model, tail, placed, (kernel, sign * angles)) / 2
-    return found
+def offset_axes(model: Model, placed: Placements, q: np.ndarray) -> np.ndarray:
+    """Return the axes (F, M, 3, 3) of offsets in the world at configurations (F, nq)."""
+    R = rotation_matrix(q[:, QUATERNION])[:, None]
+    return R @ _axes(model, q[:, TAIL_Q], placed)
 
 
-def offset_axes(model: Model, tail: np.ndarray, placed: Placements, more: Any = 0.0) -> np.ndarray:
-    """Return the axes (F, M, 3, 3) of offsets in B at tail coordinates (F, 2m).
-
-    more: angles (3,) by which the mount is turned further.
-    """
+def _axes(model: Model, tail: np.ndarray, placed: Placements) -> np.ndarray:
+    """Return the axes (F, M, 3, 3) of offsets in B at tail coordinates (F, 2m)."""
     if model.kernel("tail_points").polar:
         pairs = polar_to_bend(tail[:, ::PER_SEGMENT], tail[:, 1::PER_SEGMENT])[:2]
         tail = np.stack(pairs, axis=-1).reshape(tail.shape)
     quaternions = np.zeros((len(tail), len(placed.names), 4))
     quaternions[..., 0] = 1
-    frame: Entries = from_angles(np.array(model.parameters.get("mount_angles", (0, 0, 0))) + more)
+    frame: Entries = from_angles(np.array(model.parameters.get("mount_angles", (0.0, 0, 0))))
     for k in range(placed.piece.max() + 1):
         i = PER_SEGMENT * placed.pieces.segment[k]
         turn = partial(_turn, placed.pieces.arc[k], tail[:, i], tail[:, i + 1])
@@ -110,21 +80,12 @@ def offset_axes(model: Model, tail: np.ndarray, placed: Placements, more: Any = 
     return rotation_matrix(quaternions)
 
 
-def _in_body(
-    model: Model,
-    tail: np.ndarray,
-    placed: Placements,
-    other: tuple[Kernel, np.ndarray] | None = None,
-) -> np.ndarray:
-    """Return markers in B (F, M, 3) m at tail coordinates (F, 2m).
-
-    other: tail points of other parameters, and angles by which the mount is turned further.
-    """
-    kernel, more = other or (model.kernel("tail_points"), np.zeros(3))
-    places = _centre_line(kernel, tail, placed)
+def _in_body(model: Model, tail: np.ndarray, placed: Placements) -> np.ndarray:
+    """Return markers in B (F, M, 3) m at tail coordinates (F, 2m)."""
+    places = _centre_line(model.kernel("tail_points"), tail, placed)
     if not placed.offset[~placed.on_torso].any():
         return places + placed.offset
-    return places + (offset_axes(model, tail, placed, more) @ placed.offset[..., None])[..., 0]
+    return places + (_axes(model, tail, placed) @ placed.offset[..., None])[..., 0]
 
 
 def _turn(arc: bool, first: np.ndarray, second: np.ndarray, fraction: float) -> list[np.ndarray]:

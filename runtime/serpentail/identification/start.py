@@ -85,11 +85,11 @@ def fitted(
     left = np.arange(len(q))  # frames that still move
     misfit = (off(world_points(model, placed, q), left) ** 2).sum(axis=(1, 2))
     for _ in range(ITERATIONS):
-        at = marker_points(model, placed, q[left])
-        J = np.where(weight[left, ..., None], at.by_q, 0).reshape(len(left), -1, nv)
+        points, by_q = marker_points(model, placed, q[left])
+        J = np.where(weight[left, ..., None], by_q, 0).reshape(len(left), -1, nv)
         back = np.swapaxes(J, 1, 2)
         square = back @ J + ridge[left, None, None] * hold
-        step = np.linalg.solve(square, back @ off(at.points, left))[..., 0]
+        step = np.linalg.solve(square, back @ off(points, left))[..., 0]
         new = turned(model, q[left], step)
         after = (off(world_points(model, placed, new), left) ** 2).sum(axis=(1, 2))
         better = after <= misfit[left]

@@ -11,11 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import IdentificationError
-from ..model.layout import TAIL_Q
 from ..model.model import Model
 from . import stages as radau
 from .placement import Placements
-from .points import STEP, by_parameters, marker_points, offset_axes, world_points
+from .points import STEP, marker_points, offset_axes, world_points
 from .torques import Known, TorquePrior, knots_of, prior_rows
 from .tracks import MarkerTracks
 from .unknowns import Unknowns
@@ -148,17 +147,16 @@ def marker_jacobians(
     unknowns: Unknowns, model: Model, placed: Placements, q: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return derivatives (F, M, 3, nv), (F, M, 3, P) of the markers by q's tangent and unknowns."""
-    at = marker_points(model, placed, q)
-    by = np.zeros((*at.points.shape, len(unknowns.each)))
-    columns, steps = unknowns.geometry(model)
-    if columns:
-        moves = by_parameters(model, q[:, TAIL_Q], placed, steps)
-        by[..., columns] = at.attitudes @ (moves / (STEP * unknowns.sizes[columns]))
+    points, by_q = marker_points(model, placed, q)
+    by = np.zeros((*points.shape, len(unknowns.each)))
+    for k, beside in unknowns.beside(model).items():
+        above, below = (world_points(each, placed, q) for each in beside)
+        by[..., k] = (above - below) / (2 * STEP * unknowns.sizes[k])
     if offsets := unknowns.offsets():
-        axes = at.attitudes @ offset_axes(model, q[:, TAIL_Q], placed)
+        axes = offset_axes(model, placed, q)
         for marker, axis, k in offsets:
             by[:, marker, :, k] = axes[:, marker, :, axis]
-    return at.by_q, by
+    return by_q, by
 
 
 @dataclass(frozen=True, eq=False)

@@ -72,12 +72,7 @@ class Unknowns:
         for each, value in zip(self.each, values, strict=True):
             if not each.is_offset:
                 new[each.of] = _with(new[each.of], each.entries, value)
-        if not new:
-            return self.model
-        with warnings.catch_warnings():  # an iterate may be unusual; only the result is checked
-            warnings.simplefilter("ignore", UnusualSize)
-            warnings.simplefilter("ignore", UnlikeBodies)
-            return self.model.with_parameters(**new)
+        return _changed(self.model, new) if new else self.model
 
     def placed_at(self, values: np.ndarray) -> Placements:
         """Return the markers with these offsets."""
@@ -102,20 +97,25 @@ class Unknowns:
                 jacobian[:, k] = _struct_direction(model, each)
         return jacobian
 
-    def geometry(self, model: Model) -> tuple[list[int], list[tuple[np.ndarray, np.ndarray]]]:
-        """Return the indices of numbers that move places on the tail, and a small step of each.
+    def beside(self, model: Model) -> dict[int, list[Model]]:
+        """Return the models a small step above and below, by index of what moves the tail."""
+        models: dict[int, list[Model]] = {}
+        for k, each in enumerate(self.each):
+            if each.of in GEOMETRY:
+                values = np.array(model.parameters[each.of], float)
+                here = np.atleast_1d(values)[each.entries[0]]
+                ends = (here + STEP * each.size, here - STEP * each.size)
+                changes = [{each.of: _with(values, each.entries, end)} for end in ends]
+                models[k] = [_changed(model, change) for change in changes]
+        return models
 
-        A step is of the parameter struct, and of the mount's angles (3,), rad.
-        """
-        by = self.struct_jacobian(model)
-        which = [k for k, each in enumerate(self.each) if each.of in GEOMETRY]
-        steps = []
-        for k in which:
-            each, angles = self.each[k], np.zeros(3)
-            if each.of == "mount_angles":
-                angles[list(each.entries)] = STEP * each.size
-            steps.append((STEP * each.size * by[:, k], angles))
-        return which, steps
+
+def _changed(model: Model, changes: dict[str, Any]) -> Model:
+    """Return a model with other parameters, which may be unusual; only the result is checked."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UnusualSize)
+        warnings.simplefilter("ignore", UnlikeBodies)
+        return model.with_parameters(**changes)
 
 
 def _with(values: np.ndarray, entries: tuple[int, ...], value: float) -> Any:
