@@ -233,7 +233,15 @@ def test_page_and_figure_have_what_was_measured_and_its_gaps(tmp_path):
             st.view(found.trajectory, page, markers=markers)
 
     _, axes = found.plot(tmp_path / "residuals.png")
-    assert [each.get_ylabel() for each in axes] == ["residual [mm]", "torque [mN m]", "power [mW]"]
+    named = [text.get_text() for text in axes[0].get_legend().get_texts()]
+    assert named == [*data.names, f"rms of noise: {1e3 * found.noise * 3**0.5:.2g} mm"]
+    for label, each in zip(("tail torque\n[mN m]", "power\n[mW]"), axes[1:], strict=True):
+        assert each.get_ylabel() == label and len(each.collections) == 2  # bands
+        named = [text.get_text() for text in each.get_legend().get_texts()]
+        assert named == ["pitch", "yaw", "95 %"]
+    bands = found.trials[0].torques
+    edge = axes[1].collections[1].get_paths()[0].vertices[:, 1]
+    assert edge.min() == pytest.approx(1e3 * bands.low[:, 1].min())
     curves = [line.get_ydata() for line in axes[0].lines[:-1]]
     distance = 1e3 * np.linalg.norm(found.trials[0].residuals, axis=2)
     np.testing.assert_allclose(np.array(curves).T, distance)
@@ -241,3 +249,21 @@ def test_page_and_figure_have_what_was_measured_and_its_gaps(tmp_path):
     assert (tmp_path / "residuals.png").stat().st_size > 1000
     with pytest.raises(st.IdentificationError, match="trial: value 1: needs 0 to 0"):
         found.plot(trial=1)
+
+
+def test_tracks_and_torques_tell_their_shapes_and_priors_take_units():
+    model, times = zoo.model("m1_n1"), np.linspace(0, 0.05, 11)
+    data = tracks(model, times, flown(model, times, start(model)), 3e-4)
+    told = repr(data).splitlines()
+    assert len(told) <= 4 and "5 markers at 11 times" in told[0] and "nose, left" in told[1]
+    found, same = (
+        st.identify(model, data, placed(model), torques=st.TorquePrior(*prior), noise=3e-4)
+        for prior in (("4 mN m", "30 ms"), (4e-3, 0.03))
+    )
+    torques = found.trials[0].torques
+    np.testing.assert_array_equal(torques.values, same.trials[0].torques.values)
+    np.testing.assert_array_equal(torques[1], torques.values[:, 1])
+    assert f"values=array of {len(torques.times)} x 2" in repr(torques)
+    for prior, words in ((("4 mm", 1), "torques.std: value '4 mm'"), ((1, "x"), "torques.time")):
+        with row(words), pytest.raises(st.IdentificationError, match=words):
+            st.identify(model, data, placed(model), torques=st.TorquePrior(*prior))

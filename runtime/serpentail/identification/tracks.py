@@ -1,7 +1,7 @@
 """``MarkerTracks``: positions of markers over time, nan if a marker was not seen."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..checks import finite_array, needed, one_of, real_array, refusal, shown
 from ..errors import IdentificationError
+from ..motion.account import framed
 from ..units import MEASURES, plain
 
 UNITS: dict[str, Fraction] = MEASURES["m"][1]
@@ -31,12 +32,26 @@ class MarkerTracks:
         Names of the markers.
     source : str
         Where they are from, for messages.
+    unit : str
+        The unit that they were given in, for messages.
     """
 
     times: np.ndarray
     positions: np.ndarray
     names: tuple[str, ...]
     source: str = "arrays"
+    unit: str = "m"
+
+    def __repr__(self) -> str:
+        frames, count = self.seen.shape
+        return framed(
+            [
+                f"MarkerTracks of {self.source}: {count} markers at {frames} times, "
+                f"{self.times[0]:.6g} to {self.times[-1]:.6g} s",
+                f"names {', '.join(self.names)}",
+                f"positions {self.positions.shape}; SI: s, m; {1 - self.seen.mean():.0%} not seen",
+            ]
+        )
 
     @property
     def seen(self) -> np.ndarray:
@@ -64,7 +79,7 @@ class MarkerTracks:
         for name in names:
             one_of(f"markers of {self.source}", name, self.names, IdentificationError)
         columns = [self.names.index(name) for name in names]
-        return MarkerTracks(self.times, self.positions[:, columns], tuple(names), self.source)
+        return replace(self, positions=self.positions[:, columns], names=tuple(names))
 
 
 def marker_tracks(
@@ -122,7 +137,7 @@ def checked_tracks(
 ) -> MarkerTracks:
     """Return tracks of arrays after checking them; how: unit, axes, zeros; source: for errors."""
     unit, axes, zeros = how
-    factor = float(UNITS[checked_unit(unit, source)])
+    unit = checked_unit(unit, source)
     t = checked_times(times, source)
     names = checked_names(names, source)
     where = real_array(f"{source}: positions", positions, IdentificationError)
@@ -136,13 +151,13 @@ def checked_tracks(
     one_of("zeros", zeros, ZEROS, IdentificationError)
     where = without_zeros(where, names, zeros, source)
     columns, signs = checked_axes(axes)
-    where = where[..., columns] * signs * factor
+    where = where[..., columns] * signs * float(UNITS[unit])
     part = np.isfinite(where)
     where = np.where(part.all(axis=2, keepdims=True), where, np.nan)
     unseen = [name for k, name in enumerate(names) if not part[:, k].all(axis=-1).any()]
     if unseen:
         raise IdentificationError(f"{source}: never seen: {', '.join(unseen)}: leave these out")
-    return MarkerTracks(t, where, names, source)
+    return MarkerTracks(t, where, names, source, unit)
 
 
 def checked_unit(unit: Any, source: str) -> str:

@@ -82,7 +82,7 @@ def plot(
     chosen = [PANELS[name](motion, model).without_still() for name in names or PANELS]
     chosen = chosen if names else [panel for panel in chosen if panel.names]
     if ax is None:
-        return drawn(lambda: _figure(motion, chosen), path)
+        return drawn(lambda: stacked(motion, chosen), path)
     return drawn_on(ax, motion, chosen, path)
 
 
@@ -99,7 +99,7 @@ def drawn_on(
     return every[0].figure, ax
 
 
-def _figure(motion: Trajectory, chosen: list[Panel]) -> tuple["Figure", Array]:
+def stacked(motion: Trajectory, chosen: list[Panel]) -> tuple["Figure", Array]:
     """A figure of stacked panels."""
     from .figure import Drawing
 
@@ -142,7 +142,12 @@ def _draw_panel(axes: "Axes", t: Array, panel: Panel) -> None:
     steps = [1, 1.5, 3, 4.5, 9, 10] if "[deg]" in panel.label else [1, 2, 2.5, 5, 10]
     axes.yaxis.set_major_locator(MaxNLocator(5, steps=steps))
     if rows:
-        axes.legend(loc="upper left", ncols=columns, **LEGEND)
+        labelled(axes, columns)
+
+
+def labelled(axes: "Axes", columns: int) -> None:
+    """A legend of all that has a label."""
+    axes.legend(loc="upper left", ncols=columns, **LEGEND)
 
 
 def _limits(panel: Panel) -> tuple[float, float]:
