@@ -5,12 +5,11 @@ import io
 from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from ..errors import IdentificationError
-from ..extras import needed
+from .c3d import read_c3d
 from .tracks import MarkerTracks, checked_tracks, checked_unit
 
 LARGEST = 2**30  # bytes of a file that is read
@@ -26,7 +25,7 @@ def read_markers(
     axes: str = "xyz",
     zeros: str = "refuse",
 ) -> MarkerTracks:
-    """Read marker tracks from a TRC, CSV or C3D file.
+    """Read marker tracks from a TRC, CSV or C3D file, which may be damaged or from a stranger.
 
     Parameters
     ----------
@@ -70,6 +69,8 @@ def read_markers(
             "serpentail.marker_tracks"
         )
     try:
+        if source.exists() and not source.is_file():
+            raise IdentificationError(f"{source}: is no regular file: needs one")
         if source.stat().st_size > LARGEST:
             raise IdentificationError(f"{source}: larger than {LARGEST} bytes: cut it into trials")
         times, positions, names, stated = READERS[known](source)
@@ -112,7 +113,7 @@ def _trc(source: Path) -> Read:
         )
     rows = [(k, line) for k, line in enumerate(lines[5:], 6) if line.strip()]
     cells = [_cells(source, k, line.split("\t"), 2 + 3 * count) for k, line in rows]
-    if len(cells) != frames:
+    if len(cells) != frames or not frames:
         raise IdentificationError(
             f"{source}: has {len(cells)} frames, its header says {frames}: the file is cut off, or "
             "its header is wrong"
@@ -177,25 +178,4 @@ def _csv(source: Path) -> Read:
     return table[:, 0], table[:, 1:].reshape(len(table), len(names), 3), names, None
 
 
-def _c3d(source: Path) -> Read:
-    """Read a C3D file with ezc3d, which gives nan for markers that were not seen."""
-    ezc3d = needed("ezc3d", "c3d")
-    try:
-        content = ezc3d.c3d(str(source))
-        point = content["parameters"]["POINT"]
-        names = [str(name).strip() for name in point["LABELS"]["value"]]
-        rate = float(point["RATE"]["value"][0])
-        units: list[Any] = point["UNITS"]["value"]
-        positions = np.moveaxis(content["data"]["points"][:3], [0, 1, 2], [2, 1, 0])
-        first = int(content["header"]["points"]["first_frame"])
-    except OSError:
-        raise
-    except Exception as error:  # ezc3d raises errors of many kinds for damaged files
-        raise IdentificationError(
-            f"{source}: is not a complete C3D file ({type(error).__name__}: {error!s:.100})"
-        ) from error
-    times = (first + np.arange(len(positions))) / rate
-    return times, positions, names[: positions.shape[1]], str(units[0]) if units else None
-
-
-READERS: dict[str, Callable[[Path], Read]] = {".trc": _trc, ".csv": _csv, ".c3d": _c3d}
+READERS: dict[str, Callable[[Path], Read]] = {".trc": _trc, ".csv": _csv, ".c3d": read_c3d}
