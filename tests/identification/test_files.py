@@ -5,6 +5,7 @@ verb identify, and what is drawn of an identification: its page, residuals and t
 import base64
 import gzip
 import json
+import os
 import re
 import subprocess
 import sys
@@ -32,6 +33,20 @@ def some():
     return st.marker_tracks(STEP * T, positions, NAMES, unit="m")
 
 
+def far(y):
+    x = X.copy()
+    x[2, 1, 1] = y
+    return x
+
+
+def test_a_marker_beyond_100_m_is_named_with_a_remedy():
+    """The rule is that of scenes: warn, because most often it is a slip of units."""
+    with pytest.warns(st.UnusualSize, match=r"'tip', frame 2 .*, y: value -101 m: .*unit="):
+        st.marker_tracks(T, far(-101), NAMES, unit="m")
+    st.marker_tracks(T, far(99), NAMES, unit="m")
+    st.marker_tracks(T, far(1e5 - 1), NAMES, unit="mm")
+
+
 def test_arrays_that_are_no_tracks_are_refused():
     for words, times, positions, names, how in (
         ("unit: none is stated", T, X, NAMES, {"unit": None}),
@@ -45,6 +60,9 @@ def test_arrays_that_are_no_tracks_are_refused():
         ("names: value", T, X, ["a", " "], {}),
         ("'tip' is at exactly .* in 6 frames", T, X * [[[1], [0]]], NAMES, {}),
         ("never seen: tip", T, X * [[[1], [np.nan]]], NAMES, {}),
+        ("names: value", T, X, ["a", "b\nc"], {}),
+        (r"'tip', frame 2 .*, y: value 1e\+38 m: .*100 m.*unit=", T, far(1e38), NAMES, {}),
+        (r"times\[1\]: value 2e\+12: needs seconds", T * 2e12, X, NAMES, {}),
         ("infinite", T, X * np.inf, NAMES, {}),
         (r"\(3,\): needs 4 frames", T[:3], X[:3], NAMES, {}),
         ("axes: value 'xzy'", T, X, NAMES, {"axes": "xzy"}),
@@ -134,7 +152,7 @@ def test_no_c3d_file_ends_this_process(tmp_path, monkeypatch):
         ("SIGSEGV", {}, whole[:place] + b"\xff" + whole[place + 1 :]),
         ("c3d file", {}, b"\x00\xff" * 300),
         ("MemoryError|bad_alloc|SIG", {"MEMORY": (2**20, 0)}, large),
-        ("no answer in 0.1 s", {"WAIT": 0.01}, whole),
+        ("no answer in 0.09 s", {"WAIT": 0.03}, whole),
     )
     for words, limits, content in rows:
         path.write_bytes(content)
@@ -186,6 +204,8 @@ TRC = {
     "DataRate is 260 Hz": header("200", "260"),
     "names 1 markers, NumMarkers is 2": lambda x: [*x[:3], x[3].replace("tip", ""), *x[4:]],
     "NumFrames: value 'six'": header("6", "six"),
+    "has 0 frames": lambda x: header("6", "0")([*x[:5], " "]),
+    "DataRate is 0 Hz, .* 200 Hz": header("200", "0"),
 }
 CSV = {
     r"line 7 has \d of 7": lambda x: [*x[:-1], x[-1][:20]],
@@ -193,6 +213,7 @@ CSV = {
     "csv: line 1 needs time": lambda x: [],
     "line 1 needs": lambda x: ["time" for _ in x],
     "repeated": lambda x: [*x[:4], x[3], *x[4:]],
+    "cannot be read as CSV": lambda x: [*x[:-1], "1" * 200_000],
 }
 
 
@@ -205,10 +226,12 @@ def test_damaged_files_are_refused_by_line(tmp_path):
             with row(suffix, words), pytest.raises(st.IdentificationError, match=words):
                 st.read_markers(path, unit)
     (tmp_path / "run.trc").write_bytes(b"\x00\xff" * 300)
+    os.mkfifo(tmp_path / "pipe.csv")
     for words, path in (
         ("unit: none is stated", st.write_markers(some(), tmp_path / "run.csv")),
         ("data: value 3", 3),
         (r"tracks.xlsx: needs .*\.trc, \.csv, \.c3d", tmp_path / "tracks.xlsx"),
+        ("pipe.csv: is no regular file", tmp_path / "pipe.csv"),
         (r"none.trc: cannot be read", tmp_path / "none.trc"),
         ("is not a text file", tmp_path / "run.trc"),
     ):

@@ -16,7 +16,7 @@ from ..extras import needed
 CHILD = Path(__file__).with_name("c3d_child.py")
 MEMORY = (2**30, 64)  # bytes that a read may use: at least, and for each byte of the file
 SPEED = 1e6  # bytes of a file in a second of processor time: a tenth of what is usual
-SECONDS = 10  # of processor time, at least
+SECONDS = 3  # of processor time, at least
 WAIT = 6  # s for each s of processor time: the machine may be busy
 REMEDY = "export it again, or save it as TRC or CSV"
 

@@ -139,10 +139,11 @@ def _check_rate(source: Path, times: np.ndarray, stated: str | None) -> None:
         rate = float(stated or "nan")
     except ValueError:
         return
-    spans = np.diff(times)
+    with np.errstate(over="ignore", invalid="ignore"):  # of times that are refused later
+        spans = np.diff(times)
     if np.isfinite(rate) and len(spans) and np.isfinite(spans).all() and (spans > 0).all():
-        found = 1 / np.median(spans)
-        if abs(found / rate - 1) > RATE_TOLERANCE:
+        found = 1 / float(np.median(spans))
+        if abs(found - rate) > RATE_TOLERANCE * abs(rate):
             raise IdentificationError(
                 f"{source}: DataRate is {rate:g} Hz, but the times have {found:g} Hz: correct one"
             )
@@ -165,7 +166,10 @@ def _cells(source: Path, line: int, cells: list[str], count: int) -> list[float]
 
 def _csv(source: Path) -> Read:
     """Read a CSV file with a line of names."""
-    rows = list(csv.reader(io.StringIO("\n".join(_lines(source)))))
+    try:
+        rows = list(csv.reader(io.StringIO("\n".join(_lines(source)))))
+    except csv.Error as error:
+        raise IdentificationError(f"{source}: cannot be read as CSV ({error})") from None
     heads = [head.strip() for head in rows[0]] if rows else []
     names = [head[:-2] for head in heads[1::3]]
     wanted = ["time", *(f"{name}_{axis}" for name in names for axis in "xyz")]
