@@ -68,7 +68,7 @@ class Sweep:
         found = self.store.rows([entry.key])
         if not found:
             raise KeyError(f"point {k} has no row yet")
-        return row_of(k, entry, found[entry.key])
+        return self._row(k, found[entry.key])
 
     def rows(self) -> list[dict[str, Any]]:
         """Return all rows that exist, in the order of their points.
@@ -81,7 +81,7 @@ class Sweep:
         """
         found = self.store.rows(entry.key for entry in self.entries)
         return [
-            row_of(k, entry, found[entry.key])
+            self._row(k, found[entry.key])
             for k, entry in enumerate(self.entries)
             if entry.key in found
         ]
@@ -213,9 +213,11 @@ class Sweep:
 
         return write(self, path)
 
-
-def row_of(k: int, entry: Entry, row: Row) -> dict[str, Any]:
-    """Return a row as a dict."""
-    outcome = {} if row.outcome is None else json.loads(row.outcome)
-    told = {"error": row.error, "seconds": row.seconds}
-    return {"number": k} | entry.point | outcome | told
+    def _row(self, k: int, row: Row) -> dict[str, Any]:
+        """Return the stored row of a point as a dict; SweepError if it is damaged."""
+        try:
+            outcome = {} if row.outcome is None else json.loads(row.outcome)
+            told = {"error": row.error, "seconds": float(row.seconds)}
+            return {"number": k} | self.entries[k].point | outcome | told
+        except (RecursionError, TypeError, ValueError) as reason:
+            raise self.store.damaged(f"the row of point {k}: {reason}") from None

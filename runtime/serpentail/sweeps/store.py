@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 from filelock import FileLock, Timeout
 
+from ..checks import one_line
 from ..errors import NotWritten, SweepError
 from ..files import refuse_unwritable
 
@@ -18,6 +19,7 @@ TABLE = (
     "create table if not exists rows (key text primary key, point text not null, outcome text, "
     "error text, seconds real not null) without rowid"
 )
+STORED = TABLE.replace("create table if not exists", "CREATE TABLE")  # as SQLite keeps it
 INSERT = "insert into rows values (?, ?, ?, ?, ?) on conflict (key) do nothing"
 IN_ONE_QUERY = 500
 
@@ -50,11 +52,13 @@ class Store:
             # blocks finish in any thread, but one thread at a time writes
             self.base = sqlite3.connect(self.path or ":memory:", check_same_thread=False)
             (found,) = self.base.execute("pragma application_id").fetchone()
-            (tables,) = self.base.execute("select count(*) from sqlite_master").fetchone()
+            tables = self.base.execute("select sql from sqlite_master").fetchall()
             if tables and found != FORMAT:
                 raise SweepError(f"store: {self.path} is another program's: name another file")
             if not tables:
                 self._begin()
+            elif tables != [(STORED,)]:  # a view or a trigger would run its own statements
+                raise self.damaged("it has other tables")
 
     def _begin(self) -> None:
         """Make an empty store."""
@@ -87,8 +91,9 @@ class Store:
     def known(self, keys: Iterable[str]) -> dict[str, bool]:
         """Return which of the keys have rows, and whether each went well."""
         wanted = set(keys)
-        rows = self.base.execute("select key, error is null from rows")
-        return {key: bool(good) for key, good in rows if key in wanted}
+        with self._told():
+            rows = self.base.execute("select key, error is null from rows")
+            return {key: bool(good) for key, good in rows if key in wanted}
 
     def rows(self, keys: Iterable[str]) -> dict[str, Row]:
         """Return the rows that there are of some keys."""
@@ -98,7 +103,8 @@ class Store:
             part = wanted[first : first + IN_ONE_QUERY]
             marks = ",".join("?" * len(part))
             query = f"select key, point, outcome, error, seconds from rows where key in ({marks})"
-            found |= {row[0]: Row(*row) for row in self.base.execute(query, part)}
+            with self._told():
+                found |= {row[0]: Row(*row) for row in self.base.execute(query, part)}
         return found
 
     def forget(self, keys: Iterable[str]) -> None:
@@ -110,15 +116,22 @@ class Store:
         """Close the file, after writing SQLite's log into it."""
         self.base.close()
 
+    def damaged(self, reason: str) -> SweepError:
+        """Return the error about a file that holds what no sweep has written."""
+        remedy = "restore a copy, or name another file"
+        return SweepError(f"store: {self.path} is damaged ({one_line(reason)}): {remedy}")
+
     @contextmanager
     def _told(self) -> Iterator[None]:
         """Turn errors of SQLite into one line."""
         try:
             yield
-        except sqlite3.DatabaseError as reason:
+        except (sqlite3.DatabaseError, UnicodeDecodeError) as reason:
             name = getattr(reason, "sqlite_errorname", "")
             if name == "SQLITE_NOTADB":
                 raise SweepError(f"store: {self.path} is not a store: name another file") from None
+            if name.startswith("SQLITE_CORRUPT") or not name:  # none: texts that are not UTF-8
+                raise self.damaged(f"{reason}") from None
             raise NotWritten(
                 f"store: {self.path} is not written ({reason}): make room, or mend the disk; its "
                 "rows are intact, and the same call resumes from them"
