@@ -99,6 +99,11 @@ def test_written_tracks_are_read_again(tmp_path):
             assert found.names == tracks.names
             np.testing.assert_allclose(found.times, tracks.times, rtol=1e-8)
             np.testing.assert_allclose(found.positions, tracks.positions, rtol=1e-7)
+    names = ["=cmd|' /C calc'!A0", 'left, "big"']
+    odd = st.marker_tracks(tracks.times, tracks.positions, names, unit="m")
+    path = st.write_markers(odd, tmp_path / "odd.csv")
+    assert path.read_text().startswith("time,'=cmd")
+    assert st.read_markers(path, "m").names == odd.names
     with pytest.raises(st.IdentificationError, match=r"path: value .*run\.c3d"):
         st.write_markers(tracks, tmp_path / "run.c3d")
     path = tmp_path / "run.trc"

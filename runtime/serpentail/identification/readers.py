@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import IdentificationError
+from ..files import without_quote
 from .c3d import read_c3d
 from .tracks import MarkerTracks, checked_tracks, checked_unit
 
@@ -170,7 +171,7 @@ def _csv(source: Path) -> Read:
         rows = list(csv.reader(io.StringIO("\n".join(_lines(source)))))
     except csv.Error as error:
         raise IdentificationError(f"{source}: cannot be read as CSV ({error})") from None
-    heads = [head.strip() for head in rows[0]] if rows else []
+    heads = [without_quote(head.strip()) for head in rows[0]] if rows else []
     names = [head[:-2] for head in heads[1::3]]
     wanted = ["time", *(f"{name}_{axis}" for name in names for axis in "xyz")]
     if heads != wanted or not names:

@@ -1,6 +1,5 @@
 """The rows of a sweep in the forms that other tools take."""
 
-import csv
 import math
 from contextlib import suppress
 from os import PathLike
@@ -12,7 +11,7 @@ import numpy as np
 from ..checks import shown
 from ..errors import SweepError
 from ..extras import needed
-from ..files import refuse_unwritable, replacing
+from ..files import refuse_unwritable, replacing, write_csv
 from .axes import Axes
 
 if TYPE_CHECKING:
@@ -50,25 +49,22 @@ def checked(path: str | PathLike[str]) -> Path:
 def write(sweep: "Sweep", path: str | PathLike[str]) -> Path:
     """Write the rows to a file, whole or not at all, and return its path."""
     target = checked(path)
+    if target.suffix == ".csv":
+        return _write_csv(sweep.rows(), target)
     with replacing(target) as part:
         if target.suffix == ".parquet":
             frame(sweep.rows()).to_parquet(part, engine="pyarrow", index=False)
-        elif target.suffix == ".nc":
+        else:
             data = sweep.to_xarray()
             data.to_netcdf(part, engine="scipy", format="NETCDF3_64BIT")
-        else:
-            _write_csv(sweep.rows(), part)
     return target
 
 
-def _write_csv(rows: Rows, path: Path) -> None:
+def _write_csv(rows: Rows, path: Path) -> Path:
     """Write one line for each row; numbers have all their digits, missing values are empty."""
     found = [flat(row) for row in rows]
     names = list(dict.fromkeys(name for row in found for name in row))
-    with path.open("w", encoding="utf-8", newline="") as stream:
-        writer = csv.DictWriter(stream, names, restval="", lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(found)
+    return write_csv(path, [names, *([row.get(name, "") for name in names] for row in found)])
 
 
 def flat(row: dict[str, Any], before: str = "") -> dict[str, Any]:
