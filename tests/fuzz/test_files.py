@@ -8,7 +8,9 @@ import json
 import os
 import resource
 import subprocess
+import tempfile
 import warnings
+from pathlib import Path
 
 import ezc3d  # noqa
 import pytest
@@ -92,11 +94,14 @@ def forked(command, **_):
     child = os.fork()
     if child == 0:
         faulthandler.disable()  # signals are expected here
-        quiet = os.open(os.devnull, os.O_WRONLY)
+        quiet, ended = os.open(os.devnull, os.O_WRONLY), 1
         os.dup2(quiet, 1), os.dup2(quiet, 2)
-        with open(write, "wb") as answer:
-            c3d_child.main(path, int(memory), int(seconds), answer)
-        os._exit(0)
+        try:
+            with open(write, "wb") as answer:
+                c3d_child.main(path, int(memory), int(seconds), answer)
+            ended = 0
+        finally:
+            os._exit(ended)
     os.close(write)
     with open(read, "rb") as answer:
         said = answer.read()
@@ -140,24 +145,24 @@ def test_any_file_is_read_or_refused_in_a_line(name, many, tmp_path, monkeypatch
         pytest.importorskip("ezc3d")  # once, not in each fork
         monkeypatch.setattr(c3d.subprocess, "run", forked)
         monkeypatch.setattr(c3d, "SECONDS", 1)
-    whole = tmp_path / name
-    make(whole)
-    read(whole)
-    content, refused = whole.read_bytes(), 0
-    folder = tmp_path / "damaged"
+    make(tmp_path / name)
+    read(tmp_path / name)
+    content, refused = (tmp_path / name).read_bytes(), 0
     for k, mutant in enumerate(mutants(content, many)):
-        folder.mkdir()
-        path = folder / name
-        path.write_bytes(mutant)
-        with row(f"mutant {k}: {mutant[:2000]!r}"), in_time(), bounded(), warnings.catch_warnings():
+        with (
+            row(f"mutant {k}: {mutant[:2000]!r}"),
+            tempfile.TemporaryDirectory(dir=tmp_path) as folder,
+            in_time(),
+            bounded(),
+            warnings.catch_warnings(),
+        ):
             warnings.simplefilter("ignore", st.UnusualSize)
+            path = Path(folder) / name
+            path.write_bytes(mutant)
             try:
                 read(path)
             except refusals as error:
                 refused += 1
                 for line in str(error).splitlines():
                     assert line.isprintable() and 10 < len(line) < 2000, line
-        for each in folder.iterdir():
-            each.unlink()
-        folder.rmdir()
     assert refused > many // 4
