@@ -1,14 +1,16 @@
 """Writes files whole or not at all, and checks before the work that they can be written."""
 
 import contextlib
+import csv
 import os
 import re
 import secrets
 import shutil
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 from .errors import NotWritten
 
@@ -18,6 +20,8 @@ except ImportError:  # Windows, where no part is locked, and none is swept
     fcntl = None  # type: ignore[assignment]
 
 PART = re.compile(r"\..+\.[0-9a-f]{8}\.part")
+# begins a text, but no number, that a spreadsheet would run, with or without a ' in front
+FORMULA = re.compile(r"'*(?![-+]?[\d.]+(e[-+]?\d+)?$)[-=+@\t\r\n]", re.IGNORECASE)
 LEFT_AFTER = 60.0  # s without a change, after which a part that no process holds was left by a kill
 
 
@@ -54,6 +58,31 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
                 f"{str(path)!r} is not written ({reason.strerror or reason}): make room, or name "
                 "another file"
             ) from reason
+
+
+def write_csv(path: str | os.PathLike[str], rows: Iterable[Iterable[Any]]) -> Path:
+    """Write rows as CSV, whole or not at all, and return the path; numbers have all their digits.
+
+    Texts that a spreadsheet would run as a formula get a ' in front, see ``without_quote``.
+    NotWritten if the system refuses.
+    """
+    with replacing(path) as part, part.open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerows([_quoted(cell) for cell in row] for row in rows)
+    return Path(path)
+
+
+def _quoted(cell: Any) -> Any:
+    """Return a cell, a text with a ' in front if it could be a formula."""
+    if not isinstance(cell, str):
+        return cell
+    cell = cell.replace("\r\n", "\n").replace("\r", "\n")  # which the csv module does not quote
+    return f"'{cell}" if FORMULA.match(cell) else cell
+
+
+def without_quote(text: str) -> str:
+    """Return the text that ``write_csv`` wrote as this cell."""
+    return text[1:] if text.startswith("'") and FORMULA.match(text) else text
 
 
 @contextlib.contextmanager

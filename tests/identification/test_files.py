@@ -5,6 +5,7 @@ verb identify, and what is drawn of an identification: its page, residuals and t
 import base64
 import gzip
 import json
+import os
 import re
 
 import numpy as np
@@ -29,6 +30,20 @@ def some():
     return st.marker_tracks(STEP * T, positions, NAMES, unit="m")
 
 
+def far(y):
+    x = X.copy()
+    x[2, 1, 1] = y
+    return x
+
+
+def test_a_marker_beyond_100_m_is_named_with_a_remedy():
+    """The rule is that of scenes: warn, because most often it is a slip of units."""
+    with pytest.warns(st.UnusualSize, match=r"'tip', frame 2 .*, y: value -101 m: .*unit="):
+        st.marker_tracks(T, far(-101), NAMES, unit="m")
+    st.marker_tracks(T, far(99), NAMES, unit="m")
+    st.marker_tracks(T, far(1e5 - 1), NAMES, unit="mm")
+
+
 def test_arrays_that_are_no_tracks_are_refused():
     for words, times, positions, names, how in (
         ("unit: none is stated", T, X, NAMES, {"unit": None}),
@@ -42,6 +57,9 @@ def test_arrays_that_are_no_tracks_are_refused():
         ("names: value", T, X, ["a", " "], {}),
         ("'tip' is at exactly .* in 6 frames", T, X * [[[1], [0]]], NAMES, {}),
         ("never seen: tip", T, X * [[[1], [np.nan]]], NAMES, {}),
+        ("names: value", T, X, ["a", "b\nc"], {}),
+        (r"'tip', frame 2 .*, y: value 1e\+38 m: .*100 m.*unit=", T, far(1e38), NAMES, {}),
+        (r"times\[1\]: value 2e\+12: needs seconds", T * 2e12, X, NAMES, {}),
         ("infinite", T, X * np.inf, NAMES, {}),
         (r"\(3,\): needs 4 frames", T[:3], X[:3], NAMES, {}),
         ("axes: value 'xzy'", T, X, NAMES, {"axes": "xzy"}),
@@ -81,6 +99,11 @@ def test_written_tracks_are_read_again(tmp_path):
             assert found.names == tracks.names
             np.testing.assert_allclose(found.times, tracks.times, rtol=1e-8)
             np.testing.assert_allclose(found.positions, tracks.positions, rtol=1e-7)
+    names = ["=cmd|' /C calc'!A0", 'left, "big"']
+    odd = st.marker_tracks(tracks.times, tracks.positions, names, unit="m")
+    path = st.write_markers(odd, tmp_path / "odd.csv")
+    assert path.read_text().startswith("time,'=cmd")
+    assert st.read_markers(path, "m").names == odd.names
     with pytest.raises(st.IdentificationError, match=r"path: value .*run\.c3d"):
         st.write_markers(tracks, tmp_path / "run.c3d")
     path = tmp_path / "run.trc"
@@ -92,30 +115,6 @@ def test_written_tracks_are_read_again(tmp_path):
     ):
         path.write_text("\n".join(change(lines)))
         np.testing.assert_array_equal(st.read_markers(path).positions, wanted)
-
-
-def test_c3d_is_read_as_ezc3d_writes_it(tmp_path):
-    """Also from a frame that is not the first."""
-    ezc3d = pytest.importorskip("ezc3d")
-    tracks, file = some(), ezc3d.c3d()
-    point = file["parameters"]["POINT"]
-    point["RATE"]["value"], point["UNITS"]["value"] = [200], ["mm"]
-    point["LABELS"]["value"] = ["nose", "tip"]
-    points = np.ones((4, 2, 6))
-    points[:3] = np.moveaxis(1e3 * tracks.positions, [0, 1, 2], [2, 1, 0])
-    file["data"]["points"] = points
-    for first in (0, 9):
-        file["header"]["points"]["first_frame"] = first
-        file.write(str(tmp_path / "run.c3d"))
-        found = st.read_markers(tmp_path / "run.c3d")
-        assert found.names == tracks.names
-        np.testing.assert_allclose(found.times, STEP * (first + np.arange(6)), rtol=1e-9)
-        np.testing.assert_allclose(found.positions, tracks.positions, atol=1e-6)
-    with pytest.raises(st.IdentificationError, match="unit: value 'm': the file states mm"):
-        st.read_markers(tmp_path / "run.c3d", "m")
-    (tmp_path / "run.c3d").write_bytes(b"\x00\xff" * 300)
-    with pytest.raises(st.IdentificationError, match=r"run.c3d: .*c3d file"):
-        st.read_markers(tmp_path / "run.c3d")
 
 
 def header(old, new):
@@ -136,6 +135,8 @@ TRC = {
     "DataRate is 260 Hz": header("200", "260"),
     "names 1 markers, NumMarkers is 2": lambda x: [*x[:3], x[3].replace("tip", ""), *x[4:]],
     "NumFrames: value 'six'": header("6", "six"),
+    "has 0 frames": lambda x: header("6", "0")([*x[:5], " "]),
+    "DataRate is 0 Hz, .* 200 Hz": header("200", "0"),
 }
 CSV = {
     r"line 7 has \d of 7": lambda x: [*x[:-1], x[-1][:20]],
@@ -143,6 +144,7 @@ CSV = {
     "csv: line 1 needs time": lambda x: [],
     "line 1 needs": lambda x: ["time" for _ in x],
     "repeated": lambda x: [*x[:4], x[3], *x[4:]],
+    "cannot be read as CSV": lambda x: [*x[:-1], "1" * 200_000],
 }
 
 
@@ -155,10 +157,12 @@ def test_damaged_files_are_refused_by_line(tmp_path):
             with row(suffix, words), pytest.raises(st.IdentificationError, match=words):
                 st.read_markers(path, unit)
     (tmp_path / "run.trc").write_bytes(b"\x00\xff" * 300)
+    os.mkfifo(tmp_path / "pipe.csv")
     for words, path in (
         ("unit: none is stated", st.write_markers(some(), tmp_path / "run.csv")),
         ("data: value 3", 3),
         (r"tracks.xlsx: needs .*\.trc, \.csv, \.c3d", tmp_path / "tracks.xlsx"),
+        ("pipe.csv: is no regular file", tmp_path / "pipe.csv"),
         (r"none.trc: cannot be read", tmp_path / "none.trc"),
         ("is not a text file", tmp_path / "run.trc"),
     ):

@@ -121,7 +121,7 @@ def _torso(
 ) -> Mapping[str, Value] | None:
     """Return mass, inertia and contact ellipsoid of a torso of uniform density."""
     shape = table.get("shape") if isinstance(table, Mapping) else None
-    if shape not in TORSOS:
+    if not isinstance(shape, str) or shape not in TORSOS:
         names = " or ".join(map(repr, TORSOS))
         remedy = f"needs a table with shape ({names}), its lengths, and density"
         problems.append(Problem("body.torso", table, remedy))

@@ -7,7 +7,7 @@ from typing import Any
 from .checks import is_finite
 from .parameters import ANY, NOT_NEGATIVE, POSITIVE, Rule
 from .problems import Problem, suggest
-from .scene import COUNT
+from .scene import COUNT, MOST_LINKS
 from .units import in_unit
 
 Numbers = Mapping[str, tuple[float, ...]]  # the numbers of a table by key, in SI units
@@ -81,10 +81,10 @@ def count_of(
     """
     own = isinstance(table, Mapping) and "links" in table and kind == "articulated"
     count: Any = table["links"] if own else pieces.get(kind)
-    if COUNT.holds(count):
+    if COUNT.holds(count) and count <= MOST_LINKS:
         return int(count)
     field = f"{place}.links" if own or kind not in pieces else PIECES[kind]
-    problems.append(Problem(field, count, f"needs {COUNT.text}"))
+    problems.append(Problem(field, count, f"needs {COUNT.text}, up to {MOST_LINKS}"))
     return 1
 
 

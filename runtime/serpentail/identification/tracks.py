@@ -1,5 +1,7 @@
 """``MarkerTracks``: positions of markers over time, nan if a marker was not seen."""
 
+import warnings
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -9,13 +11,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..checks import finite_array, needed, one_of, real_array, refusal, shown
-from ..errors import IdentificationError
+from ..errors import IdentificationError, UnusualSize
+from ..magnitudes import LARGEST
 from ..motion.account import framed
 from ..units import MEASURES, plain
 
 UNITS: dict[str, Fraction] = MEASURES["m"][1]
 ZEROS = ("refuse", "gap")
 FEWEST = 4  # frames
+FARTHEST = 1e6  # m from the origin, in any recording
+LATEST = 1e12  # s: times since 1970, and more
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +124,12 @@ def marker_tracks(
     Raises
     ------
     IdentificationError
-        An argument is wrong.
+        An argument is wrong, or a position is more than 1000 km from the origin.
+
+    Warns
+    -----
+    UnusualSize
+        A position is more than 100 m from the origin: most often the unit is wrong.
 
     Examples
     --------
@@ -157,7 +167,25 @@ def checked_tracks(
     unseen = [name for k, name in enumerate(names) if not part[:, k].all(axis=-1).any()]
     if unseen:
         raise IdentificationError(f"{source}: never seen: {', '.join(unseen)}: leave these out")
+    far, line = _farthest(where, names, source)
+    if far > FARTHEST:
+        raise IdentificationError(line)
+    if far > LARGEST["m"][0]:
+        warnings.warn(line, UnusualSize, stacklevel=3)
     return MarkerTracks(t, where, names, source, unit)
+
+
+def _farthest(where: np.ndarray, names: Sequence[str], source: str) -> tuple[float, str]:
+    """Return the largest coordinate (m), and a line that says it is beyond what is usual."""
+    reach = np.abs(where)
+    place = np.unravel_index(np.nanargmax(reach), where.shape)
+    frame, marker, axis = map(int, place)
+    field = f"{source}: marker {shown(names[marker])}, frame {frame} (from 0), {'xyz'[axis]}"
+    line = (
+        f"{field}: value {where[place]:.6g} m: beyond {LARGEST['m'][1]}, which no recording has: "
+        'give the right unit, such as unit="mm", or nan for a gap'
+    )
+    return float(reach[place]), line
 
 
 def checked_unit(unit: Any, source: str) -> str:
@@ -180,6 +208,11 @@ def checked_times(times: Any, source: str) -> np.ndarray:
         raise IdentificationError(
             f"{source}: times have shape {t.shape}: needs {FEWEST} frames or more"
         )
+    late = np.flatnonzero(np.abs(t) > LATEST)
+    if len(late):
+        raise IdentificationError(
+            f"{source}: times[{late[0]}]: value {t[late[0]]:g}: needs seconds, up to {LATEST:g}"
+        )
     wrong = np.flatnonzero(np.diff(t) <= 0)
     if len(wrong):
         k = int(wrong[0])
@@ -194,11 +227,13 @@ def checked_times(times: Any, source: str) -> np.ndarray:
 def checked_names(names: Any, source: str) -> tuple[str, ...]:
     """Return the names of markers; IdentificationError unless they are different texts."""
     listed = tuple(names) if isinstance(names, list | tuple) else ()
-    if not listed or not all(isinstance(name, str) and name.strip() for name in listed):
-        raise refusal(f"{source}: names", names, "a name for each marker", IdentificationError)
-    twice = [name for name in listed if listed.count(name) > 1]
-    if twice:
-        raise IdentificationError(f"{source}: two markers are called {twice[0]!r}: rename one")
+    sound = (isinstance(x, str) and x.strip() and x.isprintable() for x in listed)
+    if not listed or not all(sound):
+        needs = "a name for each marker, without control characters"
+        raise refusal(f"{source}: names", names, needs, IdentificationError)
+    name, count = Counter(listed).most_common(1)[0]
+    if count > 1:
+        raise IdentificationError(f"{source}: two markers are called {shown(name)}: rename one")
     return listed
 
 

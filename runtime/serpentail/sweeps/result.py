@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..brief import brief
+from ..checks import one_line
 from ..errors import SweepError
 from .axes import Axes, checked_row
 from .driver import Spent
@@ -85,10 +86,16 @@ class Sweep:
 
     @staticmethod
     def _row(row: Row, point: dict[str, Any]) -> dict[str, Any]:
-        outcome = {} if row.outcome is None else json.loads(row.outcome)
-        return (
-            {"number": row.number} | point | outcome | {"error": row.error, "seconds": row.seconds}
-        )
+        """Return a stored row as a dict; SweepError if it is damaged."""
+        try:
+            outcome = {} if row.outcome is None else json.loads(row.outcome)
+            told = {"error": row.error, "seconds": row.seconds}
+            return {"number": row.number} | point | outcome | told
+        except (RecursionError, TypeError, ValueError) as reason:
+            raise SweepError(
+                f"store: the row of point {row.number} is damaged ({one_line(str(reason))}): "
+                "restore a copy, or name another folder"
+            ) from None
 
     def rows(self) -> list[dict[str, Any]]:
         """Return all rows that exist, in the order of their points.

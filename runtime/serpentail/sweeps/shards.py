@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..checks import one_line
 from ..errors import SweepError
 from ..extras import needed
 from ..files import replacing
@@ -53,9 +54,9 @@ class Shard(NamedTuple):
         """Return it as a file, which is there whole or not at all; NotWritten if it cannot be."""
         arrow, parquet = parquet_library()
         columns = list(zip(*self.where, strict=True))
-        kinds = (arrow.int64(), arrow.string(), arrow.string(), arrow.float64())
-        arrays = [arrow.array(x, kind) for x, kind in zip(columns, kinds, strict=True)]
-        table = arrow.Table.from_arrays(arrays, list(Row._fields))
+        kinds = arrow.schema(columns_of(arrow))
+        arrays = [arrow.array(x, kind.type) for x, kind in zip(columns, kinds, strict=True)]
+        table = arrow.Table.from_arrays(arrays, schema=kinds)
         check = zlib.crc32(np.array(columns[0], np.int64).tobytes())
         name = f"{self.first:08d}-{self.last:08d}-{self.size}-{self.failed}-{check:08x}.parquet"
         path = folder / f"{self.first // IN_FOLDER:03d}" / name
@@ -77,14 +78,29 @@ class Shard(NamedTuple):
         arrow, parquet = parquet_library()
         try:
             with parquet.ParquetFile(self.where) as file:
-                for batch in file.iter_batches(AT_ONCE, columns=list(Row._fields)):
+                if [(each.name, each.type) for each in file.schema_arrow] != columns_of(arrow):
+                    raise ValueError("it has other columns")
+                for batch in file.iter_batches(AT_ONCE):
                     columns = (column.to_pylist() for column in batch.columns)
-                    yield from map(Row._make, zip(*columns, strict=True))
-        except (OSError, arrow.ArrowException) as reason:
+                    yield from map(self._row, zip(*columns, strict=True))
+        except (OSError, ValueError, TypeError, arrow.ArrowException) as reason:
             raise SweepError(
-                f"store: {self.where} cannot be read ({reason}): delete it, and the same call "
-                "makes its rows again"
+                f"store: {self.where} cannot be read ({one_line(str(reason))}): delete it, and the "
+                "same call makes its rows again"
             ) from None
+
+    def _row(self, values: tuple) -> Row:
+        """Return the row of a file; ValueError or TypeError for what no sweep has written."""
+        row = Row._make(values)
+        if not (self.first <= row.number <= self.last and row.seconds >= 0):
+            raise ValueError(f"it has a row {row.number} of {row.seconds} s")
+        return row
+
+
+def columns_of(arrow: Any) -> list[tuple[str, Any]]:
+    """Return the names and types of a shard's columns."""
+    kinds = (arrow.int64(), arrow.string(), arrow.string(), arrow.float64())
+    return list(zip(Row._fields, kinds, strict=True))
 
 
 def parquet_library() -> tuple[Any, Any]:

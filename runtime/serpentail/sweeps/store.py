@@ -89,8 +89,10 @@ class Store:
 
     def _adopt(self, other: Path) -> None:
         """Take the rows of another sweep that are rows of this one, too."""
-        spec = json.loads(other.read_bytes())
-        mapped = Mapped(spec, self.spec)
+        try:
+            mapped = Mapped(json.loads(other.read_bytes()), self.spec)
+        except (ArithmeticError, LookupError, MemoryError, RecursionError, TypeError, ValueError):
+            raise SweepError(f"store: {other} is damaged: delete its folder") from None
         for shard in _accepted(other.parent, np.zeros(mapped.old_total, bool)):
             rows = [
                 row._replace(number=number)

@@ -1,9 +1,8 @@
 """The rows of a sweep in the forms that other tools take."""
 
-import csv
 import math
 from collections.abc import Iterable, Iterator
-from itertools import islice
+from itertools import chain, islice
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +12,7 @@ import numpy as np
 from ..checks import shown
 from ..errors import SweepError
 from ..extras import needed
-from ..files import refuse_unwritable, replacing
+from ..files import refuse_unwritable, replacing, write_csv
 from .shards import AT_ONCE, parquet_library
 
 if TYPE_CHECKING:
@@ -50,23 +49,21 @@ def checked(path: str | PathLike[str]) -> Path:
 def write(sweep: "Sweep", path: str | PathLike[str]) -> Path:
     """Write the rows to a file, whole or not at all, and return its path."""
     target = checked(path)
+    if target.suffix == ".csv":
+        return _write_csv(sweep, target)
     with replacing(target) as part:
         if target.suffix == ".parquet":
             _write_parquet(sweep, part)
-        elif target.suffix == ".nc":
-            dataset(sweep).to_netcdf(part, engine="scipy", format="NETCDF3_64BIT")
         else:
-            _write_csv(sweep, part)
+            dataset(sweep).to_netcdf(part, engine="scipy", format="NETCDF3_64BIT")
     return target
 
 
-def _write_csv(sweep: "Sweep", path: Path) -> None:
+def _write_csv(sweep: "Sweep", path: Path) -> Path:
     """Write one line for each row; numbers have all their digits, missing values are empty."""
-    names = dict.fromkeys(name for row in sweep for name in flat(row))
-    with path.open("w", encoding="utf-8", newline="") as stream:
-        writer = csv.DictWriter(stream, names, restval="", lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(map(flat, sweep))
+    names = list(dict.fromkeys(name for row in sweep for name in flat(row)))
+    rows = ([row.get(name, "") for name in names] for row in map(flat, sweep))
+    return write_csv(path, chain([names], rows))
 
 
 def _write_parquet(sweep: "Sweep", path: Path) -> None:
