@@ -2,7 +2,6 @@
 the old file stays whole, whenever and however the system refuses.
 """
 
-import csv
 import dataclasses
 import errno
 import fcntl
@@ -37,8 +36,6 @@ from serpentail.files import (
     refuse_unusable,
     refuse_unwritable,
     replacing,
-    without_quote,
-    write_csv,
 )
 from tests.support.drawn_flight import flight
 from tests.support.file_faults import age, before_calls, killed_at
@@ -294,15 +291,3 @@ def test_a_kill_leaves_the_old_file_and_nothing_after_the_next_write(tmp_path):
                 assert listed(tmp_path) == sorted([name, "next"])
         path.unlink()
         (tmp_path / "next").unlink()
-
-
-def test_no_cell_of_a_csv_file_is_run_by_a_spreadsheet(tmp_path):
-    """Numbers stay as they are, and what is read is what was written."""
-    texts = ["=cmd|' /C calc'!A0", "+1+1", "-x", "@sum(1)", "\t=1", "\n=1", "'=1", "''@", "-5 deg"]
-    plain = ["", "word", "'", "'x", "a=1", "-3", "+2.5e-3", "a,b", 'say "x"', "two\nlines"]
-    path = write_csv(tmp_path / "cells.csv", [texts, plain, [-1.5, 3, True, None, "\r\n\r"]])
-    with path.open(newline="") as stream:
-        quoted, *rest = csv.reader(stream)
-    assert all(cell.startswith("'") for cell in quoted)
-    assert rest == [plain, ["-1.5", "3", "True", "", "'\n\n"]]
-    assert [*map(without_quote, quoted)] == texts and [*map(without_quote, plain)] == plain

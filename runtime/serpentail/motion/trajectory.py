@@ -12,6 +12,7 @@ from typing import Any, Self
 from numpy.typing import ArrayLike
 
 from ..attitude import Array
+from ..checks import needed
 from ..model.layout import QUATERNION, Layout
 from ..model.model import Model
 from . import archive
@@ -91,6 +92,8 @@ class Trajectory(Exports, Showable):
                 raise ValueError(
                     f"{name} has shape {actual}: give {shape}, to match the shapes of t and q"
                 )
+        if not isinstance(self.contact, Contact | None):
+            raise ValueError(needed("contact", self.contact, "a serpentail.Contact, or None"))
         if self.contact is not None and len(self.contact.points) != len(self.t):
             raise ValueError(
                 f"contact has {len(self.contact.points)} samples: give {len(self.t)}, as t has"
