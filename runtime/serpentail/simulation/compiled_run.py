@@ -204,6 +204,8 @@ class CompiledRun:
             times, kinds = self.event_times[:count].tolist(), self.event_kinds[:count].tolist()
             info["events"] = self.ground.events(times, kinds)
             info["unfelt"] = record.unfelt
+            if record.near_error > 0:
+                info["near"] = self.ground.near(record)
         failure = self.actuation.error
         if failure is None and status not in (0, STOPPED_AT_EVENT):
             failure = failed(status, record.t, self._extremes())
