@@ -73,9 +73,10 @@ def choose(
         name, reason = chosen(settings, available, decay, place_of(model))
     refuse_misplaced(model, settings)
     span = start.end - start.start
-    if name in ADAPTIVE:
-        settings.setdefault("most_steps", usual_most_steps(span))
     method = checked_method(name, settings, available, single)
+    if name in ADAPTIVE:
+        usual = {"most_steps": usual_most_steps(span)}
+        method = replace(method, settings=usual | method.settings)
     most_steps = method.settings.get("most_steps", MOST_STEPS)
     for each in ("step", "most_step"):
         length = method.settings.get(each, np.inf)
