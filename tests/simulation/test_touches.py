@@ -113,7 +113,8 @@ def shallow(count):
         # the last minimum that is lower than all before
         before = np.minimum.accumulate(height)[5:-6]
         lows = np.flatnonzero((height[6:-5] < before) & (height[6:-5] < height[7:-4]))
-        q[k, 2] -= depth + height[lows[-1] + 6] if len(lows) else 0
+        deep = depth + height[lows[-1] + 6] if len(lows) else 0
+        q[k, 2] -= deep if height[0] > deep + 1e-3 else 0
     exact = {
         "method": "tsit5",
         "rtol": 1e-11,
