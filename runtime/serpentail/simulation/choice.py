@@ -75,7 +75,7 @@ def choose(
     span = start.end - start.start
     method = checked_method(name, settings, available, single)
     if name in ADAPTIVE:
-        most = {"most_steps": float(usual_most_steps(span))}
+        most: dict[str, float] = {"most_steps": usual_most_steps(span)}
         method = replace(method, settings=most | method.settings)
     most_steps = method.settings.get("most_steps", MOST_STEPS)
     for each in ("step", "most_step"):

@@ -172,6 +172,12 @@ def test_rejected_steps_of_dop853_are_counted():
         assert 0 < info["evaluations"] - parts <= 8 and info["rejected"] >= least
 
 
+def test_a_wild_run_ends_after_steps_that_follow_its_duration():
+    for span, most in ((2e-3, 300_000), (2.0, 600_000), (10.0, 1_000_000)):
+        info = fly(t_span=span, output_step=span, rtol=1e-3).info
+        assert info["most_steps"] == most and info["steps"] < 10_000
+
+
 def test_the_last_two_steps_are_equal():
     """14 ms in steps of 10 ms or less: rates are asked for in the middle, and never beyond."""
     times, h = [], 0.01
