@@ -84,7 +84,7 @@ def test_units_and_facts_are_attributes(drop):
     found = data.coordinate_units.sel(coordinate=["z", "qx", "alpha_1"])
     assert found.values.tolist() == ["m", "1", "rad"]
     assert data.rate_units.sel(rate=["vx", "omega_z"]).values.tolist() == ["m/s", "rad/s"]
-    assert data.attrs["method"] == "ros34pw2" and data.attrs["steps"] == drop.info["steps"]
+    assert data.attrs["method"] == "switching" and data.attrs["steps"] == drop.info["steps"]
     assert json.loads(data.attrs["info"]) == drop.info and "events" not in data.attrs
 
 

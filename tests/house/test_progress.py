@@ -191,7 +191,7 @@ def test_what_the_package_gives_fills_no_screen_and_says_what_it_is_and_how_it_e
     report = plan.report | {"status": "Infeasible", "effort": None}
     tails = "articulated, 1 x 3 links.*51 samples, 0 to 0.05 s.*by points: 6 of the feet; 0 events"
     for thing, words in [
-        (motion, rf"{tails}.*\n  by ros34pw2: .*steps"),
+        (motion, rf"{tails}.*\n  by switching: .*steps"),
         (motion.contact, "forces=array of 51 x 6 x 3"),
         (st.Trajectory.load(motion.save(tmp_path / "run.npz")), "without its model"),
         (warned, r"\n(?=.{9,100}$)[^\n]*2 warnings, the first: word word[^\n]*\.\.\.>$"),

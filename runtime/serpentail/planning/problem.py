@@ -184,7 +184,7 @@ def _start_inside(values: np.ndarray, bound: np.ndarray | None, name: str, unit:
 def _between_stops(name: str, model: Model, angles: np.ndarray) -> None:
     behind = behind_stops(model.parameters, angles[None])
     if behind:
-        raise PlanningError(f"{name}: {behind}")
+        raise PlanningError(f"{name}: {behind}: give one between the stops, or move them")
 
 
 def _goal_inside(name: str, values: np.ndarray | None, bound: np.ndarray | None) -> None:

@@ -183,4 +183,10 @@ def warnings_of(audit: Audit, info: Mapping[str, Any], eps: float) -> list[str]:
             f"{info['unfelt']} touches were shorter than a step and may have been missed: take a "
             "shorter step, or an adaptive method"
         )
+    if near := info.get("near"):
+        found.append(
+            f"{near['group']}: point {near['point']} passed {1e3 * near['height']:.2g} mm above "
+            f"the ground at t = {near['time']:.4g} s with an error of {1e3 * near['error']:.2g} "
+            "mm: a smaller rtol decides whether it touches"
+        )
     return found

@@ -208,6 +208,8 @@ class CompiledRun:
             info["events"] = self.ground.events(times, kinds)
             info["unfelt"] = record.unfelt
             info["peaks"] = self._peaks()
+            if record.near_error > 0:
+                info["near"] = self.ground.near(record)
         failure = self.actuation.error
         if failure is None and status not in (0, STOPPED_AT_EVENT):
             failure = failed(status, record.t, self._extremes())

@@ -63,9 +63,10 @@ def simulate(
     t_span : float or (float, float), default (0, 1)
         Start and end (s), or the end alone.
     method : str, default "auto"
-        "tsit5" or "ros34pw2": adaptive, in C; "rk4" or "implicit_euler": steps of a fixed
-        length, in C; "dop853" or "lsoda": SciPy's, as a check; "auto" chooses, and ``info``
-        of the result gives its choice and reason.
+        "tsit5" or "ros34pw2": adaptive, in C; "switching": the first in flight, the second while
+        a point touches the ground; "rk4" or "implicit_euler": steps of a fixed length, in C;
+        "dop853" or "lsoda": SciPy's, as a check; "auto" chooses, and ``info`` of the result gives
+        its choice and reason.
 
     Returns
     -------
@@ -77,13 +78,15 @@ def simulate(
     output_step : float, optional
         Time between samples (s); it is rounded to divide the span. Default: span / 200.
     rtol, atol : float, optional
-        Tolerances of adaptive methods. Defaults: 1e-8 for "tsit5" and 1e-4 for "ros34pw2"
-        (float models: 1e-4 and 1e-3), ``atol`` equal to ``rtol``; for SciPy's methods 1e-10 and
-        1e-12 (float models: 1e-6 and 1e-6).
+        Tolerances of adaptive methods. At the same ``rtol`` all methods have errors of about the
+        same size. Defaults: 1e-8 in flight, 1e-4 with contacts and for "ros34pw2" by name (float
+        models: 1e-4 and 1e-3), ``atol`` equal to ``rtol``; for SciPy's methods 1e-10 and 1e-12
+        (float models: 1e-6 and 1e-6).
     first_step, least_step, most_step : float, optional
-        Bounds of the steps of "tsit5" and "ros34pw2" (s).
-    most_steps : int, default 1000000
-        Largest number of steps of these two.
+        Bounds of the steps of "tsit5", "ros34pw2" and "switching" (s).
+    most_steps : int, optional
+        Largest number of steps of these. Default: 300000 for each second, at least 300000 and at
+        most 1000000.
     step : float, default 1e-4
         Step of "rk4" and "implicit_euler" (s); it is shortened to divide ``output_step``.
     legs : Legs

@@ -5,8 +5,14 @@ from dataclasses import dataclass
 
 from ...functions.tail import Tail
 
-# The methods' numbers in C, in order; those with True need `implicit`.
-METHODS = {"rk4": False, "tsit5": False, "ros34pw2": True, "implicit_euler": True}
+# The methods' numbers in C, in order, and what a scene needs for them.
+METHODS = {
+    "rk4": (),
+    "tsit5": (),
+    "ros34pw2": ("implicit",),
+    "implicit_euler": ("implicit",),
+    "switching": ("implicit", "contacts"),
+}
 
 
 @dataclass(frozen=True)
@@ -51,7 +57,9 @@ class SimulationFeatures:
     @property
     def methods(self) -> list[str]:
         """Return the methods that it has."""
-        return [name for name, implicit in METHODS.items() if self.implicit or not implicit]
+        return [
+            name for name, needs in METHODS.items() if all(getattr(self, each) for each in needs)
+        ]
 
 
 def simulation_features(tail: Tail, names: Collection[str], factors: int) -> SimulationFeatures:
