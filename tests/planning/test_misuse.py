@@ -115,7 +115,7 @@ STOPS = {
     r"start: tail coordinate 0 is 1\.": {"start": ([*np.eye(7)[3], 1.5, 0, 0, 0], np.zeros(10))},
     r"goal\.tail: tail coordinate 1 is -1\.2": {"goal": Goal(tail=[0.0, -1.2, 0, 0])},
     "duration: value -1": {"goal": Goal(tail=[0.0, None, 0, 0]), "duration": -1},
-    "free_start.tail: tail coordinate 0": {"free_start": {"tail": (-1.5, 0.1)}},
+    "free_start.tail: tail coordinate 1": {"free_start": {"tail": (-1.5, 0.1)}},
     "design.tail_stop_lower": {"design": {"tail_stop_lower": (-1.0, -0.5)}},
 }
 
