@@ -26,10 +26,11 @@ WRONG = (
     *([], [1], ["x"], [[]], [{}], [True], [1, "x", {}], [[[[[1.0]]]]], {}, {"x": 1}, {"x": {}}),
     *({"kind": []}, {"kind": 3}, {"shape": {}}, {"name": [{}]}),
 )
+EVERY = 13  # one in so many places and values is tried
 TORSO = {"shape": "box", "sides": ["1 cm"] * 3, "density": 1000}
 OF_BODY = {"body": {"scale": 2, "mass": "1 kg", "torso": TORSO}}
 OF_SEGMENTS = {"segments": [{"links": 2, "length": 0.1, "mass": 1}], "taper": {"radii": [1, 2]}}
-SWEPT = {"run": "simulate", "points": 8, "store": "a.db", "over": {"tail_mass": {"grid": [1, 2]}}}
+SWEPT = {"run": "simulate", "points": 8, "store": "a.rows", "over": {"tail_mass": {"grid": [1, 2]}}}
 SWEPT["over"] |= {"duration": [0.1], "start.pitch": {"random": [-1.0, 1.0], "law": "uniform"}}
 
 
@@ -93,8 +94,7 @@ def swept(monkeypatch):
     return read
 
 
-@pytest.mark.parametrize("every", [13, pytest.param(1, marks=pytest.mark.slow)])
-def test_a_value_of_a_wrong_kind_is_refused_by_name(every, monkeypatch):
+def test_a_value_of_a_wrong_kind_is_refused_by_name(monkeypatch):
     """Each key gets each wrong value; the quick test takes one in thirteen."""
     short = {(key,) for key in KEYS} | {("parameters", name) for name in NAMES}
     one, kick = tomllib.loads(VALID), tables("kick_and_land")
@@ -114,7 +114,7 @@ def test_a_value_of_a_wrong_kind_is_refused_by_name(every, monkeypatch):
         places = sorted({*paths(table), *further}, key=str)
         cases = [(path, value) for path in places for value in WRONG]
         refused = 0
-        for path, value in cases[::every]:
+        for path, value in cases[::EVERY]:
             with row(name, path, repr(value)[:80]), warnings.catch_warnings():
                 warnings.simplefilter("ignore", st.UnusualSize)
                 try:
@@ -122,7 +122,7 @@ def test_a_value_of_a_wrong_kind_is_refused_by_name(every, monkeypatch):
                 except (SceneError, st.SerpentailError) as error:
                     refused += 1
                     assert all(line.isprintable() for line in str(error).splitlines())
-        assert refused > len(cases) // every // 10, name
+        assert refused > len(cases) // EVERY // 10, name
 
 
 def test_values_that_were_tracebacks_are_refused_by_name(monkeypatch):
