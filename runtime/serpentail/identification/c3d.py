@@ -1,7 +1,6 @@
 """Reads C3D files by ezc3d in a child process with limits, so that no file can harm this one."""
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -12,6 +11,7 @@ import numpy as np
 from ..checks import one_line
 from ..errors import IdentificationError
 from ..extras import needed
+from ..model.commands import inherited
 
 CHILD = Path(__file__).with_name("c3d_child.py")
 MEMORY = (2**30, 64)  # bytes that a read may use: at least, and for each byte of the file
@@ -49,13 +49,11 @@ def _answer(source: Path) -> bytes:
     seconds = SECONDS + int(size / SPEED)
     command = [sys.executable, "-P", str(CHILD), str(source.absolute())]
     command += [str(MEMORY[0] + MEMORY[1] * size), str(seconds)]
-    paths = os.pathsep.join(path or os.getcwd() for path in sys.path)
-    # threads of NumPy would need memory, and there is nothing to do for them
-    environment = os.environ | {"PYTHONPATH": paths, "OPENBLAS_NUM_THREADS": "1"}
     try:
         done = subprocess.run(
             command,
-            env=environment,
+            # threads of NumPy would need memory, and there is nothing to do for them
+            env=inherited(OPENBLAS_NUM_THREADS="1"),
             stdin=subprocess.DEVNULL,
             capture_output=True,
             timeout=WAIT * seconds,

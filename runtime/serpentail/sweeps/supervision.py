@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import SweepError
+from ..model.commands import inherited
 from ..model.cores import VARIABLE
 from .axes import Axes, Point
 from .bundles import Bundle
@@ -84,9 +85,7 @@ class Child:
 
     def __init__(self) -> None:
         here, there = Pipe()
-        paths = [path or os.getcwd() for path in sys.path]
-        environment = os.environ | {"PYTHONPATH": os.pathsep.join(dict.fromkeys(paths))}
-        environment |= {VARIABLE: "1"}  # its siblings use the other cores
+        environment = inherited(**{VARIABLE: "1"})  # its siblings use the other cores
         command = [sys.executable, "-m", "serpentail.sweeps.child", str(there.fileno())]
         before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])  # it inherits that
         try:
