@@ -27,13 +27,10 @@ from .unknowns import Unknowns, unknowns
 
 LONGEST = 0.01  # s: of the intervals of the first mesh
 FIRST_NOISE = 1e-3  # m
-FUNCTIONS = [
-    "forward_dynamics",
-    "forward_dynamics_derivatives",
-    "energy",
-    "momentum",
-    "tail_points",
-]
+FUNCTIONS = (
+    *("forward_dynamics", "forward_dynamics_derivatives"),
+    *("energy", "momentum", "tail_points"),
+)
 Data = MarkerTracks | str | PathLike[str]
 
 
@@ -157,7 +154,7 @@ def check_model(model: Any, estimate: Any) -> None:
     if not isinstance(model, Model):
         raise refusal("model", model, "a Model, as serpentail.load returns", IdentificationError)
     refuse_unlike(model, "identify")
-    for name in (*FUNCTIONS, "tail_points"):
+    for name in FUNCTIONS:
         model.kernel(name)
     names = list(estimate) if isinstance(estimate, Mapping | Sequence) else []
     if any(not str(name).startswith("marker:") for name in names):
