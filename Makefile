@@ -84,10 +84,12 @@ else
 ENVIRONMENT := $(PYTHON) -m venv $(VENV)
 INSTALL := $(PY) -m pip install --quiet --disable-pip-version-check
 endif
-TELL_PAGE := test -f runtime/serpentail/viewer/page.html || \
-             echo 'no page of runs: it needs Node.js 18 or newer, and npm its packages'
+# a page that could not be made is tried again by the next `make setup` or `make demo`
+TELL_PAGE := if test -f runtime/serpentail/viewer/page.html; then touch $(PAGED); else \
+             echo "no page of runs, which needs Node.js 18 and npm: $$(cat .build/page_missing 2>&1)"; fi
+AGAIN := $(if $(wildcard $(READY)),$(if $(wildcard $(PAGED)),,$(PAGED)))
 
-setup: $(READY)
+setup: $(READY) $(AGAIN)
 
 # The page needs Node.js and npm, which would keep the first picture waiting.
 $(DRAWS): pyproject.toml
@@ -100,17 +102,16 @@ $(DRAWS): pyproject.toml
 $(PAGED): $(PAGE) | $(DRAWS)
 	$(INSTALL) --no-deps --editable .
 	@$(TELL_PAGE)
-	@touch $@
 
 $(TESTED): $(DRAWS) $(PAGE)
 	$(INSTALL) --editable '.[test]'
 	@$(TELL_PAGE)
-	@touch $(PAGED) $@
+	@touch $@
 
 $(READY): $(DRAWS) $(PAGE)
 	$(INSTALL) --editable '.[$(EXTRAS)]'
 	@$(TELL_PAGE)
-	@touch $(PAGED) $(TESTED) $@
+	@touch $(TESTED) $@
 
 demo: $(DRAWS)
 	$(PY) examples/demo.py

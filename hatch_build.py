@@ -14,6 +14,7 @@ from pathlib import Path
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 PAGE = "runtime/serpentail/viewer/page.html"
+MISSING = ".build/page_missing"  # the reason, for the Makefile: installers hide what hooks tell
 EXAMPLES = "serpentail/examples"
 LEAST_NODE = 18
 # where there are wheels of Node.js
@@ -36,13 +37,16 @@ class PageHook(BuildHookInterface):
         build_data["artifacts"].append(PAGE)
 
     def _make_page(self) -> None:
-        """Make the page anew; where that fails, say so."""
-        page = Path(self.root) / PAGE
-        page.unlink(missing_ok=True)
+        """Make the page anew; where that fails, say so, and leave the reason as one line."""
+        page, missing = Path(self.root) / PAGE, Path(self.root) / MISSING
+        for path in (page, missing):
+            path.unlink(missing_ok=True)
         try:
             _build(Path(self.root) / "viewer", page)
         except (OSError, ImportError, subprocess.CalledProcessError) as error:
-            reason = getattr(error, "stderr", None) or error
+            reason = " ".join(str(getattr(error, "stderr", None) or error).split())[:300]
+            missing.parent.mkdir(exist_ok=True)
+            missing.write_text(f"{reason}\n", encoding="utf-8")
             self.app.display_warning(f"serpentail is built without the page of runs: {reason}")
 
 

@@ -12,8 +12,8 @@ from tests.support.models import choose_compiler
 
 # of extras that `make test` does not install
 LIBRARIES = (
-    *("fmpy", "imageio_ffmpeg", "jax", "mujoco", "pinocchio", "pyarrow", "selenium", "sphinx"),
-    *("torch", "viser", "ziglang"),
+    *("fmpy", "hatchling", "imageio_ffmpeg", "jax", "mujoco", "pinocchio", "selenium"),
+    *("sphinx", "torch", "viser", "ziglang"),
 )
 LACKS = re.compile(r"could not import '(\w+)")
 

@@ -31,7 +31,7 @@ sweep = st.sweep(
         "t_span": 0.2,
         "controller": st.Pfl(model, swing),
     },
-    store=Path(tempfile.mkdtemp(), "study.db"),
+    store=Path(tempfile.mkdtemp(), "study"),
 )
 print(sweep.status())
 

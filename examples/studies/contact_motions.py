@@ -38,7 +38,7 @@ SHOWN = (
     "upright_end",
     "standing_end",
 )
-SHOWN += ("landed", "peak_foot_force_N", "peak_ground_force_weights", "steps", "real_time_factor")
+SHOWN += ("landed", "peak_ground_force_N", "peak_ground_force_weights", "steps", "real_time_factor")
 DROPS, DROPPED = 20, 3.0  # random drops, and for how long (s)
 BLOCK = 5  # drops that are kept together
 DRAWN = ("{}.npz", "{}_film.png", "{}_time.png")

@@ -96,7 +96,7 @@ def seen(model, markers, times, states, rng):
 
     import serpentail as st
     from serpentail.identification.placement import placements
-    from serpentail.identification.trial import world_points
+    from serpentail.identification.points import world_points
 
     points = world_points(model, placements(model, markers), states[:, : model.nq])
     points = points + NOISE * rng.standard_normal(points.shape)

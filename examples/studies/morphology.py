@@ -1,6 +1,6 @@
 """The value of a tail: plans of righting for tails of many shapes, from many tumbles.
 
-Each plan is a row of FOLDER/rows.db; the same command resumes an interrupted study. --executor uses
+Each plan is a row of FOLDER/rows; the same command resumes an interrupted study. --executor uses
 the workers of a cluster: see docs/sweeps.md.
 """
 

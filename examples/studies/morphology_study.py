@@ -112,7 +112,7 @@ def swept(folder: Path, points: int, executor: str | None) -> Sweep:
     """Make the missing plans, and return all."""
     for segments in SEGMENTS:  # built once, before many processes need it
         tail(segments)
-    given = {"store": folder / "rows.db", "limit": LIMIT, "executor": executor, "of": VERSION}
+    given = {"store": folder / "rows", "limit": LIMIT, "executor": executor, "of": VERSION}
     over = {"segments": st.grid(SEGMENTS)} | OVER
     return st.sweep(None, over, right, points=points, seed=1, **given)
 

@@ -50,14 +50,14 @@ class Maker:
 def made(study: str, folder: Path, parts: Mapping[str, Part]) -> dict[str, Result]:
     """Return the results of parts by title.
 
-    Parts that FOLDER/STUDY.db does not have are computed, in as many processes as this one may use
-    threads. Each becomes a row when it is finished. SerpentailError if a part failed, or if another
-    process computes parts in the folder.
+    Parts that FOLDER/STUDY.rows does not have are computed, in as many processes as this one may
+    use threads. Each becomes a row when it is finished. SerpentailError if a part failed, or if
+    another process computes parts in the folder.
     """
     folder.mkdir(parents=True, exist_ok=True)
     over = {("part", "of"): st.grid([(title, part.of) for title, part in parts.items()])}
     run = Maker(study, {title: part.make for title, part in parts.items()})
-    store = folder / f"{study}.db"
+    store = folder / f"{study}.rows"
     _forget_without_files(posed(None, over, run, store), parts)
     rows = st.sweep(None, over, run, store=store, executor="processes", retry_failed=True).rows()
     for row in rows:
@@ -69,8 +69,9 @@ def made(study: str, folder: Path, parts: Mapping[str, Part]) -> dict[str, Resul
 def _forget_without_files(found: st.Sweep, parts: Mapping[str, Part]) -> None:
     """Forget the results of parts whose files are gone, so that they are computed again."""
     gone = {title for title, part in parts.items() if not all(f.exists() for f in part.files)}
-    found.store.forget(each.key for each in found.entries if each.point["part"] in gone)
-    found.store.close()
+    points = enumerate(found.axes)
+    with found.store.writing():
+        found.store.forget([k for k, point in points if point["part"] in gone])
 
 
 def digest(*sources: Path) -> str:

@@ -67,7 +67,9 @@ def shown(value: object) -> str:
 
 def one_line(text: str) -> str:
     """Return a text on one line of at most 200 characters."""
-    line = text if text.isprintable() else " ".join(text.split())
+    line = text
+    if not text.isprintable():
+        line = "".join(x if x.isprintable() else repr(x)[1:-1] for x in " ".join(text.split()))
     return line if len(line) <= 200 else line[:197] + "..."
 
 

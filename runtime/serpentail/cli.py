@@ -1,19 +1,23 @@
 """The command `serpentail`: scenes, motions, plans and models from a shell."""
 
-import argparse
-import json
 import sys
-import warnings
-from importlib import import_module
-from typing import Any
-
-from .commands.arguments import parser
-from .commands.files import refuse_targets, write
-from .commands.outcome import Outcome, tell
-from .errors import SerpentailError
-from .stages import progress
 
 INTERRUPTED = 130  # status of a command that Ctrl-C ended: 128 and the signal's number
+try:
+    import argparse
+    import json
+    import warnings
+    from importlib import import_module
+    from typing import Any
+
+    from .commands.arguments import parser
+    from .commands.files import refuse_targets, write
+    from .commands.outcome import Outcome, tell
+    from .errors import SerpentailError
+    from .stages import progress
+except KeyboardInterrupt:  # these take longer than Python itself
+    sys.exit(INTERRUPTED)
+
 ROOMS = {  # modules of `commands`, each with a function of the name of each verb
     "scenes": ("examples", "new", "generate", "schema", "completion"),
     "motions": ("simulate", "plan", "identify", "view"),
@@ -26,7 +30,15 @@ def main(argv: list[str] | None = None) -> int:
     """Run a verb; 0 if it went well, 1 if a check or a file failed, 2 if the input was refused, 130
     after Ctrl-C.
     """
-    arguments = arguments_of(argv)
+    try:
+        return done(arguments_of(argv))
+    except KeyboardInterrupt:
+        print("serpentail: interrupted", file=sys.stderr)
+        return INTERRUPTED
+
+
+def done(arguments: argparse.Namespace) -> int:
+    """Run a verb, tell of what it refuses, and return the status."""
     try:
         refuse_targets(arguments)
         with progress(), warnings.catch_warnings():
@@ -35,9 +47,6 @@ def main(argv: list[str] | None = None) -> int:
     except SerpentailError as error:
         print(error, file=sys.stderr)
         return 2
-    except KeyboardInterrupt:
-        print("serpentail: interrupted", file=sys.stderr)
-        return INTERRUPTED
     except OSError as error:  # a path that the system refuses, a disk that is full
         print(f"{arguments.verb}: {error!s:.300}", file=sys.stderr)
         return 2

@@ -88,7 +88,10 @@ class UnlikeBodies(UserWarning):
 
 
 class UnusualSize(UserWarning):
-    """Warning: a number has a size that no animal or robot has; most often a unit is wrong."""
+    """Warning: a number has a size that no animal or robot has; most often a unit is wrong.
+
+    It also tells if the arcs of a tapered tail are too long for its inertia.
+    """
 
 
 class DoubtfulMarkers(UserWarning):

@@ -1,19 +1,27 @@
 """Writes files whole or not at all, and checks before the work that they can be written."""
 
 import contextlib
-import fcntl
+import csv
 import os
 import re
 import secrets
 import shutil
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 from .errors import NotWritten
 
+try:
+    import fcntl
+except ImportError:  # Windows, where no part is locked, and none is swept
+    fcntl = None  # type: ignore[assignment]
+
 PART = re.compile(r"\..+\.[0-9a-f]{8}\.part")
+# begins a text, but no number, that a spreadsheet would run, with or without a ' in front
+FORMULA = re.compile(r"'*(?![-+]?[\d.]+(e[-+]?\d+)?$)[-=+@\t\r\n]", re.IGNORECASE)
 LEFT_AFTER = 60.0  # s without a change, after which a part that no process holds was left by a kill
 
 
@@ -52,22 +60,53 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
             ) from reason
 
 
+def write_csv(path: str | os.PathLike[str], rows: Iterable[Iterable[Any]]) -> Path:
+    """Write rows as CSV, whole or not at all, and return the path; numbers have all their digits.
+
+    Texts that a spreadsheet would run as a formula get a ' in front, see ``without_quote``.
+    NotWritten if the system refuses.
+    """
+    with replacing(path) as part, part.open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerows([_quoted(cell) for cell in row] for row in rows)
+    return Path(path)
+
+
+def _quoted(cell: Any) -> Any:
+    """Return a cell, a text with a ' in front if it could be a formula."""
+    if not isinstance(cell, str):
+        return cell
+    cell = cell.replace("\r\n", "\n").replace("\r", "\n")  # which the csv module does not quote
+    return f"'{cell}" if FORMULA.match(cell) else cell
+
+
+def without_quote(text: str) -> str:
+    """Return the text that ``write_csv`` wrote as this cell."""
+    return text[1:] if text.startswith("'") and FORMULA.match(text) else text
+
+
 @contextlib.contextmanager
 def _held(folder: Path, name: str) -> Iterator[Path]:
     """Make an empty part, locked while this process uses it, and remove it if it is still there."""
     part = folder / f".{name}.{secrets.token_hex(4)}.part"
     handle = os.open(part, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX)
+        if fcntl is None:
+            os.close(handle)  # an open file cannot be renamed there
+        else:
+            fcntl.flock(handle, fcntl.LOCK_EX)
         yield part
     finally:
         with contextlib.suppress(OSError):  # its folder may be missing
             part.unlink(missing_ok=True)
-        os.close(handle)
+        if fcntl is not None:
+            os.close(handle)
 
 
 def _remove_left(folder: Path) -> None:
-    """Remove parts that killed processes left in a folder."""
+    """Remove parts that killed processes left in a folder, where locks tell which these are."""
+    if fcntl is None:
+        return
     with os.scandir(folder) as entries:
         parts = [entry.path for entry in entries if PART.fullmatch(entry.name)]
     for part in parts:
@@ -83,7 +122,7 @@ def _remove_left(folder: Path) -> None:
 
 def _sync(path: Path) -> None:
     """Wait until a file or the entries of a folder are on the disk."""
-    handle = os.open(path, os.O_RDONLY)
+    handle = os.open(path, os.O_RDWR if path.is_file() else os.O_RDONLY)
     try:
         os.fsync(handle)
     finally:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any, TextIO
 
 PATIENCE_S = 1.0  # s: longer stages are reported
+NOTABLE_S = 0.5  # s: the log has shorter stages at level DEBUG
 PERIOD_S = 10.0  # s between lines in a pipe or a file
 
 
@@ -75,7 +76,7 @@ def progress(hook: Hook | None = None) -> Iterator[None]:
     Notes
     -----
     Without this context manager nothing is shown. The logger "serpentail" receives the end of
-    each stage in any case, at level INFO.
+    each stage in any case, at level INFO, or DEBUG if it took less than half a second.
 
     Examples
     --------
@@ -115,7 +116,8 @@ class Stage:
         logging: Any = sys.modules.get("logging")  # without it, nobody receives log records
         if logging is not None:
             words = "%s" if kind is None else "%s, ended by " + kind.__name__
-            logging.getLogger("serpentail").info(words, now)
+            level = logging.INFO if now.seconds >= NOTABLE_S else logging.DEBUG
+            logging.getLogger("serpentail").log(level, words, now)
         if self.hook is not None:
             self.hook(now)
 

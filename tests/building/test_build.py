@@ -46,7 +46,7 @@ def generations(cache, monkeypatch):
     """Return a list that grows by each run of the generator, which makes each text once a day."""
     runs = []
 
-    def generate(scene, output):
+    def generate(scene, output, given):
         runs.append(scene)
         return shutil.copytree(folder_of(load_scene(scene)), output / scene.stem)
 
@@ -96,7 +96,7 @@ REFUSED = [
     (None, {"segmens": 3}, "segmens: value 3: .*'segments'"),
     (None, {"m": 2}, "m: value 2.*'segments'"),
     (None, {**TINY, "torso_mas": 1}, "torso_mas: .*'torso_mass'"),
-    (None, {**TINY, "mu": 1}, "mu: no such parameter"),
+    (None, {**TINY, "mu": 1}, "mu: value 1: nothing touches the ground by it"),
     (None, {"tail": "articulatd", "segments": 0}, "(?s)kind: .*segments: .*links: "),
     (None, {**TINY, "links": 10**30}, "links: value 1000.*64 bits"),
     (None, {**TINY, "contacts": {1j}}, "contacts: value {1j}"),
@@ -114,6 +114,18 @@ def test_what_cannot_be_built_is_refused_by_name(cache, monkeypatch):
     monkeypatch.setattr("serpentail.building.generator.find_spec", lambda name: None)
     with pytest.raises(st.ModelError, match="without the package serpentail_codegen"):
         made(**TINY)
+
+
+def test_wrong_parameters_are_refused_before_anything_is_derived(cache):
+    """In less than a second of processor time; the shortest derivation takes several."""
+    wrong, before = ("3 oz", -1, "3 kg cm2", "3 N cm", "3 N cm/rad"), os.times()
+    for value in wrong:
+        words = f"tail_mass: value {value!r}: "
+        with row(value), pytest.raises(st.ModelError, match=words) as caught:
+            st.build(**TINY, tail_mass=value)
+        assert "\n" not in str(caught.value) and str(cache) not in str(caught.value)
+    spent = sum(os.times()[:4]) - sum(before[:4])  # with that of children
+    assert not (cache / "models").exists() and spent < len(wrong)
 
 
 def test_a_built_model_is_the_generated_one_and_nothing_else_is_imported(cache, tmp_path):

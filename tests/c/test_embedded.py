@@ -21,8 +21,6 @@ CROSS = [name for name in boards.BOARDS if name != "host"]
 LIBC_STACK = 16  # bytes: what memset and memcpy push, which no call graph of ours has
 # bytes: branches that the stored states do not take, such as angles beyond all reason
 NOT_TAKEN = 128
-# some of its entries, which no solution depends on, differ with the width of vectors
-UNREAD = {"implicit_factor"}
 
 
 def compared(folder, name, output, profile):
@@ -33,7 +31,6 @@ def compared(folder, name, output, profile):
     """
     board(name)
     found = comparison.compare(folder, name, output, profile)
-    found = [one for one in found if one.name not in UNREAD]
     assert all(one.holds(profile) for one in found), "\n".join(comparison.table(found))
     for one in found:
         with row(one):
@@ -51,7 +48,7 @@ def compared(folder, name, output, profile):
 )
 def test_reproducible_models_have_the_host_s_bits(tmp_path, name, of):
     found = compared(zoo.folder(of), name, tmp_path, "reproducible")
-    assert set(found) == set(image.manifest_of(zoo.folder(of))["functions"]) - UNREAD
+    assert set(found) == set(image.manifest_of(zoo.folder(of))["functions"])
     assert all(one.same_bits and one.units == 0 for one in found.values())
 
 

@@ -14,6 +14,7 @@ from numpy.testing import assert_array_equal as equal
 from scipy.io import netcdf_file
 
 import serpentail as st
+from serpentail.files import without_quote, write_csv
 from tests.motion.conftest import motion
 from tests.support import zoo
 
@@ -83,7 +84,7 @@ def test_units_and_facts_are_attributes(drop):
     found = data.coordinate_units.sel(coordinate=["z", "qx", "alpha_1"])
     assert found.values.tolist() == ["m", "1", "rad"]
     assert data.rate_units.sel(rate=["vx", "omega_z"]).values.tolist() == ["m/s", "rad/s"]
-    assert data.attrs["method"] == "ros34pw2" and data.attrs["steps"] == drop.info["steps"]
+    assert data.attrs["method"] == "switching" and data.attrs["steps"] == drop.info["steps"]
     assert json.loads(data.attrs["info"]) == drop.info and "events" not in data.attrs
 
 
@@ -227,3 +228,15 @@ def test_who_does_not_ask_loads_nothing():
     command = [sys.executable, "-W", "error", "-c", program]
     done = subprocess.run(command, check=True, capture_output=True, text=True)
     assert done.stdout == "[]\n"
+
+
+def test_no_cell_of_a_csv_file_is_run_by_a_spreadsheet(tmp_path):
+    """Numbers stay as they are, and what is read is what was written."""
+    texts = ["=cmd|' /C calc'!A0", "+1+1", "-x", "@sum(1)", "\t=1", "\n=1", "'=1", "''@", "-5 deg"]
+    plain = ["", "word", "'", "'x", "a=1", "-3", "+2.5e-3", "a,b", 'say "x"', "two\nlines"]
+    path = write_csv(tmp_path / "cells.csv", [texts, plain, [-1.5, 3, True, None, "\r\n\r"]])
+    with path.open(newline="") as stream:
+        quoted, *rest = csv.reader(stream)
+    assert all(cell.startswith("'") for cell in quoted)
+    assert rest == [plain, ["-1.5", "3", "True", "", "'\n\n"]]
+    assert [*map(without_quote, quoted)] == texts and [*map(without_quote, plain)] == plain

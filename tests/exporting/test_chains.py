@@ -12,7 +12,7 @@ pytest.importorskip("pinocchio")
 import mujoco
 import pinocchio as pin
 
-TAILS = ("m1_n1", "m1_n3", "m3_n4", "own_links", "weightless")
+TAILS = ("m1_n1", "m1_n3", "m3_n4", "own_links", "weightless", "elastic")
 CHANGED = {
     "torso_mass": 0.1234567890123,
     "torso_inertia": (7.1e-5, 4.3e-5, 6.9e-5),
@@ -42,6 +42,8 @@ def configurations(model, count=5):
 
 
 def pinocchio_model(model, folder):
+    if "tail_stiffness" in model.parameters:  # URDF has no springs
+        model = model.with_parameters(tail_stiffness=0)
     path = st.export(model, "urdf", folder / "rat.urdf")
     return pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer(), True)
 
@@ -77,6 +79,32 @@ def test_pinocchio_finds_inertia_and_points_of_the_model(tmp_path):
             assert np.abs(places - model.tail_points(q)).max() < 1e-12, name
 
 
+def test_pinocchio_finds_limits_and_damping_and_needs_the_models_torques(tmp_path):
+    model = zoo.model("elastic").with_parameters(tail_stiffness=0)
+    read, p, rng = pinocchio_model(model, tmp_path), model.parameters, np.random.default_rng(5)
+    lower, upper, damping = (
+        np.array(p[f"tail_{x}"]) for x in ("stop_lower", "stop_upper", "damping")
+    )
+    read.gravity.linear = np.array([0, 0, -p["gravity"]])
+    for q, turned in configurations(model):
+        q[7:] = rng.uniform(lower, upper)
+        v, tau = rng.normal(size=model.nv), rng.normal(size=model.nv - 6)
+        state, turn = pinocchio_state(model, read, q, turned)
+        tail = turn[:, 6:].T  # entries of the coordinates
+        for found, wanted in (
+            (tail @ read.damping, damping),
+            (tail @ read.lowerPositionLimit[-read.nv :], lower),
+            (tail @ read.upperPositionLimit[-read.nv :], upper),
+        ):
+            np.testing.assert_array_equal(found, wanted)
+        rates = turn @ model.forward_dynamics(q, v, tau)
+        rates[:3] -= np.cross(v[3:6], turn[:3, :3] @ v[:3])  # as the body sees its velocity
+        torques = pin.rnea(read, read.createData(), state, turn @ v, rates)
+        torques += read.damping * (turn @ v)
+        expected = turn @ np.append(np.zeros(6), tau)
+        assert np.abs(torques - expected).max() < 1e-12
+
+
 def mujoco_model(model, folder):
     return mujoco.MjModel.from_xml_path(str(st.export(model, "mjcf", folder / "rat.xml")))
 
@@ -86,13 +114,47 @@ def of_links(model, angles):
     return np.repeat(np.reshape(angles, (-1, 2)), model.joints_each, axis=0).ravel()
 
 
+def tie_of(model):
+    """The free chain's velocities by those of the model."""
+    tail = np.array([of_links(model, unit) for unit in np.eye(model.nv - 6)]).T
+    return np.block([[np.eye(6), np.zeros((6, model.nv - 6))], [np.zeros((len(tail), 6)), tail]])
+
+
+def unbalanced(model, read, q, v):
+    """Forces (..., nv) that MuJoCo's model lacks to accelerate as ours does."""
+    data, tie, turned = mujoco.MjData(read), tie_of(model), q[3:7] / np.linalg.norm(q[3:7])
+    data.qpos[:] = np.concatenate([q[:3], turned, of_links(model, q[7:])])
+    data.qvel[:] = tie @ v
+    mujoco.mj_forward(read, data)
+    full = np.zeros((read.nv, read.nv))
+    mujoco.mj_fullM(read, data, full)
+    rates = model.forward_dynamics(q, v, np.zeros(model.nv - 6))
+    return tie.T @ (full @ tie @ rates - data.qfrc_smooth)
+
+
+def test_mujoco_has_springs_damping_and_stops(tmp_path):
+    """Also far behind the stops; within their width they push less, by a bound that is reached."""
+    model, rng = zoo.model("elastic"), np.random.default_rng(5)
+    read, names = mujoco_model(model, tmp_path), ("lower", "upper", "stiffness", "width")
+    lower, upper, k, w = (np.array(model.parameters[f"tail_stop_{x}"]) for x in names)
+    deep = w * rng.uniform(1, 3, 4)
+    for tail, short in (
+        (rng.uniform(lower, upper), 0),
+        (upper + deep, 0),
+        (lower - deep, 0),
+        (upper + w / 2, 3 / 32 * k * w),
+        (lower - w / 2, -3 / 32 * k * w),
+    ):
+        q, v = np.append(rng.normal(size=7), tail), rng.normal(size=model.nv)
+        lacking = unbalanced(model, read, q, v)
+        assert lacking == pytest.approx(np.append(np.zeros(6), -short * np.ones(4)), abs=1e-12)
+
+
 def check_mujoco(model, folder):
     """Inertia, points, and the free chain's work at the motors, which is that of the torques."""
     read = mujoco_model(model, folder)
     data, tau = mujoco.MjData(read), np.random.default_rng(3).normal(size=model.nv - 6)
-    tie = np.zeros((read.nv, model.nv))
-    tie[:6, :6] = np.eye(6)
-    tie[6:, 6:] = np.array([of_links(model, unit) for unit in np.eye(model.nv - 6)]).T
+    tie = tie_of(model)
     first = np.cumsum([0, *model.joints_each[:-1]])
     data.ctrl[:] = tau
     for q, turned in configurations(model):

@@ -48,7 +48,7 @@ def rates(one, known, model):
     return one.getReal([known[f"der({name})"] for name in named(v=range(model.nv))])
 
 
-@pytest.mark.parametrize("name", FLIGHTS)
+@pytest.mark.parametrize("name", [*FLIGHTS, "elastic"])
 def test_it_flies_as_the_model_does(name, fmu):
     path, model = fmu(name), zoo.model(name)
     assert validate_fmu(str(path)) == []

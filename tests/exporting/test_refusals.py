@@ -42,7 +42,8 @@ def test_arguments_that_are_wrong(here):
         ((model, ["urdf"]), r"kind: value \['urdf'\]"),
         (("m1_n3", "urdf"), "model: value 'm1_n3'"),
         ((model, "urdf", "x.xml"), r"path: value 'x\.xml': .*\.urdf"),
-        ((model, "mjcf", "x.urdf"), r"path: value 'x\.urdf': .*\.xml"),
+        ((model, "mjcf", "x.urdf"), r"path: value 'x\.urdf': .*\.xml or \.mjcf"),
+        ((model, "bundle", "x.tar"), r"path: value 'x\.tar': .*\.zip or \.bundle"),
         ((model, "urdf", ""), r"path: value '': .*\.urdf"),
         ((model, "urdf", "x.urdf/"), r"path: value 'x\.urdf/': .*\.urdf"),
         ((model, "urdf", 3), "path: value 3: "),
@@ -78,11 +79,12 @@ def test_what_no_file_would_say_is_refused(here, monkeypatch):
             ("arcs1", "kind.*articulated tail.*arcs1.*chain|kind.*articulated tail.*chain.*arcs1"),
             ("polar", "kind.*articulated tail"),
             ("mixed", "kind.*articulated tail"),
-            ("elastic", "kind.*springs, damping"),
             ("fixed", "kind.*torso that moves"),
         ):
             with row(kind, name), pytest.raises(st.ExportError, match=words):
                 st.export(zoo.model(name), kind)
+    with pytest.raises(st.ExportError, match=r"kind: value .urdf.: .*without springs.*mjcf"):
+        st.export(zoo.model("elastic"), "urdf")
     for changes, words in (
         ({"link_inertia": (1e-9, 1e-15, 1e-9)}, "inertia of link_1_1: value .* 1e-15"),
         ({"link_inertia": (1e-9, 1e-9, 3e-9)}, "inertia of link_1_1: value"),

@@ -2,6 +2,7 @@
 project says of itself; and make, which builds what is asked for, once.
 """
 
+import os
 import re
 import shutil
 import subprocess
@@ -113,3 +114,48 @@ def test_what_is_there_is_not_made_again_and_what_was_lost_is(tmp_path):
     (folder / "README.md").unlink()
     assert "1 files written" in make().stdout
     assert (folder / "README.md").read_bytes() == readme
+
+
+UV = """#!/bin/sh
+case $SERPENTAIL_PAGE in later) exit;; esac
+exec {} -c 'import os; from hatch_build import PageHook
+PageHook(os.getcwd(), {{}}, None, None, "", "wheel").initialize("editable", {{"artifacts": []}})'
+"""
+NODE = "case $1 in --version) echo v20.1.0;; *) echo page > $2;; esac"
+NPM = "echo 'npm error code E403' >&2; echo 'npm error  403 Forbidden' >&2; exit 1"
+
+
+def test_why_there_is_no_page_is_told_in_a_line_and_it_is_tried_again(tmp_path):
+    """Installers hide what a hook of the build tells."""
+    pytest.importorskip("hatchling")
+    for name in ("Makefile", "pyproject.toml", "hatch_build.py"):
+        shutil.copy2(ROOT / name, tmp_path)
+    for name in ("viewer", "runtime/serpentail/viewer", "bin"):
+        (tmp_path / name).mkdir(parents=True)
+    stand_in(tmp_path)
+    stamps = {name: tmp_path / ".venv" / f".{name}" for name in ("draws", "paged", "ready")}
+    stamps["paged"].unlink()
+    stamps["ready"].unlink()
+
+    def program(name, text):
+        (tmp_path / "bin" / name).write_text(text if text[0] == "#" else f"#!/bin/sh\n{text}\n")
+        (tmp_path / "bin" / name).chmod(0o755)
+
+    for name, text in {"uv": UV.format(sys.executable), "node": NODE, "npm": NPM}.items():
+        program(name, text)
+    own = away_from_make() | {"LC_ALL": "C", "PATH": f"{tmp_path}/bin:{os.environ['PATH']}"}
+
+    def told():
+        command = ["make", "-s", "setup", "UV=uv"]
+        said = subprocess.run(command, cwd=tmp_path, env=own, capture_output=True, check=True)
+        return said.stdout.decode()
+
+    for _ in range(2):
+        reason = "npm error code E403 npm error 403 Forbidden"
+        assert re.fullmatch(f"no page of runs, .*npm: {reason}\n", told())
+        assert stamps["ready"].exists() and not stamps["paged"].exists()
+    program("npm", "exit 0")
+    assert told() == "" and stamps["paged"].exists()
+    page = tmp_path / "runtime/serpentail/viewer/page.html"
+    page.unlink()
+    assert told() == "" and not page.exists()  # what was made is not made again

@@ -2,8 +2,19 @@
 the old file stays whole, whenever and however the system refuses.
 """
 
+import dataclasses
 import errno
+import fcntl
 import os
+import pty
+import resource
+import stat
+import threading
+import time
+import tty
+from contextlib import closing
+from functools import partial
+from pathlib import Path
 from unittest import mock
 
 import numpy as np
@@ -21,8 +32,13 @@ from serpentail.checks import (
     whole_number,
 )
 from serpentail.errors import PlanningError
-from serpentail.files import refuse_unusable, refuse_unwritable
+from serpentail.files import (
+    refuse_unusable,
+    refuse_unwritable,
+    replacing,
+)
 from tests.support.drawn_flight import flight
+from tests.support.file_faults import age, before_calls, killed_at
 from tests.support.rows import row
 
 BAD = [  # what is checked, how, and the value and the need that the error names
@@ -154,3 +170,124 @@ def test_a_path_is_checked_before_the_work(tmp_path):
     refuse_unwritable(tmp_path / "new" / "folder" / "run.npz")
     refuse_unusable(tmp_path / "new")
     unchanged(tmp_path, "file")
+
+
+def put(path, content):
+    with replacing(path) as part:
+        part.write_bytes(content)
+
+
+def listed(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_links_are_followed(tmp_path):
+    """To a file, and to one that is still to be made, in another folder."""
+    (tmp_path / "far").mkdir()
+    for name, target in {"near": "far/old", "later": "far/new", "again": "near"}.items():
+        (tmp_path / name).symlink_to(target)
+    (tmp_path / "far" / "old").write_bytes(OLD)
+    for name, target in {"near": "old", "later": "new", "again": "old"}.items():
+        put(tmp_path / name, name.encode())
+        with row(name):
+            assert (tmp_path / "far" / target).read_bytes() == name.encode()
+            assert (tmp_path / name).is_symlink() and listed(tmp_path / "far")[-1] == "old"
+    assert listed(tmp_path) == ["again", "far", "later", "near"]
+
+
+def test_a_pipe_and_a_device_stay_and_get_the_content(tmp_path):
+    pipe, got = tmp_path / "pipe.csv", []
+    os.mkfifo(pipe)
+    reader = threading.Thread(target=lambda: got.append(pipe.read_bytes()), daemon=True)
+    reader.start()
+    for path in (pipe, tmp_path / "file.csv"):
+        KILLED["run.csv"](flight(samples=20), path)
+    reader.join(10)
+    assert got == [(tmp_path / "file.csv").read_bytes()]
+    assert stat.S_ISFIFO(os.stat(pipe).st_mode) and listed(tmp_path) == ["file.csv", "pipe.csv"]
+    ours, theirs = pty.openpty()  # of the devices the one that no other program uses
+    with closing(os.fdopen(ours, "rb", 0)) as terminal, closing(os.fdopen(theirs, "wb")):
+        tty.setraw(theirs)
+        device = Path(os.ttyname(theirs))
+        put(device, b"words")
+        assert terminal.read(9) == b"words" and device.is_char_device()
+
+
+def test_parts_of_the_dead_go_after_a_minute_and_those_in_use_stay(tmp_path):
+    """Of a file that has another name, too; what only looks like a part stays."""
+    ages = {".a.npz.01234567.part": 59, ".b.csv.89abcdef.part": 61, ".c.0123456.part": 61}
+    ages |= {"d.01234567.part": 61, ".held.00000000.part": 61}
+    for name, seconds in ages.items():
+        (tmp_path / name).write_bytes(OLD)
+        os.utime(tmp_path / name, (time.time() - seconds,) * 2)
+    with (tmp_path / ".held.00000000.part").open("rb") as held:
+        fcntl.flock(held, fcntl.LOCK_EX)
+        put(tmp_path / "run", b"new")
+        assert listed(tmp_path) == sorted({*ages, "run"} - {".b.csv.89abcdef.part"})
+    put(tmp_path / "run", b"new")
+    assert listed(tmp_path) == sorted(
+        {*ages, "run"} - {".b.csv.89abcdef.part", ".held.00000000.part"}
+    )
+    with mock.patch("serpentail.files.fcntl", None):  # as on Windows
+        age(tmp_path)
+        put(tmp_path / "run", b"newer")
+    assert (tmp_path / "run").read_bytes() == b"newer"
+    with replacing(tmp_path / "run"):  # a part is held while it is written, however long it takes
+        age(tmp_path)
+        put(tmp_path / "other", b"new")
+        assert len([name for name in listed(tmp_path) if name.startswith(".run.")]) == 1
+
+
+def test_content_is_on_the_disk_before_the_name_and_the_name_before_the_end(tmp_path, monkeypatch):
+    path, synced = tmp_path / "run", []
+    path.write_bytes(OLD)
+
+    def fsync(handle):
+        kind = "folder" if stat.S_ISDIR(os.fstat(handle).st_mode) else "file"
+        synced.append((kind, path.read_bytes()))
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    put(path, b"new")
+    assert synced == [("file", OLD), ("folder", b"new")]
+
+
+def test_a_full_disk_keeps_the_old_file(tmp_path):
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    for name, write in KILLED.items():
+        (tmp_path / name).write_bytes(OLD)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))
+        try:
+            with row(name), pytest.raises(st.SerpentailError, match=f"{name}.*not written .*make"):
+                write(flight(samples=20), tmp_path / name)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        unchanged(tmp_path, name)
+        (tmp_path / name).unlink()
+
+
+KILLED = {
+    "run.npz": WRITERS["run.npz"],
+    "run.csv": lambda motion, path: dataclasses.replace(motion, model=None).to_csv(path),
+    "run.html": st.view,
+}
+
+
+def test_a_kill_leaves_the_old_file_and_nothing_after_the_next_write(tmp_path):
+    """At each of the last 20 calls of the file system, the old file or the new one is there."""
+    for name, write in KILLED.items():
+        path, calls = tmp_path / name, []
+        work = partial(write, flight(samples=20), path)
+        work()
+        new = path.read_bytes()
+        with before_calls(partial(calls.append, 1)):
+            work()
+        for moment in range(len(calls) - 20, len(calls)):
+            path.write_bytes(OLD)
+            with row(name, moment):
+                assert killed_at(moment, work)
+                assert path.read_bytes() in (OLD, new)
+                age(tmp_path)
+                put(tmp_path / "next", b"")
+                assert listed(tmp_path) == sorted([name, "next"])
+        path.unlink()
+        (tmp_path / "next").unlink()

@@ -80,7 +80,7 @@ HOMES = {  # where alone a library of an extra may be imported, behind the room'
     "matplotlib": ("pictures/",),
     "PIL": ("pictures/",),
     "imageio_ffmpeg": ("pictures/encode.py",),
-    "ezc3d": ("identification/readers.py",),
+    "ezc3d": ("identification/c3d_child.py",),
     "gymnasium": ("learning/environments.py",),
     "jax": ("differentiable/jax_calls.py", "differentiable/jax_functions.py"),
     "torch": ("differentiable/torch_functions.py",),

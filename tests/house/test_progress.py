@@ -95,7 +95,7 @@ def test_a_pipe_has_few_lines_and_a_terminal_one_that_ends_empty(clock):
 
 
 def test_nobody_is_told_by_default_and_the_log_of_the_ends(clock, caplog, capsys):
-    with caplog.at_level(logging.INFO, "serpentail"):
+    with caplog.at_level(logging.DEBUG, "serpentail"):
         with Stage("compile", "rat.c") as stage:
             clock(60)
             stage.tell(0.5)
@@ -103,6 +103,14 @@ def test_nobody_is_told_by_default_and_the_log_of_the_ends(clock, caplog, capsys
             raise KeyError
     assert caplog.messages == ["compile rat.c: 60.0 s", "derive rat: 0.0 s, ended by KeyError"]
     assert capsys.readouterr() == ("", "")
+
+
+def test_short_work_is_told_to_those_who_debug(clock, caplog):
+    for seconds, level in ((0.4, logging.DEBUG), (0.6, logging.INFO)):
+        caplog.clear()
+        with caplog.at_level(logging.DEBUG, "serpentail"), Stage("simulate", "rat"):
+            clock(seconds)
+        assert [record.levelno for record in caplog.records] == [level]
 
 
 def test_runs_and_a_long_run_are_told_by_the_part_that_is_done():
@@ -183,7 +191,7 @@ def test_what_the_package_gives_fills_no_screen_and_says_what_it_is_and_how_it_e
     report = plan.report | {"status": "Infeasible", "effort": None}
     tails = "articulated, 1 x 3 links.*51 samples, 0 to 0.05 s.*by points: 6 of the feet; 0 events"
     for thing, words in [
-        (motion, rf"{tails}.*\n  by ros34pw2: .*steps"),
+        (motion, rf"{tails}.*\n  by switching: .*steps"),
         (motion.contact, "forces=array of 51 x 6 x 3"),
         (st.Trajectory.load(motion.save(tmp_path / "run.npz")), "without its model"),
         (warned, r"\n(?=.{9,100}$)[^\n]*2 warnings, the first: word word[^\n]*\.\.\.>$"),

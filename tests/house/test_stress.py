@@ -174,8 +174,8 @@ def test_parts_are_made_once_and_again_where_inputs_change_or_files_are_gone(tmp
 def test_a_part_that_fails_is_told_and_none_is_made_while_another_process_writes(tmp_path):
     with pytest.raises(st.SerpentailError, match="one: ZeroDivisionError: no such part"):
         one(tmp_path, {}, tiny_study.wrong)
-    assert tiny_study.titles(tmp_path / "study.db") == []
-    lock = FileLock(tmp_path / ".study.db.lock")
+    assert tiny_study.titles(tmp_path / "study.rows") == []
+    lock = FileLock(tmp_path / "study.rows" / "lock")
     with lock, pytest.raises(st.SerpentailError, match="another process is writing"):
         one(tmp_path, {}, tiny_study.ones)
     assert np.isnan(one(tmp_path, {}, tiny_study.lost)["lost"])  # JSON has no NaN of its own
@@ -197,7 +197,7 @@ def started(folder):
 @pytest.mark.parametrize("whole", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_ctrl_c_ends_all_in_one_line_and_the_same_command_goes_on(tmp_path, whole):
     """From a terminal all processes hear it, from another program the parent alone."""
-    store, process = tmp_path / "parts" / "tiny.db", started(tmp_path)
+    store, process = tmp_path / "parts" / "tiny.rows", started(tmp_path)
     while not tiny_study.titles(store):
         time.sleep(0.02)
     (os.killpg if whole else os.kill)(process.pid, signal.SIGINT)

@@ -59,6 +59,13 @@ def tracks(model, times, states, noise=0.0, seed=1, gaps=0.0):
     return st.marker_tracks(times, positions, list(placed(model)), unit="m")
 
 
+def hidden(data, names, frames):
+    positions = data.positions.copy()
+    for name in names:
+        positions[frames, data.names.index(name)] = np.nan
+    return st.marker_tracks(data.times, positions, data.names, unit="m")
+
+
 def scene(markers, *more):
     head = 'kind = "articulated"\nsegments = 1\nlinks = 1\nfunctions = ["energy"]\n'
     rows = "".join(

@@ -5,6 +5,7 @@ verb identify, and what is drawn of an identification: its page, residuals and t
 import base64
 import gzip
 import json
+import os
 import re
 
 import numpy as np
@@ -29,6 +30,20 @@ def some():
     return st.marker_tracks(STEP * T, positions, NAMES, unit="m")
 
 
+def far(y):
+    x = X.copy()
+    x[2, 1, 1] = y
+    return x
+
+
+def test_a_marker_beyond_100_m_is_named_with_a_remedy():
+    """The rule is that of scenes: warn, because most often it is a slip of units."""
+    with pytest.warns(st.UnusualSize, match=r"'tip', frame 2 .*, y: value -101 m: .*unit="):
+        st.marker_tracks(T, far(-101), NAMES, unit="m")
+    st.marker_tracks(T, far(99), NAMES, unit="m")
+    st.marker_tracks(T, far(1e5 - 1), NAMES, unit="mm")
+
+
 def test_arrays_that_are_no_tracks_are_refused():
     for words, times, positions, names, how in (
         ("unit: none is stated", T, X, NAMES, {"unit": None}),
@@ -42,6 +57,9 @@ def test_arrays_that_are_no_tracks_are_refused():
         ("names: value", T, X, ["a", " "], {}),
         ("'tip' is at exactly .* in 6 frames", T, X * [[[1], [0]]], NAMES, {}),
         ("never seen: tip", T, X * [[[1], [np.nan]]], NAMES, {}),
+        ("names: value", T, X, ["a", "b\nc"], {}),
+        (r"'tip', frame 2 .*, y: value 1e\+38 m: .*100 m.*unit=", T, far(1e38), NAMES, {}),
+        (r"times\[1\]: value 2e\+12: needs seconds", T * 2e12, X, NAMES, {}),
         ("infinite", T, X * np.inf, NAMES, {}),
         (r"\(3,\): needs 4 frames", T[:3], X[:3], NAMES, {}),
         ("axes: value 'xzy'", T, X, NAMES, {"axes": "xzy"}),
@@ -81,6 +99,11 @@ def test_written_tracks_are_read_again(tmp_path):
             assert found.names == tracks.names
             np.testing.assert_allclose(found.times, tracks.times, rtol=1e-8)
             np.testing.assert_allclose(found.positions, tracks.positions, rtol=1e-7)
+    names = ["=cmd|' /C calc'!A0", 'left, "big"']
+    odd = st.marker_tracks(tracks.times, tracks.positions, names, unit="m")
+    path = st.write_markers(odd, tmp_path / "odd.csv")
+    assert path.read_text().startswith("time,'=cmd")
+    assert st.read_markers(path, "m").names == odd.names
     with pytest.raises(st.IdentificationError, match=r"path: value .*run\.c3d"):
         st.write_markers(tracks, tmp_path / "run.c3d")
     path = tmp_path / "run.trc"
@@ -92,30 +115,6 @@ def test_written_tracks_are_read_again(tmp_path):
     ):
         path.write_text("\n".join(change(lines)))
         np.testing.assert_array_equal(st.read_markers(path).positions, wanted)
-
-
-def test_c3d_is_read_as_ezc3d_writes_it(tmp_path):
-    """Also from a frame that is not the first."""
-    ezc3d = pytest.importorskip("ezc3d")
-    tracks, file = some(), ezc3d.c3d()
-    point = file["parameters"]["POINT"]
-    point["RATE"]["value"], point["UNITS"]["value"] = [200], ["mm"]
-    point["LABELS"]["value"] = ["nose", "tip"]
-    points = np.ones((4, 2, 6))
-    points[:3] = np.moveaxis(1e3 * tracks.positions, [0, 1, 2], [2, 1, 0])
-    file["data"]["points"] = points
-    for first in (0, 9):
-        file["header"]["points"]["first_frame"] = first
-        file.write(str(tmp_path / "run.c3d"))
-        found = st.read_markers(tmp_path / "run.c3d")
-        assert found.names == tracks.names
-        np.testing.assert_allclose(found.times, STEP * (first + np.arange(6)), rtol=1e-9)
-        np.testing.assert_allclose(found.positions, tracks.positions, atol=1e-6)
-    with pytest.raises(st.IdentificationError, match="unit: value 'm': the file states mm"):
-        st.read_markers(tmp_path / "run.c3d", "m")
-    (tmp_path / "run.c3d").write_bytes(b"\x00\xff" * 300)
-    with pytest.raises(st.IdentificationError, match=r"run.c3d: .*c3d file"):
-        st.read_markers(tmp_path / "run.c3d")
 
 
 def header(old, new):
@@ -136,6 +135,8 @@ TRC = {
     "DataRate is 260 Hz": header("200", "260"),
     "names 1 markers, NumMarkers is 2": lambda x: [*x[:3], x[3].replace("tip", ""), *x[4:]],
     "NumFrames: value 'six'": header("6", "six"),
+    "has 0 frames": lambda x: header("6", "0")([*x[:5], " "]),
+    "DataRate is 0 Hz, .* 200 Hz": header("200", "0"),
 }
 CSV = {
     r"line 7 has \d of 7": lambda x: [*x[:-1], x[-1][:20]],
@@ -143,6 +144,7 @@ CSV = {
     "csv: line 1 needs time": lambda x: [],
     "line 1 needs": lambda x: ["time" for _ in x],
     "repeated": lambda x: [*x[:4], x[3], *x[4:]],
+    "cannot be read as CSV": lambda x: [*x[:-1], "1" * 200_000],
 }
 
 
@@ -155,10 +157,12 @@ def test_damaged_files_are_refused_by_line(tmp_path):
             with row(suffix, words), pytest.raises(st.IdentificationError, match=words):
                 st.read_markers(path, unit)
     (tmp_path / "run.trc").write_bytes(b"\x00\xff" * 300)
+    os.mkfifo(tmp_path / "pipe.csv")
     for words, path in (
         ("unit: none is stated", st.write_markers(some(), tmp_path / "run.csv")),
         ("data: value 3", 3),
         (r"tracks.xlsx: needs .*\.trc, \.csv, \.c3d", tmp_path / "tracks.xlsx"),
+        ("pipe.csv: is no regular file", tmp_path / "pipe.csv"),
         (r"none.trc: cannot be read", tmp_path / "none.trc"),
         ("is not a text file", tmp_path / "run.trc"),
     ):
@@ -233,7 +237,15 @@ def test_page_and_figure_have_what_was_measured_and_its_gaps(tmp_path):
             st.view(found.trajectory, page, markers=markers)
 
     _, axes = found.plot(tmp_path / "residuals.png")
-    assert [each.get_ylabel() for each in axes] == ["residual [mm]", "torque [mN m]", "power [mW]"]
+    named = [text.get_text() for text in axes[0].get_legend().get_texts()]
+    assert named == [*data.names, f"rms of noise: {1e3 * found.noise * 3**0.5:.2g} mm"]
+    for label, each in zip(("tail torque\n[mN m]", "power\n[mW]"), axes[1:], strict=True):
+        assert each.get_ylabel() == label and len(each.collections) == 2  # bands
+        named = [text.get_text() for text in each.get_legend().get_texts()]
+        assert named == ["pitch", "yaw", "95 %"]
+    bands = found.trials[0].torques
+    edge = axes[1].collections[1].get_paths()[0].vertices[:, 1]
+    assert edge.min() == pytest.approx(1e3 * bands.low[:, 1].min())
     curves = [line.get_ydata() for line in axes[0].lines[:-1]]
     distance = 1e3 * np.linalg.norm(found.trials[0].residuals, axis=2)
     np.testing.assert_allclose(np.array(curves).T, distance)
@@ -241,3 +253,21 @@ def test_page_and_figure_have_what_was_measured_and_its_gaps(tmp_path):
     assert (tmp_path / "residuals.png").stat().st_size > 1000
     with pytest.raises(st.IdentificationError, match="trial: value 1: needs 0 to 0"):
         found.plot(trial=1)
+
+
+def test_tracks_and_torques_tell_their_shapes_and_priors_take_units():
+    model, times = zoo.model("m1_n1"), np.linspace(0, 0.05, 11)
+    data = tracks(model, times, flown(model, times, start(model)), 3e-4)
+    told = repr(data).splitlines()
+    assert len(told) <= 4 and "5 markers at 11 times" in told[0] and "nose, left" in told[1]
+    found, same = (
+        st.identify(model, data, placed(model), torques=st.TorquePrior(*prior), noise=3e-4)
+        for prior in (("4 mN m", "30 ms"), (4e-3, 0.03))
+    )
+    torques = found.trials[0].torques
+    np.testing.assert_array_equal(torques.values, same.trials[0].torques.values)
+    np.testing.assert_array_equal(torques[1], torques.values[:, 1])
+    assert f"values=array of {len(torques.times)} x 2" in repr(torques)
+    for prior, words in ((("4 mm", 1), "torques.std: value '4 mm'"), ((1, "x"), "torques.time")):
+        with row(words), pytest.raises(st.IdentificationError, match=words):
+            st.identify(model, data, placed(model), torques=st.TorquePrior(*prior))

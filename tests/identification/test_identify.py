@@ -78,7 +78,7 @@ def test_information_of_several_trials_adds_up():
     model = zoo.model("m1_n3")
     data = [
         tracks(model, TIMES, flown(model, TIMES, start(model, seed)), 5e-4, seed=seed)
-        for seed in (0, 1)
+        for seed in (0, 3)  # neither mass is at its bound, where the covariance has no part of it
     ]
     one, other, both = (
         np.linalg.inv(st.identify(model, each, placed(model), KNOWN, noise=5e-4).covariance)

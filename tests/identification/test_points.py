@@ -1,9 +1,7 @@
-"""What is wrong with arguments and doubtful in data is told by name; where markers are on the body,
+"""What is wrong with arguments and data is told by name; where markers are on the body,
 against the model's own tail points and SciPy's rotations; derivatives against differences; and
 inverse dynamics against the torques that made the motion.
 """
-
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,15 +9,17 @@ from scipy.spatial.transform import Rotation
 
 import serpentail as st
 from serpentail.identification import stages
+from serpentail.identification import start as start_room
 from serpentail.identification.inverse import smoothed
 from serpentail.identification.placement import placements
-from serpentail.identification.points import body_points, geometry_of
-from serpentail.identification.trial import world_points
+from serpentail.identification.points import world_points
+from serpentail.identification.trial import marker_jacobians
+from serpentail.identification.unknowns import unknowns
 from tests.identification.flights import flown, placed, start, tracks
 from tests.support import zoo
 from tests.support.rows import row
 
-TIMES, TIPS = np.linspace(0, 0.1, 21), ("tail2", "tail3")
+TIMES = np.linspace(0, 0.1, 21)
 
 
 @pytest.fixture(scope="module")
@@ -87,8 +87,9 @@ def test_models_that_cannot_be_identified_are_refused():
     ):
         with row(words), pytest.raises(st.IdentificationError, match=words):
             st.joint_torques(zoo.model("m1_n3"), given, {"a": st.Marker(tail=1)}, cutoff=cutoff)
-    with pytest.raises(st.ModelError, match="fixed"):
-        st.joint_torques(zoo.model("fixed"), data, {"a": st.Marker(tail=1)}, cutoff=10)
+    for name, words in (("fixed", "fixed"), ("polar", "polar"), ("single", "float")):
+        with row(name), pytest.raises(st.ModelError, match=words):
+            st.joint_torques(zoo.model(name), data, {"a": st.Marker(tail=1)}, cutoff=10)
 
 
 def test_too_few_markers_are_refused(flight):
@@ -110,28 +111,8 @@ def test_too_few_markers_are_refused(flight):
         st.identify(model, data, torso, torques=prior, noise=3e-5)
 
 
-def swapped(data, a, b, frames=slice(None)):
-    positions = data.positions.copy()
-    i, j = data.names.index(a), data.names.index(b)
-    positions[frames, [i, j]] = data.positions[frames, [j, i]]
-    return st.marker_tracks(data.times, positions, data.names, unit="m")
-
-
-def test_doubtful_markers_are_named(flight):
-    model, states = flight
-    data, markers = tracks(model, TIMES[:15], states[:15], 2e-4), placed(model)
-    some, elsewhere = np.arange(8, 12)[:, None], {"nose": st.Marker(torso=(0, 0.06, 0.015))}
-    for words, given, places in (
-        (r"'tail2' .* 'tail3' .* 4 frames from 0.04 to 0.055", swapped(data, *TIPS, some), markers),
-        ("'left' and 'right' .* throughout", swapped(data, "left", "right"), markers),
-        ("marker 'nose' is off by", data, markers | elsewhere),
-    ):
-        with row(words), pytest.warns(st.DoubtfulMarkers, match=words):
-            st.identify(model, given, places, noise=2e-4)
-
-
-MODELS = ("m2_n2", "arcs2", "own_links", "own_arcs")  # the last two on a tilted mount
-OFFSET = (0.001, -0.002, 0.003)
+MODELS = ("m2_n2", "arcs2", "own_links", "own_arcs", "mixed")  # the last three on a tilted mount
+PLACES, OFFSET = (0.0, 0.1, 0.37, 0.5, 0.75, 1.0), (0.001, -0.002, 0.003)
 
 
 def shapes(model, count=5):
@@ -142,60 +123,74 @@ def shapes(model, count=5):
     return q
 
 
-def test_markers_on_the_centre_line_are_at_the_models_tail_points():
-    for name in MODELS:
-        model = zoo.model(name)
-        q, p = shapes(model), model.parameters
-        points = model.tail_points(q)
-        pieces = np.array(p.get("link_lengths", p.get("arc_lengths", ())))
-        count = points.shape[1] - 1
-        each = len(pieces) or int(np.sum(model.joints_each))
-        pieces = pieces if len(pieces) else np.full(each, p["tail_length"] / each)
-        ends = np.concatenate([[0], np.cumsum(np.repeat(pieces / (count // each), count // each))])
-        along = np.minimum(ends / ends[-1], 1)
-        line = placements(model, {f"p{k}": st.Marker(tail=s) for k, s in enumerate(along)})
-        np.testing.assert_allclose(world_points(model, line, q), points, atol=1e-14, err_msg=name)
+def chained(model, q, along):
+    """A marker in the world by a chain of rotations; arcs are integrals of their direction."""
+    p, pairs = model.parameters, q[7:].reshape(-1, 2)
+    own = {"articulated": list(p.get("link_lengths", ())), "continuum": [*p.get("arc_lengths", ())]}
+    equal = p["tail_length"] / np.sum(model.joints_each)
+    x, weight = np.polynomial.legendre.leggauss(30)
+    turn = Rotation.from_quat(q[[4, 5, 6, 3]])
+    place, left = q[:3] + turn.apply(p["tail_mount"]), along * p["tail_length"]
+    pitch, roll, yaw = p.get("mount_angles", (0, 0, 0))
+    turn = turn * Rotation.from_euler("ZXY", [yaw, pitch, roll])
+    for kind, count, (a, b) in zip(model.kinds, model.joints_each, pairs, strict=True):
+        for _ in range(count):
+            length = own[kind].pop(0) if own[kind] else equal
+            part = min(left, length)
+            if kind == "continuum":
+                bend = np.array([a, 0, b]) * part / length
+                slices = turn * Rotation.from_rotvec(np.outer((x + 1) / 2, bend))
+                place = place + weight / 2 @ slices.apply([0, -part, 0])
+                turn = turn * Rotation.from_rotvec(bend)
+            else:
+                turn = turn * Rotation.from_euler("XZ", [a, b])
+                place = place + turn.apply([0, -part, 0])
+            left -= part
+            if left < 1e-12:
+                return place + turn.apply(OFFSET)
+    raise AssertionError(left)
 
 
-def test_offsets_turn_with_links_and_with_slices_of_arcs():
-    def of_links(q):
-        return [q[:, 7:8] * [1, 0, 0], q[:, 8:9] * [0, 0, 1]] * 2
-
-    def of_arcs(q):
-        bends = [np.stack([q[:, k], 0 * q[:, k], q[:, k + 1]], axis=1) for k in (7, 9)]
-        return [bends[0], bends[1] / 2]
-
-    # m2_n2: at the end of the first segment's links
-    for name, tail, turns in (("m2_n2", 0.5, of_links), ("arcs2", 0.75, of_arcs)):
+def test_markers_are_where_a_chain_of_rotations_ends():
+    markers = {f"p{s}": st.Marker(tail=s, offset=OFFSET) for s in PLACES}
+    for name in (*MODELS, "polar"):
         model = zoo.model(name)
         q = shapes(model)
-        turn = Rotation.from_quat(q[:, [4, 5, 6, 3]])
-        for vector in turns(q):
-            turn = turn * Rotation.from_rotvec(vector)
-        markers = {"a": st.Marker(tail=tail, offset=OFFSET), "line": st.Marker(tail=tail)}
-        found = world_points(model, placements(model, markers), q)
-        wanted = found[:, 1] + turn.apply(OFFSET)
-        np.testing.assert_allclose(found[:, 0], wanted, atol=1e-14, err_msg=name)
+        if name == "polar":  # a = -theta cos(phi), b = theta sin(phi)
+            q[:, 8] = np.abs(q[:, 8]) + 0.1
+        found, bent = st.marker_positions(model, q, markers), q.copy()
+        if name == "polar":
+            bent[:, 7:] = np.stack([-q[:, 8] * np.cos(q[:, 7]), q[:, 8] * np.sin(q[:, 7])], axis=1)
+        wanted = [[chained(model, each, along) for along in PLACES] for each in bent]
+        np.testing.assert_allclose(found, wanted, atol=1e-14, err_msg=name)
 
 
-def test_derivatives_of_points_are_central_differences():
-    h, none = 1e-6, np.zeros(0, int)
+def test_derivatives_of_markers_are_central_differences():
+    h = 1e-4
+    markers = {f"p{s}": st.Marker(tail=s, offset=OFFSET) for s in (0.1, 0.6, 1.0)}
+    markers["torso"] = st.Marker(torso=(0.01, 0.02, 0.03))
     for name in MODELS:
         model = zoo.model(name)
-        shape, tail = geometry_of(model), shapes(model)[:, 7:]
-        places = {f"p{k}": st.Marker(tail=s, offset=OFFSET) for k, s in enumerate((0.1, 0.6, 1.0))}
-        at_body = placements(model, places | {"torso": st.Marker(torso=(0.01, 0.02, 0.03))})
-        numbers = np.concatenate([tail[0], shape.numbers])
-        found = body_points(shape, tail, at_body, np.arange(len(shape.numbers)))
+        q, places = shapes(model), placements(model, markers)
+        lengths = [each for each in ("link_lengths", "arc_lengths") if each in model.parameters]
+        wanted = [*(lengths or ["tail_length"]), "tail_mount", "marker:p0.6", "torso_mass"]
+        wanted += ["mount_angles"] * ("mount_angles" in model.parameters)
+        unknown = unknowns(model, places, wanted)
+        by_q, by = marker_jacobians(unknown, model, places, q)
 
-        def at(change, tail=tail, shape=shape, places=at_body):
-            mount, angles, lengths = np.split(shape.numbers + change[tail.shape[1] :], [3, 6])
-            own = replace(shape, mount=mount, angles=angles, lengths=lengths)
-            return body_points(own, tail + change[: tail.shape[1]], places, none).points
+        def at(values, unknown=unknown, q=q):
+            return world_points(unknown.model_at(values), unknown.placed_at(values), q)
 
-        wanted = [(at(step) - at(-step)) / (2 * h) for step in h * np.eye(len(numbers))]
-        slopes = np.concatenate([found.by_tail, found.by_geometry], axis=-1)
-        np.testing.assert_allclose(slopes, np.stack(wanted, axis=-1), atol=1e-9, err_msg=name)
+        steps = h * np.eye(len(unknown.start))
+        slopes = [(at(unknown.start + x) - at(unknown.start - x)) / (2 * h) for x in steps]
+        np.testing.assert_allclose(by, np.stack(slopes, axis=-1), atol=1e-8, err_msg=name)
+        turned = [
+            world_points(model, places, start_room.turned(model, q, np.tile(sign * x, (len(q), 1))))
+            for x in h * np.eye(model.nv)
+            for sign in (1, -1)
+        ]
+        slopes = (np.array(turned[::2]) - turned[1::2]) / (2 * h)
+        np.testing.assert_allclose(by_q, np.moveaxis(slopes, 0, -1), atol=1e-8, err_msg=name)
 
 
 def interval(model, x, torques, span=0.004):

@@ -174,6 +174,7 @@ def test_values_of_the_passive_tail_are_one_for_all_or_one_for_each_or_refused(m
         with row(changes):
             assert says in refusal(elastic, changes)
     assert "tail_damping: no such parameter" in refusal(manifest, {"tail_damping": 1e-3})
+    assert len(refusal(manifest, {"9" * 5000: 1})) < 700
     lower = np.array([[0, 0, 0, 0], [0, 3, 0, 0]])
     with pytest.raises(st.ModelError, match=r"tail_stop_upper 0\.5 of tail coordinate 1"):
         RunParameters.checked(elastic, resolve(elastic, None), {"tail_stop_lower": lower}, 2)

@@ -130,13 +130,31 @@ def test_a_tail_that_comes_back_into_the_torso_is_told(rat):
     assert f"{depth:.2g} of the way" in found and "t = 1 s" in found
 
 
-def test_blows_from_20_body_weights_on(rat):
-    for weights, count in ((19.9, 0), (20.1, 1)):
-        forces = np.zeros((3, 6, 3))
-        forces[2, :, 2] = weights * WEIGHT / 6
-        told = made(rat, 1.0, forces=forces).warnings
-        assert len(told) == count
-        assert all("t = 2 s" in each and "20.1" in each for each in told)
+def test_blows_beyond_what_legs_of_the_body_s_size_bear(rat):
+    """A jumper of 75 kg bears 15.2 body weights, 0.10923 kg so 15.2 (75 / 0.10923)^(1/3) = 134.1,
+    and eight times this mass half of that.
+    """
+    heavy = {name: 8 * rat.parameters[name] for name in ("torso_mass", "tail_mass")}
+    for model, most in ((rat, 134.1), (rat.with_parameters(**heavy), 67.05)):
+        for share, count in ((0.999, 0), (1.001, 1)):
+            forces = np.zeros((3, 6, 3))
+            forces[2, :, 2] = share * most * model.parameters["gravity"] / 6
+            forces *= sum(model.parameters[name] for name in heavy)
+            told = [each for each in made(model, 1.0, forces=forces).warnings if "ground" in each]
+            assert len(told) == count
+            assert all("t = 2 s" in each and f"than {most:.3g}, which" in each for each in told)
+
+
+def test_few_drops_push_too_hard():
+    """29 tumbling drops from up to half a metre."""
+    model, legs = zoo.model("ground"), st.Legs.fixed(np.radians(210), np.radians(-40))
+    rng, hard = np.random.default_rng(2), []
+    for height in np.linspace(0.05, 0.5, 29):
+        q, v = at_height(model, 0.25 + height, 1)[0], np.zeros(model.nv)
+        q[3:7], v[3:6] = Rotation.random(random_state=rng).as_quat(), 5 * rng.normal(size=3)
+        run = st.simulate(model, q, v, legs=legs, controller=st.Damping(1e-3), t_span=0.5)
+        hard += [each for each in run.warnings if "pushes" in each]
+    assert len(hard) <= 3
 
 
 def test_bends_beyond_half_a_turn(rat):

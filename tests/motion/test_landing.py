@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import serpentail as st
 from tests.support.rows import row
 
-from .conftest import at_height, made, told
+from .conftest import at_height, made, motion, told
 
 LANDS, ROWS = 0.5, 1001  # s of 1
 WEIGHT = 1.0705  # N
@@ -129,3 +130,19 @@ def test_the_landing_of_the_leap_and_of_its_parts(leap):
     after = told(leap.resample(leap.t[leap.t > 0.6]))
     assert after["take_off_s"] is None and after["recontact_s"] == of["recontact_s"]
     assert after["touching_s"]["feet"] == pytest.approx(1.5 - of["recontact_s"], abs=1e-3)
+
+
+def test_unsound_contacts_are_named():
+    points, two = np.zeros((41, 2, 3)), {"feet": 2}
+    sound = {"points": points, "forces": points, "bristles": points[..., :2], "groups": two}
+    for name, value, words in (
+        *(("groups", g, "groups: value") for g in ([], {"ear": 2}, {"feet": 0}, {"feet": 2.0})),
+        ("groups", {"feet": 3}, r"points has shape \(41, 2, 3\): give \(41, 3, 3\)"),
+        ("forces", points[:, :1], r"forces has shape \(41, 1, 3\): give \(41, 2, 3\)"),
+        ("bristles", points, r"bristles has shape .*: give \(41, 2, 2\)"),
+        ("legs", points[:, 0], r"legs has shape \(41, 3\): give \(41, 4\)"),
+    ):
+        with row(name, words), pytest.raises(ValueError, match=f"contact.{words}"):
+            st.Contact(**sound | {name: value})
+    with pytest.raises(ValueError, match="contact has 41 samples: give 40"):
+        dataclasses.replace(motion(np.arange(40.0)), contact=st.Contact(**sound))

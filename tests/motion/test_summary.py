@@ -23,7 +23,7 @@ OF_EVENTS = {
 }
 OF_THE_GROUND = OF_EVENTS | {
     *("standing_end", "peak_ground_force_N", "peak_ground_force_weights", "peak_group_force_N"),
-    *("peak_group_force_weights", "peak_foot_force_N", "peak_tail_force_N"),
+    *("peak_group_force_weights", "peak_ground_force_s"),
     *("ground_impulse_N_s", "impulse_N_s", "slip_m"),
 }
 
@@ -44,7 +44,8 @@ def test_text_markdown_and_json_have_values_units_and_meanings(kick):
     assert rows["apex_m"].split() == [f"{of['apex_m']:.5f}", "m"]
     assert rows["peak_ground_force_weights"].endswith("  body weights")
     assert rows["apex_m"].rindex(" m") == rows["duration_s"].rindex(" s")
-    assert rows["landed"] == "no" and rows["steps"].isdigit() and rows["peak_tail_force_N"] == "-"
+    assert rows["landed"] == "no" and rows["steps"].isdigit()
+    assert list(of).index("impulse_N_s") < list(of).index("peak_ground_force_N")
     said = [line.removeprefix("warnings").strip() for line in lines if line.startswith("warn")]
     assert said == kick.warnings
     lines, described = of.markdown().splitlines(), strict(of.described())
@@ -87,7 +88,7 @@ def test_a_body_without_feet_a_single_sample_and_a_motion_that_nobody_simulated(
     forces[-1, :, 2] = 1.0
     contact = st.Contact(rests, forces, rests[..., :2], {"tail": 2, "torso": 1})
     of = told(dataclasses.replace(motion, contact=contact))
-    assert of["standing_end"] is of["landed"] is of["peak_foot_force_N"] is None
+    assert of["standing_end"] is of["landed"] is None
     assert of["least_upright_landing"] == 1 and of["landing_group"] == "tail"
     assert of["peak_group_force_N"] == {"tail": 2.0, "torso": 1.0} and strict(of) == of
     of = told(kick.resample(kick.t[:1]))
@@ -141,8 +142,7 @@ def test_peaks_by_hand(leap):
     assert of["peak_group_force_N"] == pytest.approx(group)
     weights = {name: force / weight for name, force in group.items()}
     assert of["peak_group_force_weights"] == pytest.approx(weights)
-    assert of["peak_foot_force_N"] == pytest.approx(np.sqrt(90))
-    assert of["peak_tail_force_N"] == 2
+    assert of["peak_ground_force_s"] == 1
     forces[2] *= 100  # more than a warning allows, where there is a weight
     floating = leap.model.with_parameters(gravity=0.0)
     of = told(made(floating, forces=forces))
@@ -152,6 +152,28 @@ def test_peaks_by_hand(leap):
     forces[1] = 1e308  # what overflows is no number
     of = told(made(leap.model, forces=forces))
     assert of["peak_ground_force_N"] is of["peak_group_force_N"]["feet"] is None
+
+
+def test_peaks_do_not_depend_on_the_samples(kick):
+    """The legs start to move at once: a jump of the force, between the ends of steps or at one."""
+    fine = [told(kick)[f"peak_{name}"] for name in ("ground_force_N", "ground_force_s")]
+    assert fine[1] == pytest.approx(0.4, abs=1e-9)
+    for step in (1.7e-3, 0.013):
+        motion = scene_of("kick", output_step=step).simulate()
+        assert motion.contact.total.max() < 0.3 * fine[0]
+        of = told(motion)
+        assert [of["peak_ground_force_N"], of["peak_ground_force_s"]] == pytest.approx(fine, 1e-6)
+        feet = of["peak_group_force_N"]
+        assert feet["right_foot"] == feet["left_foot"] == pytest.approx(fine[0] / 2, 1e-3)
+        blows = [[each for each in run.warnings if "pushes" in each] for run in (motion, kick)]
+        assert blows[0] == blows[1] != []
+        scene = scene_of("kick", output_step=step)
+        how = scene.settings | {"t_span": scene.duration, "controller": scene.controller}
+        starts = np.tile(scene.q0, (2, 1)), np.tile(scene.v0, (2, 1))
+        many = st.simulate(scene.model, *starts, legs=scene.legs, **how)
+        assert many[1].info["peaks"] == motion.info["peaks"]
+        part = motion.resample(motion.t[:2])  # ends before the blow
+        assert told(part)["peak_ground_force_N"] < 2
 
 
 def test_the_path_of_sliding_feet_tail_and_torso():

@@ -197,6 +197,9 @@ def test_views_that_are_none_are_refused():
         for refused in (views_of, lambda views: flight().filmstrip(views=views)):
             with row(views), pytest.raises(st.ViewError, match=words):
                 refused(views)
+    # the ends of the range are in it, by whatever name
+    for azimuth, elevation, view in ((0, 0, SIDE), (0, 90, TOP), (360.0, 90.0, TOP)):
+        np.testing.assert_array_equal(views_of([(azimuth, elevation)])[0].matrix, view.matrix)
 
 
 def surface(count=150):

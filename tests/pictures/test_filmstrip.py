@@ -239,7 +239,18 @@ def test_plots_have_forces_on_a_linear_axis_and_events_on_every_panel():
         for kind in ("take_off", "touch_down"):
             drawn = [segment[0, 0] for segment in lines[f"_{kind}"].get_segments()]
             assert drawn == [event["time"] for event in EVENTS if event["kind"] == kind]
-    assert [text.get_text() for text in every[0].texts] == ["feet off", "feet on"]
+    assert [text.get_text() for text in every[0].texts] == ["feet off", "feet on", "tail off"]
+    # of events close to each other the feet's have the first place, the torso's the second row
+    times = (("tail", 0.1), ("feet", 0.102), ("torso", 0.101), ("tail", 0.5))
+    events = [{"time": time, "group": group, "kind": "take_off"} for group, time in times]
+    motion = standing()
+    span = np.ptp(motion.t)
+    for event in events:
+        event["time"] = motion.t[0] + event["time"] * span
+    _, axes = dataclasses.replace(motion, info={"events": events}).plot("height")
+    places = {text.get_text(): text.get_position()[1] for text in axes[0].texts}
+    assert list(places) == ["feet off", "torso off", "tail off"]
+    assert places["torso off"] > places["feet off"] == places["tail off"]
     # where events are unknown there are none
     _, axes = dataclasses.replace(standing(), info={"method": "dop853"}).plot("height")
     assert not axes[0].collections and not axes[0].texts

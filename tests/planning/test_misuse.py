@@ -31,7 +31,8 @@ GOALS = {"attitude": "up", "torso_rate": (0, 0), "turns": (1, 2, 3), "tail": ("1
 BOUNDS = {"torque": 0, "angle": (1, 2, 3)}
 PROBLEM = {
     r"start\[0\]: ": {"start": (np.ones(8), np.zeros(8))},
-    r"start\[1\]: .*nan": {"start": (np.ones(9), [NAN] * 8)},
+    r"start\[0\]: .*needs 9 numbers": {"start": (np.ones(10), np.zeros(8))},
+    r"start\[1\]\[3\]: value nan": {"start": (np.ones(9), [0, 0, 0, NAN, 0, 0, 0, 0])},
     r"start\[0\]\[3:7\]: .*zero": {"start": (np.zeros(9), np.zeros(8))},
     "duration: value .*least <= most": {"duration": (0.5, 0.2)},
     r"duration: value \(1, 2, 3\)": {"duration": (1, 2, 3)},
@@ -55,6 +56,9 @@ PROBLEM = {
     "objective: .*'torqe'.*'torque'": {"objective": lambda p: p.torqe**2},
     r"objective: .*shape \(2, 1\)": {"objective": lambda p: p.torque},
     "objective: value 'least'": {"objective": lambda _: "least"},
+    "objective: .*nan, as float": {"objective": lambda p: float(p.torque[0])},
+    "objective: .* is nan": {"objective": lambda p: p.tail[0] * NAN + p.torque[0]},
+    r"path\[0\]: .* is nan": {"path": [(lambda p: float(p.torque[0]), 0, 1)]},
     r"path\[0\]: value \(3, 0, 1\)": {"path": [(3, 0, 1)]},
     r"path\[0\]: bounds \('0', 1\)": {"path": [(len, "0", 1)]},
     r"path\[0\]: bounds \(1.0, 0.0\)": {"path": [(len, 1, 0)]},
@@ -111,7 +115,7 @@ STOPS = {
     r"start: tail coordinate 0 is 1\.": {"start": ([*np.eye(7)[3], 1.5, 0, 0, 0], np.zeros(10))},
     r"goal\.tail: tail coordinate 1 is -1\.2": {"goal": Goal(tail=[0.0, -1.2, 0, 0])},
     "duration: value -1": {"goal": Goal(tail=[0.0, None, 0, 0]), "duration": -1},
-    "free_start.tail: tail coordinate 0": {"free_start": {"tail": (-1.5, 0.1)}},
+    "free_start.tail: tail coordinate 1": {"free_start": {"tail": (-1.5, 0.1)}},
     "design.tail_stop_lower": {"design": {"tail_stop_lower": (-1.0, -0.5)}},
 }
 
@@ -207,9 +211,13 @@ def test_models_that_lack_functions_are_refused():
     """A scene without derivatives takes the symbolic dynamics, unless that is refused."""
     names = ["mass_matrix", "inverse_dynamics", "forward_dynamics", "rollout", "energy", "momentum"]
     model = st.load(model_folder(1, 1, functions=names))  # the list of functions is the point
-    given = AGAIN | {"start": start(model), "intervals": 4}
+    given = AGAIN | {"start": start(model), "intervals": 4, "track": True}
+    plan, whole = (st.plan(each, **given).report for each in (model, zoo.model("m1_n1")))
+    assert plan["dynamics"] == "symbolic" and plan["converged"]
+    for name, most in (("tracked_tail_error_rad", 1e-4), ("tracked_attitude_error_deg", 1e-3)):
+        assert plan[name] == pytest.approx(whole[name], abs=most), name  # whose PFL is compiled
+    given["track"] = False
     plan = st.plan(model, **given)
-    assert plan.report["dynamics"] == "symbolic" and plan.report["converged"]
     path = ((lambda point: point.tip, 0, 1),)
     for body, error, words, changes in (
         (zoo.model("bare"), st.ModelError, "'inverse_dynamics'", {}),

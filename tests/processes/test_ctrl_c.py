@@ -12,6 +12,7 @@ import pytest
 
 import serpentail as st
 from tests.support import zoo
+from tests.support.rows import row
 from tests.support.told import besides_progress
 
 PROMPT = 1.0  # s
@@ -114,6 +115,30 @@ def test_a_command_ends_in_one_line_and_writes_what_there_is(child, tmp_path, ve
     motion = st.Trajectory.load(saved)
     assert len(motion.t) > 1 and np.isfinite(motion.q).all()
     assert set(tmp_path.iterdir()) == {scene, saved}
+
+
+WHILE_IMPORTING = f"""{HEAR}
+import os
+class Stop:
+    def find_spec(name, *_):
+        if name == sys.argv[1]:
+            os.kill(os.getpid(), signal.SIGINT)
+import serpentail  # by itself it imports what Python has imported already
+sys.meta_path.insert(0, Stop)
+from serpentail.cli import main
+sys.exit(main(["simulate", "kick"]))
+"""
+PARTS = ("argparse", "serpentail.errors", "serpentail.stages", "serpentail.commands.arguments")
+PARTS += ("serpentail.commands.motions", "serpentail.scenes.simulate", "numpy")
+
+
+def test_a_command_ends_in_a_line_at_most_while_it_imports(child):
+    running = {part: child("-c", WHILE_IMPORTING, part) for part in PARTS}
+    for part, process in running.items():
+        with row(part):
+            said, errors = process.communicate(timeout=PATIENCE)
+            assert (process.returncode, said) == (130, "")
+            assert errors in ("", "serpentail: interrupted\n")
 
 
 SLOW_CC = """#!/bin/sh

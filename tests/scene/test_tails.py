@@ -55,6 +55,14 @@ def test_links_and_arcs_of_a_cone_are_its_slices():
     assert arcs["arc_lengths"] == (0.1, 0.1)
 
 
+def test_links_and_arcs_of_a_mixed_taper_share_its_length_by_segments():
+    segments = [{"kind": "articulated", "links": 4}, {"kind": "continuum"}]
+    found = parameters(segments, "mixed", taper=CONE)
+    assert found["link_lengths"] == pytest.approx((0.025,) * 4)
+    assert np.ravel(found["arc_lengths"]) == pytest.approx([0.1])
+    assert np.ravel(found["arc_masses"]) == pytest.approx([quadrature(0.0025, 0.001, 0.1, 1200)[0]])
+
+
 def test_a_taper_may_have_a_mass_and_segments_their_lengths():
     taper = {"radii": [0.004, 0.001], "mass": "3 g"}
     segments = [{"links": 2, "length": 0.1}, {"links": 2, "link_lengths": "3, 5 cm"}]

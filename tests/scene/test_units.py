@@ -30,7 +30,8 @@ SHIFTS = [
     *(("mN m/rad", "N m/rad", -3), ("N mm/rad", "N m/rad", -3), ("N mm/s", "N m/s", -3)),
     *(("mN m/s", "N m/s", -3), ("kN/m", "N/m", 3), ("N/mm", "N/m", 3), ("kN/m^1.5", "N/m^1.5", 3)),
     *(("1/s", "1/s", 0), ("1/s2", "1/s^2", 0), ("deg", "deg", 0), ("rad", "rad", 0)),
-    ("rad/s", "rad/s", 0),
+    *(("rad/s", "rad/s", 0), ("kg cm2", "kg m^2", -4), ("N cm", "N m", -2)),
+    ("N cm/rad", "N m/rad", -2),
 ]
 ANGLES = [("deg", "rad", 1), ("deg/s", "rad/s", 1), ("rad", "deg", -1), ("N m/deg", "N m/rad", -1)]
 NUMBERS = some.decimals(-(10**9), 10**9, places=9) | some.floats(

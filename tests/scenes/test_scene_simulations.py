@@ -34,9 +34,11 @@ def test_kick_is_the_papers():
     """It starts at rest; simulation/test_ground.py has the figures of the motion itself."""
     scene, motion, summary = kick()
     expected = {"take_off_s": (0.404, 1e-3), "com_rise_m": (0.619, 1e-3), "apex_m": (0.632, 2e-3)}
-    expected |= {"recontact_s": (1.095, 2e-3), "peak_foot_force_N": (400, 40)}
+    expected |= {"recontact_s": (1.095, 2e-3), "peak_ground_force_s": (0.4, 1e-9)}
     for name, (value, tolerance) in expected.items():
         assert summary[name] == pytest.approx(value, abs=tolerance), name
+    of_pairs = np.add(*np.split(motion.contact.of("feet").forces, 2, axis=1))
+    assert np.linalg.norm(of_pairs, axis=-1).max() == pytest.approx(400, abs=40)
     pitch = st.pitch_roll_yaw(motion.q, unwrap=True)[:, 0]
     assert pitch[np.argmin(np.abs(motion.t - 0.5))] == pytest.approx(3.80, abs=0.01)
     assert pitch[np.argmin(np.abs(motion.t - 1.08))] == pytest.approx(18.7, abs=0.05)

@@ -35,7 +35,7 @@ def test_simulate_prints_one_json_object_and_saves_files_of_all_kinds(simulate):
         status, out, err = simulate(*sets, "--save", path, "--json", "-")
         assert (status, err, out.count("\n")) == (0, "", 1), path
     names = "take_off_s apex_m com_rise_m recontact_s pitch_at_end_rad upright_end steps cpu_s"
-    names += " peak_foot_force_N real_time_factor method"
+    names += " peak_ground_force_s real_time_factor method"
     assert set(names.split()) <= set(json.loads(out))
     saved = st.Trajectory.load("a.npz")
     assert saved.info["parameters"]["mu"] == 0.5 and saved.q[0, 2] == 0.12

@@ -83,6 +83,22 @@ def test_the_books_of_drops_balance(method):
             assert runs.audit.relative.max() < 100 * rtol
 
 
+def test_coarse_runs_that_are_millimetres_off_are_told():
+    model = grounded()
+    q, v = (each[1:] for each in dropped(model, 4))
+    how = FIXED | {"t_span": 0.6}
+    true = st.simulate(model, q, v, **how, method="tsit5", rtol=1e-10)
+    for method, settings in (
+        *(("implicit_euler", {"step": 1e-3}), ("implicit_euler", {"step": 1e-4})),
+        *(("rk4", {"step": 5e-4}), ("tsit5", {"rtol": 1e-2}), ("ros34pw2", {"rtol": 1e-2})),
+    ):
+        runs = st.simulate(model, q, v, **how, method=method, **settings)
+        off = np.abs(runs.q - true.q)[..., :3].max(axis=(1, 2))
+        with row(method, settings):
+            assert any("accounted" in each for told in runs.warnings for each in told)
+            assert off.max() > 1e-3
+
+
 def inner_energy(run):
     """Energy of a flight about its centre of mass, J."""
     mass = sum(tail().parameters[name] for name in ("torso_mass", "tail_mass"))

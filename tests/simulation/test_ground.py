@@ -44,7 +44,7 @@ def kick(model=None, **settings):
 
 def test_a_crouched_rat_comes_to_rest():
     flight, weight = crouched(), (0.10572 + 0.00351) * 9.8
-    assert flight.info["method"] == "ros34pw2" and "contact" in flight.info["reason"]
+    assert flight.info["method"] == "switching" and "contact" in flight.info["reason"]
     assert np.abs(flight.v[-1, :6]).max() < 1e-3 and np.abs(flight.v[-1, 6:]).max() < 1e-2
     assert flight.contact.forces[-1].sum(axis=0) == pytest.approx([0, 0, weight], abs=2e-3)
     assert st.pitch_roll_yaw(flight.q[-1])[0] / DEGREES == pytest.approx(12.8, abs=0.3)

@@ -4,20 +4,13 @@ import copy
 
 import numpy as np
 
-import serpentail as st
 from serpentail.verification import report as verify
 from serpentail.verification import states
 from serpentail_scene.signatures.signature import IMPLICIT
 from serpentail_scene.signatures.table import NEEDS, in_group
-from tests.support import zoo
 
 SLIGHT_FAULT = 1e-9
 TAKING_MORE = (*NEEDS, *in_group(IMPLICIT))  # functions of more than a state
-
-
-def alone(name):
-    """A model of the zoo that no other test has; after a large batch, small ones are in lanes."""
-    return st.load(zoo.folder(name))
 
 
 def failed(checks):

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import serpentail as st
 
-POINTS, HANGS, CRASHES, RAISES = 60, (33,), (9, 40), (12,)
+POINTS, HANGS, CRASHES, RAISES, SLEEPS = 60, (33,), (9, 40), (12,), (99,)
 
 
 def square(point):
@@ -18,12 +18,19 @@ def square(point):
     return {"square": point["x"] ** 2}
 
 
+def numbers(point):
+    """The numbers of a point."""
+    return {"told": [point["a"], point.get("d"), point["b"]]}
+
+
 def troubled(pause, log, point):
-    """Return twice a number; some numbers hang, crash or raise."""
+    """Return twice a number; some numbers take for ever, crash, raise or sleep."""
     number = point["number_of"]
     with Path(log).open("a") as stream:
         stream.write(f"{number}\n")
-    if number in HANGS:
+    while number in HANGS:
+        pass
+    if number in SLEEPS:
         time.sleep(1000)
     if number == CRASHES[0]:
         ctypes.string_at(0)
@@ -50,7 +57,7 @@ def main(folder, executor, pause):
     """Run the troubled sweep, and print its progress."""
     run = partial(troubled, pause, str(folder / "log"))
     over = {"number_of": st.grid(range(POINTS))}
-    found = st.sweep(None, over, run, store=folder / "s.db", limit=1.0, executor=executor)
+    found = st.sweep(None, over, run, store=folder / "s.rows", limit=1.0, executor=executor)
     print(found.status())
 
 

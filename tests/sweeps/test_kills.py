@@ -1,69 +1,88 @@
 """The store of a sweep: each row once, whole, by one writer, also where parts are killed."""
 
+import os
 import resource
 import signal
-import sqlite3
 import subprocess
 import sys
 import time
 from collections import Counter
-from contextlib import closing, contextmanager
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.sweeps.store import Row, Store
+from serpentail.sweeps.shards import Row, Shard
+from serpentail.sweeps.store import Store
 from tests.support import swept
 from tests.support.rows import row
+
+parquet = pytest.importorskip("pyarrow.parquet")
 
 ROOT = Path(__file__).parents[2]
 PATIENCE = 120  # s
 FAILED = {*swept.HANGS, *swept.CRASHES, *swept.RAISES}
+SPEC = {"family": [], "grids": [[["x"], ["1", "2"]]], "spreads": [], "points": 1, "seed": 0}
+SPEC |= {"models": [""], "varied": []}
 
 
-ROW = Row("k", '{"x":1}', '{"y":2}', None, 0.5)
+def shard(*numbers, failed=()):
+    told = [(None, "wrong") if n in failed else (f'{{"y":{n}}}', None) for n in numbers]
+    return Shard.of([Row(n, *each, 0.5) for n, each in zip(numbers, told, strict=True)])
 
 
-def test_a_row_that_is_there_stays_and_rows_are_written_all_or_none(tmp_path):
-    store = Store(tmp_path / "s.db")
-    with pytest.raises(st.NotWritten):
-        store.add([ROW, Row("l", None, None, None, 0.1)])  # a row without a point
-    assert store.known("kl") == {}
-    store.add([ROW, Row("l", "{}", None, "wrong", 0.1)])
-    store.add([ROW._replace(outcome='{"y":3}'), Row("m", "{}", "{}", None, 0.1)])
-    assert store.rows(["k"]) == {"k": ROW}
-    assert store.known(["k", "l", "n"]) == {"k": True, "l": False}
-    store.close()
-    with closing(Store(tmp_path / "s.db")) as again:
-        assert set(again.rows("klmn")) == set("klm")
-        again.forget(["l"])
-        assert again.known("klm") == {"k": True, "m": True}
-        again.add([ROW._replace(key=str(k)) for k in range(1203)])
-        assert len(again.rows(map(str, range(1203)))) == 1203
+def numbers_of(store):
+    store.look()
+    return [row.number for row in store.rows()]
+
+
+def test_rows_are_read_in_order_and_once_and_can_be_forgotten(tmp_path):
+    """Also if a worker that was thought to be lost wrote its shard after others did its work."""
+    for path in (None, tmp_path / "s"):
+        store = Store(path, SPEC, 300_000)
+        with row(path), store.writing():
+            for part in (shard(7, 9, 250_000, failed=[9]), shard(*range(7)), shard(8, failed=[8])):
+                store.accept(part)
+            assert numbers_of(store) == [*range(10), 250_000] and store.failed == 2
+            assert store.row(9) == Row(9, None, "wrong", 0.5) and store.row(10) is None
+            assert np.flatnonzero(store.done).tolist() == numbers_of(store)
+            store.forget()
+            store.forget([3, 250_000])
+            assert numbers_of(store) == [0, 1, 2, 4, 5, 6, 7] and store.failed == 0
+    shard(6, 7, 8).written(store.folder)
+    again = Store(path, SPEC, 300_000)
+    assert numbers_of(again) == [0, 1, 2, 4, 5, 6, 7]
+    (path / "not.parquet").touch()
+    with again.writing():
+        again.accept(shard(8))
+        shard(8, 9).written(store.folder)
+    assert [each.name[:17] for each in sorted(path.glob("*/*/0*8*.parquet"))] == [f"{8:08}-{8:08}"]
+    assert numbers_of(Store(path, SPEC, 300_000)) == [0, 1, 2, 4, 5, 6, 7, 8]
+    for file in path.rglob("00000008*.parquet"):
+        file.write_bytes(b"no rows")
+    with pytest.raises(st.SweepError, match=r"0*8-.*cannot be read.*delete it"):
+        numbers_of(Store(path, SPEC, 300_000))
 
 
 def test_one_process_writes_and_other_files_are_refused(tmp_path):
-    with closing(Store(tmp_path / "s.db")) as first, closing(Store(tmp_path / "s.db")) as second:
-        with first.writing():
-            with pytest.raises(st.SweepError, match="another process is writing"), second.writing():
-                pass
-            first.add([ROW])
-            assert second.known("k") == {"k": True}  # who reads may
-        with second.writing():
+    first, second = (Store(tmp_path / "s", SPEC, 2) for _ in range(2))
+    with first.writing():
+        with pytest.raises(st.SweepError, match="another process is writing"), second.writing():
             pass
-    (tmp_path / "text.db").write_text("no database at all, but a text of some length\n" * 50)
-    with closing(sqlite3.connect(tmp_path / "other.db")) as other:
-        other.execute("create table t (x)")
-        other.commit()
-    for words, name in (
-        ("not a store", "text.db"),
-        ("another program's", "other.db"),
-        ("folder", "."),
-    ):
+        first.accept(shard(1))
+        second.look()
+        assert numbers_of(second) == [1]  # who reads may
+    with second.writing():
+        pass
+    (tmp_path / "old.db").write_text("SQLite format 3")
+    for words, name in (("is a file, of an earlier version", "old.db"), ("of other files", ".")):
         with row(words), pytest.raises(st.SweepError, match=words):
-            Store(tmp_path / name)
+            Store(tmp_path / name, SPEC, 2)
 
 
 def driver(folder, executor, **settings):
@@ -78,14 +97,12 @@ def driver(folder, executor, **settings):
 
 
 def rows(folder):
-    path = folder / "s.db"
-    if not path.exists():
-        return []
-    with closing(sqlite3.connect(f"file:{path}?mode=ro", uri=True, timeout=10)) as base:
-        try:
-            return base.execute("select point, outcome, error from rows").fetchall()
-        except sqlite3.OperationalError:  # it is being made
-            return []
+    """Read all shards as another program does: number, outcome, error."""
+    found = []
+    for path in (folder / "s.rows").glob("*/*/[0-9]*.parquet"):
+        columns = parquet.read_table(path).to_pydict()
+        found += zip(columns["number"], columns["outcome"], columns["error"], strict=True)
+    return found
 
 
 def wait_for(count, folder, process):
@@ -96,8 +113,13 @@ def wait_for(count, folder, process):
     assert process.poll() is None, process.communicate()
 
 
-def number_of(point):
-    return int(point.split(":")[1][:-1])
+def settled(folder):
+    """Wait until workers whose driver is gone write no more, and return the rows."""
+    found = None
+    while found != set(rows(folder)):
+        found = set(rows(folder))
+        time.sleep(3)
+    return found
 
 
 def logged(folder):
@@ -114,23 +136,24 @@ def finish(folder, executor):
     counts = logged(folder)
     assert driver(folder, executor).communicate(timeout=PATIENCE)[0] == told
     assert logged(folder) == counts
-    found = {number_of(point): (outcome, error) for point, outcome, error in rows(folder)}
+    found = {number: told for number, *told in rows(folder)}
     assert sorted(found) == list(range(swept.POINTS)) and len(rows(folder)) == swept.POINTS
     for number, (outcome, error) in found.items():
         assert (error is not None) == (number in FAILED), (number, error)
         assert outcome == (None if number in FAILED else f'{{"twice": {2 * number}}}')
     assert all(found[n][1].startswith("TimeLimit") for n in swept.HANGS)
     assert all(found[n][1].startswith("ProcessEnded") for n in swept.CRASHES)
-    with closing(sqlite3.connect(folder / "s.db")) as base:
-        assert base.execute("pragma integrity_check").fetchone() == ("ok",)
     return counts
 
 
-def check_full(folder, executor):
-    """No file may grow beyond a few rows, as on a full disk."""
-    few = (36_000, 36_000)
-    limited = {"preexec_fn": lambda: resource.setrlimit(resource.RLIMIT_FSIZE, few)}
-    process = driver(folder, executor, **limited)
+def few_rows():
+    """Let no file be larger than a shard of few rows."""
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1450, 1450))
+
+
+def check_full(folder, executor, **settings):
+    """A full disk, for the driver or for workers, ends the sweep in one line."""
+    process = driver(folder, executor, **settings)
     _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 1
     told = errors.splitlines()[-1]
@@ -138,10 +161,37 @@ def check_full(folder, executor):
     assert 0 < len(rows(folder)) < swept.POINTS
 
 
+def killed_at_rename(path):
+    """Have this process die where it would give a file of rows its name."""
+
+    def die(*_):
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    if not path.exists():
+        path.touch()
+        Path.replace = die
+
+
+def test_a_worker_that_dies_between_write_and_rename_leaves_no_row(tmp_path):
+    """The block is made by the next call, and the part of its file is no shard."""
+    given = {"over": {"x": st.grid([3, 4, 5])}, "run": swept.square, "store": tmp_path / "s.rows"}
+    once, spawn = tmp_path / "once", get_context("spawn")
+    for died in (True, False):
+        with ProcessPoolExecutor(1, spawn, killed_at_rename, (once,)) as pool:
+            if died:
+                with pytest.raises(st.SweepError, match="its workers are gone"):
+                    st.sweep(None, **given, executor=pool)
+                assert rows(tmp_path) == [] and [*tmp_path.rglob(".*.parquet.*.part")]
+            else:
+                found = st.sweep(None, **given, executor=pool)
+    assert sorted(rows(tmp_path)) == [(k, f'{{"square": {(k + 3) ** 2}}}', None) for k in range(3)]
+    assert found.spent.points == 3 and st.sweep(None, **given).spent.points == 0
+
+
 @pytest.mark.slow
 def test_a_full_disk_kills_and_ctrl_c_keep_the_rows(tmp_path):
     """On the same rows, one after the other: none is lost, and none that is there made again."""
-    check_full(tmp_path, "processes:2")
+    check_full(tmp_path, "processes:2", preexec_fn=few_rows)
     kept = {}
     for ending in (signal.SIGKILL, signal.SIGKILL, signal.SIGINT):
         count = len(rows(tmp_path)) + 5
@@ -151,25 +201,26 @@ def test_a_full_disk_kills_and_ctrl_c_keep_the_rows(tmp_path):
         process.communicate(timeout=PATIENCE)  # ends when its processes have, which hold its pipes
         assert process.returncode and count <= len(rows(tmp_path)) < swept.POINTS
         begun = logged(tmp_path)
-        kept = {number_of(p): begun[number_of(p)] for p, *_ in rows(tmp_path)} | kept
+        kept = {number: begun[number] for number, *_ in rows(tmp_path)} | kept
     counts = finish(tmp_path, "processes:2")
     assert all(counts[number] == count for number, count in kept.items())
 
 
 @contextmanager
-def cluster(folder):
+def cluster(folder, limited=None):
     """Yield the name of Dask's scheduler, the scheduler and workers, as real processes, and what
-    starts a worker, one without a nanny.
+    starts a worker, one without a nanny. limited: called in each worker first.
     """
     file, parts = folder / f"{time.monotonic_ns()}.json", []
 
-    def begin(kind, *options):
+    def begin(kind, *options, **settings):
         command = [sys.executable, "-m", f"distributed.cli.dask_{kind}", "--no-dashboard", *options]
         command += ["--scheduler-file", file, "--host", "127.0.0.1"]
-        with file.with_suffix(".log").open("a") as log:
-            parts.append(subprocess.Popen(command, cwd=ROOT, stdout=log, stderr=log))
+        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        parts.append(subprocess.Popen(command, cwd=ROOT, **quiet, **settings))
 
     worker = partial(begin, "worker", "--nthreads", "1", "--no-nanny", "--death-timeout", "60")
+    worker = partial(worker, preexec_fn=limited)
     begin("scheduler", "--port", "0", "--no-show")
     try:
         worker()
@@ -195,7 +246,7 @@ def test_dask_survives_kills_of_all_its_parts_and_a_full_disk(tmp_path):
         worker()
         process.kill()
         process.communicate(timeout=PATIENCE)
-        kept = set(rows(tmp_path))
+        kept = settled(tmp_path)
         process = driver(tmp_path, name)
         wait_for(len(kept) + 5, tmp_path, process)
         parts[0].kill()  # the scheduler
@@ -203,5 +254,7 @@ def test_dask_survives_kills_of_all_its_parts_and_a_full_disk(tmp_path):
         assert process.returncode == 1 and "its workers are gone" in errors.splitlines()[-1], errors
         assert kept < set(rows(tmp_path)) and len(rows(tmp_path)) < swept.POINTS
     with cluster(tmp_path) as (name, *_):
-        check_full(tmp_path, name)
         finish(tmp_path, name)
+    (tmp_path / "full").mkdir()
+    with cluster(tmp_path, few_rows) as (name, *_):
+        check_full(tmp_path / "full", name)

@@ -59,7 +59,7 @@ def told(capsys, *arguments):
 def test_the_command_makes_the_rows_of_a_scene_and_goes_on(study, capsys):
     status, _, err = told(capsys, study, "--status")
     assert status == 2 and "is not there yet" in err
-    wanted = {"points": 8, "done": 8, "failed": 0, "store": str(study.with_suffix(".db"))}
+    wanted = {"points": 8, "done": 8, "failed": 0, "store": str(study.with_suffix(".rows"))}
     assert told(capsys, study) == (0, wanted, "")
     rows, page = study.with_name("rows.csv"), study.with_name("page.html")
     extra = ("--export", rows, "--row", 5, "--view", page)
@@ -98,8 +98,13 @@ def test_rows_are_saved_for_other_tools(study):
 
 def test_shapes_and_parameters_of_links_make_models_of_their_own(study):
     axes = {("segments", "links"): st.grid([(1, 1), (2, 1)]), "start.height": st.grid([0.1, 0.2])}
-    found = st.sweep(study, axes, outputs=["q_end"])
-    assert [len(row["q_end"]) for row in found.rows()] == [9, 9, 11, 11]
+    store = study.with_suffix(".rows")
+    found = st.sweep(study, axes, outputs=["q_end"], store=store)
+    assert [len(row["q_end"]) for row in found] == [9, 9, 11, 11]
+    again = dict(reversed(axes.items())) | {("segments", "links"): st.grid([(2, 1), (1, 1)])}
+    again = st.sweep(study, again, outputs=["q_end"], store=store)  # another order, the same rows
+    assert again.spent.points == 0
+    assert [row["q_end"] for row in again] == [found[k]["q_end"] for k in (2, 0, 3, 1)]
     first = found[0]["q_end"][2]
     assert found[1]["q_end"][2] == pytest.approx(first + 0.1, abs=1e-6)
     axes = {"tail_damping": st.grid([1e-5, 1e-3])}  # there is other code for these
@@ -141,7 +146,7 @@ def test_what_cannot_be_is_told_before_anything_runs(study, capsys, monkeypatch)
     for row in ("8", "-1"):
         status, out, err = told(capsys, study, "--row", row, "--view", page)
         assert status == 2 and out is None and f"row {row}: there are 8, 0 to 7" in err
-    assert not study.with_suffix(".db").exists()
+    assert not study.with_suffix(".rows").exists()
     found = st.sweep(study, {"tail_mass": st.grid([0.003])})
     for row in (1, -1, True, 0.0):
         with pytest.raises(st.SweepError, match=f"row {row}: there are 1, 0 to 0"):
@@ -187,7 +192,7 @@ def test_each_row_is_an_identification(recordings, worker, tmp_path):
 
 def test_rows_depend_on_what_is_in_the_files(recordings, worker, tmp_path):
     copies, gone = [shutil.copy(path, tmp_path) for path in recordings], tmp_path / "gone.csv"
-    given = {"store": tmp_path / "rows.db", "executor": worker}
+    given = {"store": tmp_path / "rows", "executor": worker}
     assert [swept(copies, **given).spent.points for _ in range(2)] == [2, 0]
     shutil.copy(copies[0], copies[1])
     assert swept(copies, **given).spent.points == 1
@@ -210,7 +215,7 @@ def test_a_scene_asks_for_them(recordings, tmp_path, capsys):
     assert cli.main(["sweep", str(study), "--executor", "processes:1"]) == 0
     assert capsys.readouterr().out.startswith("4 of 4 points done, 0 of them failed")
     axes = {"data": st.grid([first, [second]]), "noise": st.grid([1e-3, 1e-4])}
-    rows = st.sweep(study, axes, "identify", store=study.with_suffix(".db"))
+    rows = st.sweep(study, axes, "identify", store=study.with_suffix(".rows"))
     assert rows.spent.points == 0
     for k, mass in enumerate(recordings.values()):
         wide, narrow = (rows[2 * k + i]["parameters"]["tail_mass"] for i in (0, 1))

@@ -1,8 +1,6 @@
-"""Points of sweeps: grids, and points that fill what they are spread in. Rows are what the runs
-themselves return, however and wherever they are made.
-"""
+"""Rows of sweeps are what the runs themselves return, however and wherever they are made."""
 
-import math
+import tracemalloc
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import nullcontext
 from functools import partial
@@ -10,13 +8,13 @@ from multiprocessing import get_context
 
 import numpy as np
 import pytest
-from scipy.stats import kstest
 
 import serpentail as st
 from serpentail.sweeps import driver, supervision
-from serpentail.sweeps.axes import axes_of
 from serpentail.sweeps.executors import Place
 from serpentail.sweeps.result import Status
+from serpentail.sweeps.shards import Row, Shard
+from serpentail.sweeps.sweep import posed
 from tests.support import swept, zoo
 from tests.support.rows import row as named
 
@@ -63,22 +61,6 @@ def test_all_executors_make_the_same_rows():
         assert not supervision._all and not supervision._idle  # none is left of its own
 
 
-def test_points_that_hang_crash_or_raise_are_rows(worker, tmp_path):
-    run = partial(swept.troubled, 0.0, str(tmp_path / "log"))
-    failing = {swept.HANGS[0]: "TimeLimit", swept.RAISES[0]: "ValueError: no such number"}
-    failing |= dict.fromkeys(swept.CRASHES, "ProcessEnded")
-    over = {"number_of": st.grid([1, *failing, 2])}
-    found = st.sweep(None, over, run, limit=1.0, executor=worker)
-    for row in found.rows():
-        if row["number_of"] in failing:
-            assert row["error"].startswith(failing[row["number_of"]])
-        else:
-            assert row["error"] is None and row["twice"] == 2 * row["number_of"]
-    log = (tmp_path / "log").read_text().split()
-    crashed = [log.count(str(number)) for number in swept.CRASHES]
-    assert crashed == [2, 2] and log.count(str(swept.HANGS[0])) == 1 and found.status().failed == 4
-
-
 class Forgetful(ThreadPoolExecutor):
     """Loses the first blocks that it gets."""
 
@@ -121,18 +103,47 @@ def test_a_block_that_a_worker_lost_runs_again_and_an_executor_that_is_gone_is_n
 
 
 def test_a_second_call_runs_what_is_missing_only(tmp_path):
-    store = tmp_path / "rows.db"
+    store = tmp_path / "rows"
     first = flights(2, store=store)
     again = flights(2, store=store)
     assert again.spent.points == 0 and again.rows() == first.rows()
     more = flights(4, store=store)  # Sobol's first points stay
     assert more.spent.points == 4 and more.status() == Status(8, 8, 0)
+    assert [more[k] | {"number": 0} for k in (0, 5)] == [first[k] | {"number": 0} for k in (0, 3)]
     assert flights(2, model().with_parameters(torso_mass=0.2), store=store).spent.points == 4
+
+
+def test_other_grids_orders_and_numbers_of_points_keep_the_rows_they_have(worker, tmp_path):
+    """A Latin hypercube of another number of points has other points."""
+    give = partial(st.sweep, None, run=swept.numbers, store=tmp_path / "rows", executor=worker)
+    a, b, pair = st.grid([1, 2]), st.random(0, 1), st.grid([(1, "x"), (2, "y")])
+    for over, points, made in (
+        ({"a": a, "c,d": pair, "b": b}, 3, 12),
+        ({"c, d": pair, "a": st.grid([3, 2]), "b": b}, 4, 16 - 2 * 3),
+        ({"a": st.grid([1, 2, 3]), "c,d": pair, "b": b}, 2, 0),
+        ({"a": a, "c,d": pair, "b": st.random(0, 2)}, 2, 8),
+        ({"a": a, "b": st.latin(0, 1)}, 4, 8),
+        ({"a": a, "b": st.latin(0, 1)}, 3, 6),
+    ):
+        found = give(over, points=points)
+        with named((list(over), points)):
+            assert found.spent.points == made
+            for k, row in enumerate(found):
+                assert row["number"] == k and row["told"] == [row["a"], row.get("d"), row["b"]]
+    assert give({"a": a, "b": b}, points=4, seed=1).spent.points == 8
+
+
+def test_rows_of_workers_that_do_not_see_the_store_are_written_here(worker, tmp_path, monkeypatch):
+    monkeypatch.setattr(supervision.ShardFolder, "is_here", lambda _: False)
+    given = {"over": {"x": st.grid([3, 4])}, "run": swept.square, "store": tmp_path / "rows"}
+    for points in (2, 0):
+        found = st.sweep(None, **given, executor=worker)
+        assert found.spent.points == points and [row["square"] for row in found] == [9, 16]
 
 
 def test_failures_are_rows_and_can_be_run_again(tmp_path):
     axes = {"tail_mass": st.grid([0.003, -1.0]), "v0": st.random(LOW, HIGH)}
-    given = {"points": 4, "settings": SETTINGS, "store": tmp_path / "rows.db"}
+    given = {"points": 4, "settings": SETTINGS, "store": tmp_path / "rows"}
     found = st.sweep(model(), axes, **given)
     assert found.status() == Status(8, 8, 4)
     assert str(found.status()) == "8 of 8 points done, 4 of them failed, 0 left"
@@ -144,7 +155,7 @@ def test_failures_are_rows_and_can_be_run_again(tmp_path):
 
 def test_functions_are_run_with_and_without_a_model_and_tell_progress(worker, tmp_path):
     """What their rows depend on is part of their keys."""
-    given = {"store": tmp_path / "s.db", "executor": worker}
+    given = {"store": tmp_path / "s", "executor": worker}
     for of, points in (("1", 2), ("1", 0), ("2", 2)):
         found = st.sweep(None, {"x": st.grid([3, 4])}, swept.square, of=of, **given)
         assert found.spent.points == points
@@ -208,80 +219,22 @@ def test_what_cannot_be_is_refused_in_one_line():
         assert "\n" not in str(caught.value)
 
 
-def points(over, count=None, seed=0):
-    return list(axes_of(over, count, seed))
-
-
-def test_grids_give_all_combinations_in_order():
-    over = {"a": st.grid([1, 2]), ("b", "c"): st.grid([(3, "x"), (4, "y")])}
-    wanted = [(1, 3, "x"), (1, 4, "y"), (2, 3, "x"), (2, 4, "y")]
-    assert points(over) == [dict(zip("abc", values, strict=True)) for values in wanted]
-    assert len(axes_of(over, None, 0)) == 4
-    assert points({"b, c": st.grid([(3, 4)])}) == [{"b": 3, "c": 4}]
-
-
-def test_units_become_those_of_the_names_that_have_one():
-    axes = axes_of({"m, word": st.grid([("2 g", "2nd"), (0.1, "3 s")])}, None, 0)
-    found = [{"m": 0.002, "word": "2nd"}, {"m": 0.1, "word": "3 s"}]
-    assert list(axes.measured({"m": "kg"})) == found
-    spread = axes_of({"m": st.random("2 g", "3 g")}, 4, 0)
-    for unit in ("kg", None):
-        assert all(0.002 <= p["m"] <= 0.003 for p in spread.measured({"m": unit}))
-    for wrong in ({"word": "s"}, {"word": None}):
-        with pytest.raises(st.SweepError, match="over: word: value '2nd'"):
-            axes.measured(wrong)
-    with pytest.raises(st.SweepError, match="over: m: value '2 g': a mass where a length"):
-        spread.measured({"m": "m"})
-
-
-def test_points_are_uniform_and_the_same_again():
-    for name, way in {"random": st.random, "latin": st.latin, "sobol": st.sobol}.items():
-        over = {"a": way([0, 10], [1, 30]), "b": way(1e-3, 1e3, "log"), "c": st.grid([1, 2])}
-        found = points(over, 256, 3)
-        with named(name):
-            assert len(found) == 512 and found == points(over, 256, 3) != points(over, 256, 4)
-            # the points that are spread are the same at each place of the grid
-            assert [{**p, "c": 0} for p in found[:256]] == [{**p, "c": 0} for p in found[256:]]
-            columns = [
-                [p["a"][0] for p in found[:256]],
-                [(p["a"][1] - 10) / 20 for p in found[:256]],
-                [(math.log10(p["b"]) + 3) / 6 for p in found[:256]],
+def test_exports_and_iteration_hold_few_rows(tmp_path):
+    count = 20_000
+    found = posed(None, {"x": st.grid(range(count))}, swept.square, tmp_path / "rows")
+    with found.store.writing():
+        for first in range(0, count, 10_000):
+            told = [
+                Row(k, f'{{"square": {k * k}}}', None, 0.1) for k in range(first, first + 10**4)
             ]
-            for column in columns:
-                assert kstest(column, "uniform").pvalue > 1e-3
-                if name != "random":  # each of 256 equal parts has one point
-                    assert sorted(int(256 * x) for x in column) == list(range(256))
-            assert abs(np.corrcoef(columns) - np.eye(3)).max() < 0.2
-    for count in (1, 2, 5):  # Sobol's points may be any number
-        assert len(points({"a": st.sobol(0, 1)}, count)) == count
-
-
-def test_points_that_cannot_be_are_refused_in_one_line():
-    one = {"a": st.random(0, 1)}
-    for words, make in {
-        "grid: value 3": lambda: st.grid(3),
-        "grid: value 'ab'": lambda: st.grid("ab"),
-        "grid: no values": lambda: st.grid([]),
-        "grid: value nan": lambda: st.grid([float("nan")]),
-        "random: low: value '2 apples'": lambda: st.random("2 apples", 3),
-        "random: low: value 1": lambda: st.random(1, 0),
-        "random: low: value 0: .*above 0": lambda: st.random(0, 1, "log"),
-        "latin: law: value 'normal'": lambda: st.latin(0, 1, "normal"),
-        r"low is \(2,\), high is \(\)": lambda: st.sobol([0, 0], 1),
-        "over: value {}": lambda: points({}),
-        "over: value 3": lambda: points({3: st.grid([1])}),
-        r"over\['a'\]: value 3": lambda: points({"a": 3}),
-        r"over\['a, b'\]: value": lambda: points({"a, b": st.random(0, 1)}, 3),
-        "over: a, b: value 1: needs 2": lambda: points({("a", "b"): st.grid([1])}),
-        "'a' twice": lambda: points({"a": st.grid([1]), ("a",): st.grid([2])}),
-        "'b' twice": lambda: points({"a, b": st.grid([[1, 2]]), "b": st.grid([2])}),
-        "latin and random": lambda: points(one | {"b": st.latin(0, 1)}, 3),
-        "points: no value": lambda: points(one),
-        "points: value 3": lambda: points({"a": st.grid([1])}, 3),
-        "points: value 0": lambda: points(one, 0),
-        "seed: value -1": lambda: points(one, 3, -1),
-        "points: value 1000000000": lambda: points(one, 10**9),
-    }.items():
-        with named(words), pytest.raises(st.SweepError, match=words) as caught:
-            make()
-        assert "\n" not in str(caught.value)
+            found.store.accept(Shard.of(told))
+    for name in ("rows.csv", "rows.parquet", None):
+        tracemalloc.start()
+        try:
+            if name:
+                found.save(tmp_path / name)
+            else:
+                assert sum(row["square"] == row["x"] ** 2 for row in found) == count
+            assert tracemalloc.get_traced_memory()[1] < 5.5e6  # all rows have 8 MB
+        finally:
+            tracemalloc.stop()

@@ -15,7 +15,7 @@ from serpentail_codegen.functions.catalogue import CATALOGUE
 from serpentail_scene.signatures.table import AIRBORNE, DERIVATIVES, NEEDS
 from tests.references import metrics
 from tests.support import models, zoo
-from tests.support.faults import TAKING_MORE, alone, broken, failed, not_a_number
+from tests.support.faults import TAKING_MORE, broken, failed, not_a_number
 from tests.support.rows import row
 from tests.verification import verify_model
 
@@ -52,7 +52,7 @@ def missing_in(model, reason):
 def test_laws_hold_for_other_animals():
     for name, numbers in OTHER_NUMBERS.items():
         with row(name):
-            checks = verify.laws(alone(name).with_parameters(**numbers))
+            checks = verify.laws(zoo.own(name).with_parameters(**numbers))
             assert failed(checks) == set()
             assert len({c.name for c in checks}) == len(checks) == len(verify.LAWS)
 
@@ -65,12 +65,32 @@ def test_long_tails_and_long_segments_pass(segments, links):
     assert [c for c in checks if not c.passed] == []
 
 
+def test_batches_in_lanes_are_singles_but_for_rounding(monkeypatch):
+    """Compiled as a user's are, where other operations are fused; else one bit is a fault."""
+    monkeypatch.setenv("CC", "cc")
+    for profile, lanes, fault in (
+        ("fast", False, 3e-16),
+        ("fast", True, 1e-9),
+        ("reproducible", True, 3e-16),
+    ):
+
+        def last_only(x, q, *_, fault=fault):
+            return x * (1 + fault * (np.arange(len(x)) == 8)[:, None]) if q.ndim == 2 else x
+
+        model = st.load(zoo.folder("bare"), profile=profile)
+        assert not lanes or model.batch_library.entry("forward_dynamics", 1000)
+        with row(profile, lanes):
+            assert failed(verify.laws(model)) == set()
+            faulty = broken(model, "forward_dynamics", last_only)
+            assert "batches are singles" in failed(verify.laws(faulty))
+
+
 # Reports
 
 
 def test_what_was_left_out_is_said():
     pytest.importorskip("pinocchio")
-    model = alone("bare")
+    model = zoo.own("bare")
     checks = verify_model.judge(model)
     omitted = {c.name: c.omitted for c in checks if c.omitted}
     assert omitted["kinetic energy is half v H v"] == "not generated: mass_matrix, energy"
@@ -105,7 +125,7 @@ def test_a_model_of_one_function_is_checked():
 
 
 def test_summary_is_strict_json():
-    model = alone("m1_n1")
+    model = zoo.own("m1_n1")
     for faulty in (True, False):
         judged = broken(model, "bias_force", not_a_number) if faulty else model
         told = verify.summary(judged, verify.laws(judged))

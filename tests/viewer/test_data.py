@@ -73,7 +73,7 @@ def test_the_kick_is_whole_and_below_1_mb(tmp_path, kick):
 def check_words(data, run, kick):
     numbers, summary = dict(run["numbers"]), told(kick)
     assert numbers["samples"] == "1201" and numbers["landed, and stands at the end"] == "no"
-    said = "largest force of the ground at the samples"
+    said = "largest force of the ground"
     for label, name in (
         *(("take-off (s)", "take_off_s"), ("highest torso (m)", "apex_m")),
         *((f"{said} (N)", "peak_ground_force_N"), ("tilt at the end (deg)", "tilt_end_deg")),

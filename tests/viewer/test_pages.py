@@ -214,7 +214,7 @@ def test_without_a_page_a_line_says_why(flight, monkeypatch, tmp_path):
         output = Output(thing)
         assert output.frame is None and words in output.words
         assert output.words.startswith(repr(thing))
-    odd = dataclasses.replace(loaded, info={"events": 3, "warnings": {"a": 1}, "method": None})
+    odd = dataclasses.replace(loaded, info={"method": None})
     assert Output(odd).words.startswith("<Trajectory of a tail")
     monkeypatch.setattr(viewer, "PAGE", tmp_path / "none.html")
     assert "not built" in Output(flight).words

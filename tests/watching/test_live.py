@@ -73,7 +73,7 @@ def test_a_run_is_shown_where_it_has_come_to(view):
     assert view.url.startswith("http://127.0.0.1:")
 
 
-def test_a_plan_is_shown_at_nine_moments_without_legs_or_ground(view):
+def test_a_plan_is_shown_at_nine_moments_without_legs_or_ground(view, capfd):
     q, v = np.r_[0, 0, 0.3, 1, 0.2, [0] * 4], np.r_[0, 0, 1, 1, [0] * 4]
     rough = {"intervals": 4, "tolerance": None, "solver": "fatrop", "track": False}
     limits = {"duration": 0.2, "bounds": st.Bounds(angle=1.0)}
@@ -89,6 +89,7 @@ def test_a_plan_is_shown_at_nine_moments_without_legs_or_ground(view):
         assert len(alone.nodes["tail"].batched_positions) == 3
         grounds = [each.server.scene.get_handle_by_name("/ground") for each in (alone, view)]
         assert grounds[0] is None and grounds[1] is not None
+    assert capfd.readouterr().out == ""
 
 
 def test_rods_lie_between_their_points():

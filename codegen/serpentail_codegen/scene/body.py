@@ -88,7 +88,8 @@ def body_of(table: Any, parameters: Any) -> Body:
     named = parameters if isinstance(parameters, Mapping) else {}
     if not isinstance(table, Mapping):
         return Body(problems=(Problem("body", table, "needs a table: scale or mass, torso"),))
-    problems = [Problem(f"body.{key}", table[key], _unknown(key)) for key in set(table) - {*KEYS}]
+    unknown = [key for key in table if key not in KEYS]
+    problems = [Problem(f"body.{key}", table[key], suggest(key, KEYS)) for key in unknown]
     if "scale" in table and "mass" in table:
         remedy = "given together with scale: each decides the size; remove one of the two"
         problems.append(Problem("body.mass", table["mass"], remedy))
@@ -96,11 +97,6 @@ def body_of(table: Any, parameters: Any) -> Body:
     mass = _number("body.mass", table.get("mass"), "kg", (1e-9, 1e9), problems)
     torso = _torso(table["torso"], named, problems) if "torso" in table else None
     return Body(scale, mass, torso, tuple(problems))
-
-
-def _unknown(key: object) -> str:
-    """Return a problem for each key that a table `body` cannot have."""
-    return suggest(str(key), KEYS) or f"unknown; needs {', '.join(KEYS)}"
 
 
 def _number(
@@ -126,7 +122,7 @@ def _torso(
 ) -> Mapping[str, Value] | None:
     """Return mass, inertia and contact ellipsoid of a torso of uniform density."""
     shape = table.get("shape") if isinstance(table, Mapping) else None
-    if shape not in TORSOS:
+    if not isinstance(shape, str) or shape not in TORSOS:
         names = " or ".join(map(repr, TORSOS))
         remedy = f"needs a table with shape ({names}), its lengths, and density"
         problems.append(Problem("body.torso", table, remedy))

@@ -9,7 +9,7 @@ from serpentail_scene.units import in_unit
 from .checks import is_finite
 from .parameters import ANY, NOT_NEGATIVE, POSITIVE, Rule
 from .problems import Problem, suggest
-from .scene import COUNT
+from .scene import COUNT, MOST_LINKS
 
 Numbers = Mapping[str, tuple[float, ...]]  # the numbers of a table by key, in SI units
 PIECES = {"articulated": "links", "continuum": "samples"}
@@ -82,10 +82,10 @@ def count_of(
     """
     own = isinstance(table, Mapping) and "links" in table and kind == "articulated"
     count: Any = table["links"] if own else pieces.get(kind)
-    if COUNT.holds(count):
+    if COUNT.holds(count) and count <= MOST_LINKS:
         return int(count)
     field = f"{place}.links" if own or kind not in pieces else PIECES[kind]
-    problems.append(Problem(field, count, f"needs {COUNT.text}"))
+    problems.append(Problem(field, count, f"needs {COUNT.text}, up to {MOST_LINKS}"))
     return 1
 
 

@@ -96,6 +96,7 @@ def described(
             problems += _lacking(place, given)
     else:
         problems += _beside_taper(places, values, whole)
+        values, whole = _shared(values, whole) if kind == "mixed" else (values, whole)
     try:
         if not problems:
             made = _all_links(values, sizes, None if taper is None else whole)
@@ -212,6 +213,17 @@ def _cone(lengths: tuple[float, ...], given: Numbers) -> Links:
     """Return the links of a cone of given density or mass."""
     density = given.get("density") or (given["mass"][0] / volume(given["radii"], sum(lengths)),)
     return cut(lengths, given["radii"], density[0])
+
+
+def _shared(values: list[Numbers], taper: Numbers) -> tuple[list[Numbers], Numbers]:
+    """Return segments that share a length of the whole tail equally, and the taper without it.
+
+    Otherwise an arc, which is one piece, would get the length of one link.
+    """
+    if "length" not in taper:
+        return values, taper
+    rest = {name: given for name, given in taper.items() if name != "length"}
+    return [{"length": (taper["length"][0] / len(values),)} for _ in values], rest
 
 
 def _tapered(

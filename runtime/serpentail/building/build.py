@@ -162,7 +162,7 @@ def generated(scene: Mapping[str, Any], name: str, given: Mapping[str, object]) 
     if found:
         return found
     own = scene.get("parameters", {})
-    with_given = scene_text(scene | {"parameters": merged(own, given)}) if given else text
+    with_given = scene_text({**scene, "parameters": merged(own, given)}) if given else text
     with alone(cache, key):
         return _noted(cache, key) or _made(cache, key, text, name, with_given)
 

@@ -73,6 +73,8 @@ def _of_motions(verbs: argparse._SubParsersAction) -> None:
     )
     film = "draw it to this file: .mp4 or .gif (film), .png, .svg or .pdf (filmstrip), .html (page)"
     simulate.add_argument("--film", help=film)
+    words = "estimate the error of each number: the motion is made again, less exactly"
+    simulate.add_argument("--errors", action="store_true", help=words)
     plan = verbs.add_parser("plan", help="plan the motion of a scene's table [plan]")
     _add_scene(plan, "scenes/righting_m1_n3.toml")
     words = "estimate parameters and torques from marker tracks, as the table [identify] says"
@@ -96,9 +98,7 @@ def _add_sweep(verbs: argparse._SubParsersAction) -> None:
     told = "make the runs of a scene's table [sweep]; the same command resumes where it stopped"
     sweep = verbs.add_parser("sweep", help=told)
     sweep.add_argument("scene", help="a scene file with a table [sweep], such as study.toml")
-    sweep.add_argument(
-        "--store", type=Path, metavar="FILE", help="SQLite file for the rows, ending in .db"
-    )
+    sweep.add_argument("--store", type=Path, metavar="FOLDER", help="folder for the rows")
     where = "processes:4, dask (on this machine), dask:tcp://host:8786 or dask:scheduler.json"
     sweep.add_argument("--executor", metavar="WHERE", help=f"{where}; by default processes")
     sweep.add_argument(
@@ -127,7 +127,7 @@ def _of_models(verbs: argparse._SubParsersAction) -> None:
     export.add_argument("kind", choices=["urdf", "mjcf", "bundle", "fmu"], help=kinds)
     for verb in (info, verify, export):
         verb.add_argument("model", help="a generated folder, a scene file or an example's name")
-    file = "the file, ending in .urdf, .xml, .zip or .fmu; by default named after the model, here"
+    file = "the file, such as rat.urdf, rat.xml, rat.zip or rat.fmu; by default the model's name"
     export.add_argument("-o", "--output", metavar="FILE", help=file)
 
 

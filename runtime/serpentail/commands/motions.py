@@ -34,9 +34,13 @@ def simulate(arguments: argparse.Namespace) -> Outcome:
 
     scene = scenario(arguments.scene, arguments.folder, parsed(arguments.changes))
     motion, stopped = _motion(scene, arguments.view)
-    report = scene.summary(motion) | _phases(motion) | stopped
+    found = scene.summary(motion, arguments.errors)
+    report = found | _phases(motion) | stopped
+    text = as_text(report, UNITS, found.errors)
+    if arguments.errors:
+        report["errors"] = found.errors
     files: Files = {"save": partial(save, motion), "film": motion.film, "view": motion.view}
-    return Outcome(report, as_text(report, UNITS), True, files)
+    return Outcome(report, text, True, files)
 
 
 def identify(arguments: argparse.Namespace) -> Outcome:

@@ -35,7 +35,9 @@ def sweep(arguments: argparse.Namespace) -> Outcome:
     report: dict[str, Any] = {"points": status.points, "done": status.done}
     report |= {"failed": status.failed, "store": str(given["store"])}
     text = f"{status}\nstore: {given['store']}"
-    first = next((row for row in found.rows() if row["error"]), None) if status.failed else None
+    first = next((row for row in found if row["error"]), None) if status.failed else None
+    if found.spent.hung:
+        text += f"\n{found.spent.hung} of them hung, and have no row: the same call runs them again"
     if first is not None:
         report["first_failure"] = {"number": first["number"], "error": first["error"]}
         text += f"\nfirst failure, point {first['number']}: {first['error']}"

@@ -1,15 +1,14 @@
 """Motions as tables of one row a sample: of pandas, and as CSV files."""
 
-import csv
 import os
-from itertools import product
+from itertools import chain, product
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..extras import needed
-from ..files import replacing
+from ..files import write_csv
 from .contents import Contents, Variable
 
 if TYPE_CHECKING:
@@ -67,14 +66,11 @@ def write(held: Contents, path: str | os.PathLike[str]) -> Path:
     NotWritten if it cannot be written. Its header has names and units, such as "time [s]"; numbers
     have all their digits.
     """
-    target, found = Path(path), columns(held)
+    found = columns(held)
     heads = {"run": "run", "time": "time [s]"}
     header = [heads[name] for name in held.leading]
     header += [f"{name} [{unit}]" for name, (unit, _) in found.items()]
     places = product(*(np.asarray(held.labels[name]).tolist() for name in held.leading))
     rows = np.stack([numbers for _, numbers in found.values()], axis=1)
-    with replacing(target) as part, part.open("w", encoding="utf-8", newline="") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(header)
-        writer.writerows((*place, *row.tolist()) for place, row in zip(places, rows, strict=True))
-    return target
+    lines = ((*place, *row.tolist()) for place, row in zip(places, rows, strict=True))
+    return write_csv(path, chain([header], lines))

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import CompileFailed
 from ..model.batch import MIN_BATCH
-from ..model.compiler import compile_library
+from ..model.compiler import compile_library, opened
 from ..model.cores import threads
 from ..model.kernel import address_of
 from ..model.model import Model
@@ -40,12 +40,11 @@ def library() -> ctypes.CDLL:
     version = f'-DJAX_VERSION="{jax.__version__}"'
     flags = ("-std=c++17", "-I", jax.ffi.include_dir(), version, *LIBRARIES)
     try:
-        path = compile_library([SOURCE], SOURCE.parent, flags=flags)
+        found = opened(lambda: compile_library([SOURCE], SOURCE.parent, flags=flags))
     except CompileFailed as error:
         raise CompileFailed(
             f"jax_functions: a C++17 compiler is needed beside that of C, such as g++: {error}"
         ) from error
-    found = ctypes.CDLL(str(path))
     found.serpentail_enter.argtypes = (ctypes.c_char_p, ctypes.c_void_p)
     found.serpentail_enter.restype = None
     capsule = jax.ffi.pycapsule(getattr(found, TARGET))

@@ -12,7 +12,6 @@ from ..viewer.shape import shape, tail_radii, usual_radius
 
 AXES = (("alpha", (1, 0, 0)), ("beta", (0, 0, 1)))  # of a link's two joints, in its own frame
 NO_TURN = (0.0, 0.0, 0.0)
-PASSIVE = ("tail_stiffness", "tail_damping", "tail_stop_stiffness")  # a parameter of each part
 Vector = tuple[float, ...]
 
 
@@ -49,10 +48,23 @@ class Link(NamedTuple):
         return f"{axis}_{self.segment}_{number or self.number}"
 
 
+class Passive(NamedTuple):
+    """Parameters of a tail coordinate, less "tail_", SI units; 0 where the scene names none."""
+
+    stiffness: float
+    rest: float
+    damping: float
+    stop_lower: float
+    stop_upper: float
+    stop_stiffness: float
+    stop_width: float
+
+
 class Chain(NamedTuple):
-    """A torso and links, SI units."""
+    """A torso and links, SI units, and what acts on each tail coordinate by its joint's name."""
 
     links: tuple[Link, ...]
+    passive: dict[str, Passive]
     torso_mass: float
     torso_inertia: Vector
 
@@ -88,23 +100,25 @@ def chain_of(model: Model, kind: str) -> Chain:
             strict=True,
         )
     )
-    return Chain(links, p["torso_mass"], p["torso_inertia"])
+    joints = [link.joint(axis) for link in links if link.number == 1 for axis, _ in AXES]
+    none = (0.0,) * len(joints)
+    columns = zip(*(p.get(f"tail_{name}", none) for name in Passive._fields), strict=True)
+    passive = dict(zip(joints, map(Passive._make, columns), strict=True))
+    return Chain(links, passive, p["torso_mass"], p["torso_inertia"])
 
 
 def _refuse_other(model: Model, kind: str) -> None:
-    """ExportError unless a model is a free chain of rigid links moved by torques only."""
-    needs, remedy = "", 'export an "fmu"'
+    """ExportError unless a model is a free chain of rigid links."""
     if model.kind != "articulated":
-        needs, remedy = (
-            "an articulated tail, because a continuum tail is not a chain of rigid links",
-            'generate a scene with kind = "articulated" and some links, or export an "fmu"',
-        )
-    elif "torso_mass" not in model.parameters:
+        needs = "an articulated tail, because a continuum tail is not a chain of rigid links"
+        remedy = 'generate a scene with kind = "articulated" and some links'
+        if model.manifest["real"] == "double" and model.manifest["scene"]["coordinates"] != "polar":
+            remedy += ', or export an "fmu"'
+    elif model.fixed:
         needs, remedy = "a torso that moves", 'generate the scene with base = "free"'
-    elif any(name in model.parameters for name in PASSIVE):
-        needs = "a tail without springs, damping and stops"
-    if needs:
-        raise ExportError(f"kind: value {kind!r}: needs {needs} ({model.name}): {remedy}")
+    else:
+        return
+    raise ExportError(f"kind: value {kind!r}: needs {needs} ({model.name}): {remedy}")
 
 
 def _links(model: Model, count: int) -> tuple[list, list, list, list]:
@@ -149,9 +163,9 @@ def text(numbers: float | Iterable[float]) -> str:
     return " ".join(map(repr, np.atleast_1d(np.asarray(numbers, float)).tolist()))
 
 
-def origin(model: Model) -> str:
-    """Return the line about a file's origin, and about what it leaves out."""
+def origin(model: Model, stops: str) -> str:
+    """Return the line about a file's origin, what it leaves out, and how it has stops, if any."""
     return (
         f" {model.name}, made by serpentail {__version__}. SI units; B is the torso's origin. "
         "Legs and feet have no mass and are left out, and so are contacts. "
-    )
+    ) + ("tail_stop_lower" in model.parameters) * stops

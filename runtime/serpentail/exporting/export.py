@@ -11,7 +11,12 @@ from ..files import refuse_unwritable, replacing
 from ..model.model import Model
 from .bundle import name_of
 
-SUFFIXES = {"urdf": ".urdf", "mjcf": ".xml", "bundle": ".zip", "fmu": ".fmu"}
+SUFFIXES = {  # the first of a kind is the usual one
+    "urdf": (".urdf",),
+    "mjcf": (".xml", ".mjcf"),
+    "bundle": (".zip", ".bundle"),
+    "fmu": (".fmu",),
+}
 SEPARATORS = ("/", os.sep)
 
 
@@ -27,8 +32,8 @@ def export(model: Model, kind: str, path: str | os.PathLike[str] | None = None) 
         joints (URDF) or equality constraints (MJCF). "bundle": a .zip of the generated folder,
         for ``load`` on another machine. "fmu": FMI 2.0.
     path : str or path, optional
-        The file, ending in .urdf, .xml, .zip or .fmu. Default: the model's name in the working
-        folder; a bundle's name includes its hash.
+        The file, ending in .urdf, .xml, .mjcf, .zip, .bundle or .fmu. Default: the model's name in
+        the working folder; a bundle's name includes its hash.
 
     Returns
     -------
@@ -52,7 +57,7 @@ def export(model: Model, kind: str, path: str | os.PathLike[str] | None = None) 
     if not isinstance(model, Model):
         raise ExportError(f"model: value {shown(model)}: needs a model, as st.load returns it")
     name = name_of(model) if kind == "bundle" else model.name
-    target = checked_path(kind, f"{name}{SUFFIXES[kind]}" if path is None else path)
+    target = checked_path(kind, f"{name}{SUFFIXES[kind][0]}" if path is None else path)
     content: bytes = getattr(import_module(f".{kind}", __package__), kind)(model)
     with replacing(target) as part:
         part.write_bytes(content)
@@ -66,9 +71,9 @@ def checked_path(kind: str, path: Any) -> Path:
     """
     try:
         target = Path(path)
-        named = target.suffix.lower() == SUFFIXES[kind] and "\0" not in target.name
+        named = target.suffix.lower() in SUFFIXES[kind] and "\0" not in target.name
         if not named or os.fspath(path).endswith(SEPARATORS):
-            raise ValueError(f"needs a file whose name ends in {SUFFIXES[kind]}")
+            raise ValueError(f"needs a file whose name ends in {' or '.join(SUFFIXES[kind])}")
         refuse_unwritable(target)
     except (TypeError, ValueError) as error:
         raise ExportError(f"path: value {shown(path)}: {error}") from error

@@ -1,7 +1,8 @@
 """MJCF of an articulated model.
 
-Joint equalities couple the joints of a segment to those of its first link, and motors on these
-apply the model's torques.
+Joint equalities couple the joints of a segment to those of its first link. These have motors for
+the model's torques, and its springs and damping. MuJoCo's own limits depend on the inertia behind
+them, so stops are springs of tendons that are slack in between.
 """
 
 from xml.etree import ElementTree as Xml
@@ -28,6 +29,10 @@ MOST_LINKS = 480  # MuJoCo reads no deeper than 500 elements
 # MuJoCo's equalities are soft.  As stiff as its own time step of 2 ms allows, joints of a segment
 # differ by 1e-4 rad in fast motions; by default, 0.1 rad.
 STIFF = {"solref": "0.004 1", "solimp": "0.9999 0.9999 0.001"}
+STOPS = (
+    "Stops are slack tendons: exact up to a stop and from its width on. Between, those of "
+    "serpentail push more, by up to 3/32 tail_stop_stiffness tail_stop_width. "
+)
 
 
 def mjcf(model: Model) -> bytes:
@@ -44,7 +49,7 @@ def mjcf(model: Model) -> bytes:
         _refuse_slight(f"mass of {link.name}", link.mass)
         _refuse_slight(f"inertia of {link.name}", link.inertia)
     root = Xml.Element("mujoco", model=model.name)
-    root.append(Xml.Comment(origin(model)))
+    root.append(Xml.Comment(origin(model, STOPS)))
     Xml.SubElement(root, "compiler", angle="radian", inertiafromgeom="false", autolimits="true")
     Xml.SubElement(root, "option", gravity=text((0.0, 0.0, -p.get("gravity", 0.0))))
     # it touches a floor that a user adds, but not itself
@@ -60,6 +65,7 @@ def mjcf(model: Model) -> bytes:
         body = _add_link(body, link)
     Xml.SubElement(body, "site", name="tip", pos=text(chain.links[-1].end))
     _add_ties(root, chain)
+    _add_passive(root, chain)
     Xml.indent(root)
     return bytes(Xml.tostring(root, encoding="utf-8", xml_declaration=True)) + b"\n"
 
@@ -128,3 +134,21 @@ def _add_ties(root: Xml.Element, chain: Chain) -> None:
             else:
                 tied = {"joint1": link.joint(name), "joint2": link.joint(name, 1)}
                 Xml.SubElement(equality, "joint", tied)
+
+
+def _add_passive(root: Xml.Element, chain: Chain) -> None:
+    """Add springs, damping and stops; behind its width a stop is a spring from half of it on."""
+    joints = {joint.get("name"): joint for joint in root.iter("joint")}
+    tendon = Xml.SubElement(root, "tendon")
+    for joint, own in chain.passive.items():
+        numbers = {"stiffness": own.stiffness, "springref": own.rest, "damping": own.damping}
+        joints[joint].attrib |= {key: text(value) for key, value in numbers.items() if value}
+        if half := own.stop_width / 2:
+            joints[joint].attrib |= {
+                "range": text((own.stop_lower, own.stop_upper)),
+                "limited": "false",  # by MuJoCo itself
+            }
+            slack = text((own.stop_lower - half, own.stop_upper + half))
+            words = {"name": f"stop_{joint}", "stiffness": text(own.stop_stiffness)}
+            stop = Xml.SubElement(tendon, "fixed", words, springlength=slack)
+            Xml.SubElement(stop, "joint", joint=joint, coef="1")

@@ -3,21 +3,28 @@
 import math
 from xml.etree import ElementTree as Xml
 
+from ..errors import ExportError
 from ..model.model import Model
-from .chain import AXES, Link, Vector, along, chain_of, origin, text, torso_capsule
+from .chain import AXES, Link, Passive, Vector, along, chain_of, origin, text, torso_capsule
 
 HALF_TURN = math.pi
 # The model has no limits of effort (N m) and speed (rad/s), but a revolute joint must.
 NO_LIMIT = 1e9
 TURNS = ((0.0, HALF_TURN / 2, 0.0), (HALF_TURN / 2, 0.0, 0.0), (0.0, 0.0, 0.0))  # z to each axis
+STOPS = "Limits of joints are where stops begin; how stiff these are is left out. "
 FIXED = (0.0, 0.0, 0.0)
 
 
 def urdf(model: Model) -> bytes:
-    """Return the file; ExportError if the tail is not a chain of rigid links."""
+    """Return the file; ExportError if the tail has springs, or is not a chain of rigid links."""
     chain, capsule = chain_of(model, "urdf"), torso_capsule(model)
+    if any(own.stiffness for own in chain.passive.values()):
+        raise ExportError(
+            f"kind: value 'urdf': needs a tail without springs ({model.name}), which URDF lacks: "
+            'export an "mjcf", or load the model with tail_stiffness = 0'
+        )
     robot = Xml.Element("robot", name=model.name)
-    robot.append(Xml.Comment(origin(model)))
+    robot.append(Xml.Comment(origin(model, STOPS)))
     # the torso
     torso = Xml.SubElement(robot, "link", name="torso")
     _inertial(torso, FIXED, chain.torso_mass, chain.torso_inertia)
@@ -27,7 +34,7 @@ def urdf(model: Model) -> bytes:
     # the tail, each link on the one before it
     before = "torso"
     for link in chain.links:
-        _add_link(robot, before, link)
+        _add_link(robot, before, link, chain.passive)
         before = link.name
     Xml.SubElement(robot, "link", name="tip")
     joint = Xml.SubElement(robot, "joint", name="tail_end", type="fixed")
@@ -36,7 +43,7 @@ def urdf(model: Model) -> bytes:
     return bytes(Xml.tostring(robot, encoding="utf-8", xml_declaration=True)) + b"\n"
 
 
-def _add_link(robot: Xml.Element, before: str, link: Link) -> None:
+def _add_link(robot: Xml.Element, before: str, link: Link, passive: dict[str, Passive]) -> None:
     """Add a cross without mass, which alpha turns, and the link, which beta turns on it."""
     cross = f"cross_{link.segment}_{link.number}"
     Xml.SubElement(robot, "link", name=cross)
@@ -48,10 +55,15 @@ def _add_link(robot: Xml.Element, before: str, link: Link) -> None:
         joint = Xml.SubElement(robot, "joint", name=link.joint(name), type="revolute")
         _between(joint, place, parent, child, turn)
         Xml.SubElement(joint, "axis", xyz=text(axis))
-        limits = {"lower": -HALF_TURN, "upper": HALF_TURN, "effort": NO_LIMIT, "velocity": NO_LIMIT}
+        own, limits = passive[link.joint(name, 1)], {"lower": -HALF_TURN, "upper": HALF_TURN}
+        if own.stop_width:
+            limits = {"lower": own.stop_lower, "upper": own.stop_upper}
+        limits |= {"effort": NO_LIMIT, "velocity": NO_LIMIT}
         Xml.SubElement(joint, "limit", {key: text(value) for key, value in limits.items()})
         if link.number > 1:
             Xml.SubElement(joint, "mimic", joint=link.joint(name, 1), multiplier="1", offset="0")
+        elif own.damping:
+            Xml.SubElement(joint, "dynamics", damping=text(own.damping), friction="0")
 
 
 def _between(

@@ -9,32 +9,25 @@ from .trial import Iterate, Linear, Trial
 from .unknowns import Unknowns
 
 ARMIJO, SHORTEST = 1e-4, 1e-6
-KEPT = 0.2  # of a positive number that a step must leave
-PINNED = 1e-3  # of its size: from here a number that wants below 0 is put there
+KEPT = 0.2  # of the way to a number's bound that a step must leave
+PINNED = 1e-3  # of its size: from so near a number that wants below its bound is put there
 
 
 def to_pin(unknowns: Unknowns, point: Point, step: np.ndarray) -> np.ndarray:
-    """Tell which numbers that cannot be negative are almost 0 and want below it."""
-    checks = {p["name"]: p["check"] for p in unknowns.model.manifest["parameters"]}
-    return np.array(
-        [
-            checks.get(each.of) == "not_negative"
-            and value <= PINNED * each.size
-            and value + change < 0
-            for each, value, change in zip(unknowns.each, point.values, step, strict=True)
-        ],
-        bool,
-    )
+    """Tell which numbers are almost at their bounds and want below them."""
+    least, values = unknowns.least, point.values
+    near = values <= np.maximum(least, 0) + PINNED * unknowns.sizes
+    return (least > -np.inf) & near & (values + step < least)
 
 
 def _longest(unknowns: Unknowns, values: np.ndarray, step: np.ndarray) -> float:
-    """Return how much of a step leaves positive numbers positive."""
-    checks = {p["name"]: p["check"] for p in unknowns.model.manifest["parameters"]}
+    """Return how much of a step leaves numbers above their bounds."""
     most = 1.0
-    for each, value, change in zip(unknowns.each, values, step, strict=True):
-        if checks.get(each.of, "finite") != "finite" and change < 0 < value:
-            least = 0.0 if value <= PINNED * each.size else KEPT
-            most = min(most, (1 - least) * value / -change)
+    for each, least, value, change in zip(unknowns.each, unknowns.least, values, step, strict=True):
+        room = value - max(least, 0.0)
+        if least > -np.inf and change < 0 < room:
+            kept = 0.0 if room <= PINNED * each.size else KEPT
+            most = min(most, (1 - kept) * room / -change)
     return most
 
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..brief import brief
 from ..motion.trajectory import Trajectory
 from .tracks import MarkerTracks
 
@@ -12,7 +13,8 @@ from .tracks import MarkerTracks
 class Estimate:
     """One estimated number with its standard deviation and interval.
 
-    begin: the value at the start of the search; at_bound: the value went to its lower bound 0.
+    begin: the value at the start of the search; at_bound: the value went to its lower bound, 0 or
+    almost 0.
     """
 
     name: str
@@ -33,7 +35,7 @@ class Estimate:
 
 @dataclass(frozen=True, eq=False)
 class EstimatedTorques:
-    """Torques at the knots of a trial.
+    """Torques at the knots of a trial; ``torques[k]`` is that of tail coordinate k, (U,).
 
     times (U,) s; values, standard deviations, and interval limits low and high (U, 2m) N m.
     """
@@ -43,6 +45,12 @@ class EstimatedTorques:
     std: np.ndarray
     low: np.ndarray
     high: np.ndarray
+
+    def __getitem__(self, coordinate: int) -> np.ndarray:
+        """Return the values of a tail coordinate (U,); IndexError if there is none."""
+        return self.values[:, coordinate]
+
+    __repr__ = brief
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +65,8 @@ class IdentifiedTrial:
     trajectory: Trajectory
     modelled: np.ndarray
     torques: EstimatedTorques | None
+
+    __repr__ = brief
 
     @property
     def residuals(self) -> np.ndarray:

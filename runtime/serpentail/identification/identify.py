@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Mapping, Sequence
+from functools import partial
 from os import PathLike
 from typing import Any, TypedDict, Unpack
 
@@ -12,7 +13,7 @@ from ..errors import IdentificationError, ModelError
 from ..model.model import Model
 from ..stages import Stage
 from . import trial as trials
-from .doubts import refuse_too_few, tell_of_swaps
+from .doubts import refuse_scale, refuse_too_few, tell_of_swaps
 from .outcome import told
 from .placement import Marker, Placements, placements
 from .point import Point
@@ -22,11 +23,14 @@ from .search import Task, first_iterate, refined
 from .start import motion_shown
 from .torques import Known, TorquePrior, checked_prior, known_torques
 from .tracks import MarkerTracks
-from .unknowns import unknowns
+from .unknowns import Unknowns, unknowns
 
 LONGEST = 0.01  # s: of the intervals of the first mesh
 FIRST_NOISE = 1e-3  # m
-FUNCTIONS = ("forward_dynamics", "forward_dynamics_derivatives", "energy", "momentum")
+FUNCTIONS = (
+    *("forward_dynamics", "forward_dynamics_derivatives"),
+    *("energy", "momentum", "tail_points"),
+)
 Data = MarkerTracks | str | PathLike[str]
 
 
@@ -53,9 +57,9 @@ def identify(
     Parameters
     ----------
     model : Model
-        The model, with the parameters to begin with. Its scene needs "forward_dynamics",
-        "forward_dynamics_derivatives", "energy", "momentum" and, if parameters are estimated,
-        "forward_dynamics_parameter_derivatives".
+        The model, with the parameters to begin with. Its scene needs "tail_points",
+        "forward_dynamics", "forward_dynamics_derivatives", "energy", "momentum" and, if parameters
+        are estimated, "forward_dynamics_parameter_derivatives".
     data : MarkerTracks, str, path, or a sequence of these
         Tracks, or TRC, CSV or C3D files; several are trials of one animal.
     markers : mapping of str to Marker
@@ -95,7 +99,7 @@ def identify(
     Warns
     -----
     DoubtfulMarkers
-        Markers look swapped, or fit badly.
+        Markers look swapped, or fit badly, or torques are missing.
 
     Notes
     -----
@@ -128,7 +132,7 @@ def identify(
     torques = torques_of(settings.get("torques"), len(tracks), model.layout.nt)
     noises, noise_known = noises_of(settings.get("noise"), tracks)
     with Stage("identify", model.name) as stage:
-        begun = [begin(model, placed, each) for each in tracks]
+        begun = [*map(partial(begin, wanted), tracks)]  # no frame between, for places of warnings
         each = tuple(
             trials.trial_of(track, noise, torque, (model.layout.nt, LONGEST))
             for track, noise, torque in zip(tracks, noises, torques, strict=True)
@@ -138,29 +142,32 @@ def identify(
             wanted.start,
             tuple(
                 first_iterate(model, trial, states)
-                for trial, states in zip(each, begun, strict=True)
+                for trial, (states, _) in zip(each, begun, strict=True)
             ),
         )
         task, found = refined(task, start, stage)
-    return told(task, found, confidence, began)
+    return told(task, found, confidence, (began, [swapped for _, swapped in begun]))
 
 
 def check_model(model: Any, estimate: Any) -> None:
     """Raise an error if a model cannot be identified, because of its kind or missing functions."""
     if not isinstance(model, Model):
         raise refusal("model", model, "a Model, as serpentail.load returns", IdentificationError)
-    model.refuse_fixed("identify")
-    if model.manifest["scene"].get("coordinates") == "polar":
-        raise ModelError(
-            f'identify: {model.name} has coordinates = "polar": generate it with "bend"'
-        )
-    if model.manifest["real"] != "double":
-        raise ModelError(f'identify: {model.name} has real = "float": generate it with "double"')
+    refuse_unlike(model, "identify")
     for name in FUNCTIONS:
         model.kernel(name)
     names = list(estimate) if isinstance(estimate, Mapping | Sequence) else []
     if any(not str(name).startswith("marker:") for name in names):
         model.kernel("forward_dynamics_parameter_derivatives")
+
+
+def refuse_unlike(model: Model, who: str) -> None:
+    """ModelError if a model has a fixed base, polar coordinates, or computes with float."""
+    model.refuse_fixed(who)
+    if model.manifest["scene"].get("coordinates") == "polar":
+        raise ModelError(f'{who}: {model.name} has coordinates = "polar": generate it with "bend"')
+    if model.manifest["real"] != "double":
+        raise ModelError(f'{who}: {model.name} has real = "float": generate it with "double"')
 
 
 def tracks_of(data: Any, placed: Placements, settings: Mapping[str, Any]) -> list[MarkerTracks]:
@@ -206,9 +213,13 @@ def noises_of(noise: Any, tracks: list[MarkerTracks]) -> tuple[list[np.ndarray],
     return [np.broadcast_to(np.array(each), track.seen.shape) for track in tracks], True
 
 
-def begin(model: Model, placed: Placements, tracks: MarkerTracks) -> np.ndarray:
-    """Return the states (F, nx) that a trial's markers show; the error says if they are too few."""
+def begin(wanted: Unknowns, tracks: MarkerTracks) -> tuple[np.ndarray, tuple[int, ...]]:
+    """Return the states (F, nx) that a trial's markers show, and markers that look swapped.
+
+    IdentificationError if they are too few, or of another scale.
+    """
+    model, placed = wanted.model, wanted.placed
     refuse_too_few(placed, tracks, model.nq)
+    refuse_scale(model, placed, tracks, {marker for marker, _, _ in wanted.offsets()})
     states = motion_shown(model, placed, tracks)
-    tell_of_swaps(model, placed, tracks, states[:, : model.nq])
-    return states
+    return states, tell_of_swaps(model, placed, tracks, states[:, : model.nq])

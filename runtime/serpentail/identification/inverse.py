@@ -19,12 +19,13 @@ from ..errors import IdentificationError
 from ..model.model import Model
 from ..model.state_space import product_matrix
 from ..motion.trajectory import Trajectory
-from .doubts import refuse_too_few, tell_of_residuals
+from .doubts import refuse_scale, refuse_too_few, tell_of_residuals
+from .identify import refuse_unlike
 from .placement import Marker, placements
+from .points import world_points
 from .result import trajectory_of
 from .start import configurations
 from .tracks import MarkerTracks
-from .trial import world_points
 
 DEGREE = 5
 ROUGH = 3  # the derivative whose square is penalised
@@ -90,7 +91,7 @@ def joint_torques(
     IdentificationError
         An argument is wrong, or too few markers are seen.
     ModelError
-        The base is fixed.
+        The base is fixed, or the model uses polar coordinates or computes with float.
 
     Warns
     -----
@@ -103,7 +104,7 @@ def joint_torques(
     lost.
     """
     cutoff = number("cutoff", cutoff, IdentificationError, above=0)
-    model.refuse_fixed("joint_torques")
+    refuse_unlike(model, "joint_torques")
     placed = placements(model, markers)
     if not isinstance(tracks, MarkerTracks):
         raise IdentificationError(
@@ -111,6 +112,7 @@ def joint_torques(
         )
     tracks = tracks.of(placed.names)
     refuse_too_few(placed, tracks, model.nq)
+    refuse_scale(model, placed, tracks)
     q = configurations(model, placed, tracks)
     q[:, QUATERNION] = sign_continuous(q[:, QUATERNION])
     q, first, second = smoothed(tracks.times, q, cutoff)

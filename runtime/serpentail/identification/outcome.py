@@ -19,6 +19,7 @@ from .certainty import (
 )
 from .doubts import tell_of_residuals
 from .estimates import Estimate, EstimatedTorques, IdentifiedTrial
+from .missing import torques_missing
 from .placement import Placements
 from .result import Identification, trajectory_of
 from .search import Task
@@ -28,8 +29,11 @@ from .trial import Iterate, Trial
 from .unknowns import Unknowns
 
 
-def told(task: Task, found: Fit, confidence: float, began: float) -> Identification:
-    """Return the result of the best fit."""
+def told(
+    task: Task, found: Fit, confidence: float, before: tuple[float, list[tuple[int, ...]]]
+) -> Identification:
+    """Return the result of the best fit; before: when it began, swapped markers of each trial."""
+    began, swaps = before
     wanted = task.unknowns
     model, placed = wanted.model_at(found.point.values), wanted.placed_at(found.point.values)
     refuse_unseen(model, task, found)
@@ -50,13 +54,13 @@ def told(task: Task, found: Fit, confidence: float, began: float) -> Identificat
             each.name,
             float(x),
             float(s),
-            *_interval(x, s * reach, bool(pinned)),
+            *_interval(x, s * reach, (bool(least == -np.inf), bool(pinned))),
             each.unit,
             float(first),
             bool(pinned),
         )
-        for each, x, s, first, pinned in zip(
-            wanted.each, values, std, wanted.start, found.pinned, strict=True
+        for each, x, s, first, pinned, least in zip(
+            wanted.each, values, std, wanted.start, found.pinned, wanted.least, strict=True
         )
     )
     C = relative_covariance(wanted, found)
@@ -66,8 +70,11 @@ def told(task: Task, found: Fit, confidence: float, began: float) -> Identificat
             task.trials, found.point.iterates, task.torques, found.triangles, strict=True
         )
     )
-    for each in done:
-        tell_of_residuals(each.tracks, each.modelled)
+    for each, trial, at, linear, swapped in zip(
+        done, task.trials, found.point.iterates, found.linear, swaps, strict=True
+    ):
+        missing = not trial.unknown_torques and torques_missing(model, placed, trial, at, linear)
+        tell_of_residuals(each.tracks, each.modelled, missing, swapped)
     noise = float(np.median(np.concatenate([trial.noise.ravel() for trial in task.trials])))
     return Identification(
         model=model,
@@ -85,9 +92,14 @@ def told(task: Task, found: Fit, confidence: float, began: float) -> Identificat
     )
 
 
-def _interval(value: float, reach: float, pinned: bool) -> tuple[float, float]:
-    """Return the ends of an interval; of a number at its bound, from there."""
-    return (0.0, float(reach)) if pinned else (float(value - reach), float(value + reach))
+def _interval(value: float, reach: float, kind: tuple[bool, bool]) -> tuple[float, float]:
+    """Return the ends of an interval, of a number that cannot be negative from 0 on.
+
+    kind: whether the number may be negative, and whether it is at its bound.
+    """
+    signed, pinned = kind
+    low = value - reach if signed else max(value - reach, 0.0)
+    return (0.0 if pinned else float(low)), float(value + reach)
 
 
 def refuse_unseen(model: Model, task: Task, found: Fit) -> None:

@@ -1,17 +1,19 @@
 """``Marker``: where a marker is on the torso or along the tail."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ..checks import number, numbers, refusal
 from ..errors import IdentificationError
+from ..model.layout import REST
 from ..model.model import Model
 
 TORSO = -1  # the piece of a marker on the torso
 NOWHERE = (0.0, 0.0, 0.0)
+STRAIGHT = 1e-5  # rad: polar coordinates have no value at 0
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,17 @@ class Marker:
 
 
 @dataclass(frozen=True, eq=False)
+class Pieces:
+    """Links and arcs of a tail from the mount to the tip: the segment (P,) of each, whether it is
+    an arc (P,), and the indices (P + 1,) of the tail points at their ends.
+    """
+
+    segment: np.ndarray
+    arc: np.ndarray
+    ends: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class Placements:
     """M markers on the pieces of a tail.
 
@@ -51,20 +64,33 @@ class Placements:
     piece: np.ndarray
     fraction: np.ndarray
     offset: np.ndarray
+    pieces: Pieces
+
+    @property
+    def on_torso(self) -> np.ndarray:
+        """Which markers are on the torso, (M,)."""
+        return self.piece == TORSO
 
     def moved(self, offset: np.ndarray) -> "Placements":
         """Return the same markers with other offsets."""
-        return Placements(self.names, self.piece, self.fraction, offset)
+        return replace(self, offset=offset)
 
 
-def piece_lengths(model: Model) -> np.ndarray:
-    """Return the length (m) of each link, or of each arc, from the mount to the tip."""
-    p = model.parameters
-    own = p.get("link_lengths", p.get("arc_lengths"))
-    if own is not None:
-        return np.atleast_1d(np.asarray(own, float))
-    pieces = int(np.sum(model.joints_each))
-    return np.full(pieces, float(p["tail_length"]) / pieces)
+def pieces_of(model: Model) -> Pieces:
+    """Return the pieces of a model's tail."""
+    count = np.atleast_1d(model.joints_each)
+    arc = np.repeat([kind == "continuum" for kind in model.kinds], count)
+    points = np.where(arc, model.samples or 1, 1)
+    return Pieces(
+        np.repeat(np.arange(model.segments), count), arc, np.concatenate([[0], np.cumsum(points)])
+    )
+
+
+def piece_lengths(model: Model, pieces: Pieces) -> np.ndarray:
+    """Return the length (m) of each piece: between its ends on a tail that is almost straight."""
+    tail = np.tile([0.0, STRAIGHT], model.segments)
+    points = model.tail_points(np.concatenate([REST, tail]))[pieces.ends]
+    return np.linalg.norm(np.diff(points, axis=0), axis=1)
 
 
 def placements(model: Model, markers: Any) -> Placements:
@@ -72,12 +98,12 @@ def placements(model: Model, markers: Any) -> Placements:
     if not isinstance(markers, Mapping) or not markers:
         needs = 'a Marker for each name, such as {"head": Marker(torso=(0, 0.03, 0.02))}'
         raise refusal("markers", markers, needs, IdentificationError)
-    ends = np.concatenate([[0.0], np.cumsum(piece_lengths(model))])
+    pieces = pieces_of(model)
+    ends = np.concatenate([[0.0], np.cumsum(piece_lengths(model, pieces))])
     placed = [_placed(str(name), marker, ends) for name, marker in markers.items()]
-    pieces, fractions, offsets = zip(*placed, strict=True)
-    return Placements(
-        tuple(map(str, markers)), np.array(pieces), np.array(fractions), np.array(offsets, float)
-    )
+    at, fractions, offsets = zip(*placed, strict=True)
+    numbers = np.array(at), np.array(fractions), np.array(offsets, float)
+    return Placements(tuple(map(str, markers)), *numbers, pieces)
 
 
 def _placed(name: str, marker: Any, ends: np.ndarray) -> tuple[int, float, np.ndarray]:

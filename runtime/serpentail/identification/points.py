@@ -1,19 +1,23 @@
 """Where markers are in the torso's axes, and how they move with the tail and with its geometry.
 
-Derivatives are complex steps: the imaginary part of f(x + i h) is h f'(x) up to h^2, with h so
-small that nothing of it is lost, so they are exact to rounding.
+Places on the centre line follow from the model's own tail points, for every kind of tail. A place
+on a link is between the link's ends. A place on an arc is the end of a shorter arc of the same
+curvature: at the fraction x it is x times as far from the root as the end of the arc would be, were
+it bent by x times as much. Only the axes of offsets are turned here. Derivatives are central
+differences.
 """
 
-from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
+from ..attitude import Entries, from_angles, product, rotation_matrix
+from ..model.kernel import Kernel
+from ..model.layout import OMEGA, PER_SEGMENT, QUATERNION, REST, TAIL_Q, TAIL_V
 from ..model.model import Model
-from .placement import TORSO, Placements, piece_lengths
+from ..model.polar import polar_to_bend
+from .placement import TORSO, Placements
 
-STEP = 1e-30  # of complex steps
-SERIES = 0.5  # bend below which arcs are computed by a series
-TERMS = 12
 CROSS = np.array(
     [
         [[0.0, 0, 0], [0, 0, -1], [0, 1, 0]],
@@ -21,162 +25,98 @@ CROSS = np.array(
         [[0, -1, 0], [1, 0, 0], [0, 0, 0]],
     ]
 )  # CROSS[k] is the matrix of e_k x
+STEP = 1e-5  # of differences, in rad or relative to sizes; their error is about its square
 
 
-@dataclass(frozen=True, eq=False)
-class Geometry:
-    """What a tail's shape is made of: mount (3,) m in B, its angles (3,) rad, lengths (P,) m of the
-    pieces, the segment (P,) of each, and whether they are arcs.
+def marker_points(model: Model, placed: Placements, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return markers at configurations (F, nq): points (F, M, 3) m in the world, and their
+    derivatives by q in its tangent space (F, M, 3, nv).
     """
-
-    mount: np.ndarray
-    angles: np.ndarray
-    lengths: np.ndarray
-    segment: np.ndarray
-    arcs: bool
-
-    @property
-    def numbers(self) -> np.ndarray:
-        """Mount, angles and lengths as one array (6 + P,)."""
-        return np.concatenate([self.mount, self.angles, self.lengths])
-
-
-def geometry_of(model: Model) -> Geometry:
-    """Return the geometry of a model's tail."""
-    p = model.parameters
-    return Geometry(
-        np.array(p["tail_mount"], float),
-        np.array(p.get("mount_angles", (0.0, 0.0, 0.0)), float),
-        piece_lengths(model),
-        np.repeat(np.arange(model.segments), model.joints_each),
-        model.kind != "articulated",
-    )
+    tail, nt = q[:, TAIL_Q], model.layout.nt
+    steps = STEP * np.concatenate([np.zeros((1, nt)), np.eye(nt), -np.eye(nt)])
+    places = _in_body(model, (tail + steps[:, None]).reshape(-1, nt), placed)
+    body = places.reshape(len(steps), len(q), -1, 3)
+    R = rotation_matrix(q[:, QUATERNION])[:, None]
+    by_q = np.zeros((*body.shape[1:], model.nv))
+    by_q[..., :3] = np.eye(3)
+    by_q[..., OMEGA] = -R @ np.einsum("fmk,kij->fmij", body[0], CROSS)
+    slopes = (body[1 : nt + 1] - body[nt + 1 :]) / (2 * STEP)
+    by_q[..., TAIL_V] = R @ np.moveaxis(slopes, 0, -1)
+    return _in_world(q, R, body[0]), by_q
 
 
-def frames(
-    shape: Geometry, numbers: np.ndarray, tail: np.ndarray, placed: Placements
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return origins (..., M, 3) m and axes (..., M, 3, 3) of the markers' places in B.
+def world_points(model: Model, placed: Placements, q: np.ndarray) -> np.ndarray:
+    """Return markers at configurations (F, nq), (F, M, 3) m."""
+    R = rotation_matrix(q[:, QUATERNION])[:, None]
+    return _in_world(q, R, _in_body(model, q[:, TAIL_Q], placed))
 
-    numbers (..., 6 + P): as ``Geometry.numbers``; tail (..., 2m): tail coordinates; both may be
-    complex.
-    """
-    batch = np.broadcast_shapes(numbers.shape[:-1], tail.shape[:-1])
-    kind = np.result_type(numbers, tail)
-    markers = len(placed.names)
-    origins = np.zeros((*batch, markers, 3), kind)
-    axes = np.zeros((*batch, markers, 3, 3), kind)
-    axes[:] = np.eye(3)
-    joint = np.broadcast_to(numbers[..., :3], (*batch, 3))
-    R = _mounted(numbers[..., 3:6])
-    # outward, piece by piece, up to the last marker
-    for k in range(max(placed.piece.max(), -1) + 1):
-        i = shape.segment[k]
-        first, second = tail[..., 2 * i, None, None], tail[..., 2 * i + 1, None, None]
-        length = numbers[..., 6 + k, None]
+
+def _in_world(q: np.ndarray, R: np.ndarray, body: np.ndarray) -> np.ndarray:
+    """Return points in the world of points (F, M, 3) in B; attitudes R (F, 1, 3, 3)."""
+    return q[:, None, :3] + (R @ body[..., None])[..., 0]
+
+
+def offset_axes(model: Model, placed: Placements, q: np.ndarray) -> np.ndarray:
+    """Return the axes (F, M, 3, 3) of offsets in the world at configurations (F, nq)."""
+    R = rotation_matrix(q[:, QUATERNION])[:, None]
+    return R @ _axes(model, q[:, TAIL_Q], placed)
+
+
+def _axes(model: Model, tail: np.ndarray, placed: Placements) -> np.ndarray:
+    """Return the axes (F, M, 3, 3) of offsets in B at tail coordinates (F, 2m)."""
+    if model.kernel("tail_points").polar:
+        pairs = polar_to_bend(tail[:, ::PER_SEGMENT], tail[:, 1::PER_SEGMENT])[:2]
+        tail = np.stack(pairs, axis=-1).reshape(tail.shape)
+    quaternions = np.zeros((len(tail), len(placed.names), 4))
+    quaternions[..., 0] = 1
+    frame: Entries = from_angles(np.array(model.parameters.get("mount_angles", (0.0, 0, 0))))
+    for k in range(placed.piece.max() + 1):
+        i = PER_SEGMENT * placed.pieces.segment[k]
+        turn = partial(_turn, placed.pieces.arc[k], tail[:, i], tail[:, i + 1])
         for marker in np.flatnonzero(placed.piece == k):
-            way, turned = _along(shape.arcs, first, second, placed.fraction[marker])
-            origins[..., marker, :] = joint + length * (R @ way)[..., 0]
-            axes[..., marker, :, :] = R @ turned
-        way, turned = _along(shape.arcs, first, second, 1.0)
-        joint, R = joint + length * (R @ way)[..., 0], R @ turned
-    return origins, axes
+            entries = product(frame, turn(placed.fraction[marker]))
+            quaternions[:, marker] = np.stack(entries, axis=-1)
+        frame = product(frame, turn(1.0))
+    return rotation_matrix(quaternions)
 
 
-def _along(
-    arcs: bool, first: np.ndarray, second: np.ndarray, x: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the point at x of a piece of length 1, (..., 3, 1), and its axes (..., 3, 3).
+def _in_body(model: Model, tail: np.ndarray, placed: Placements) -> np.ndarray:
+    """Return markers in B (F, M, 3) m at tail coordinates (F, 2m)."""
+    places = _centre_line(model.kernel("tail_points"), tail, placed)
+    if not placed.offset[~placed.on_torso].any():
+        return places + placed.offset
+    return places + (_axes(model, tail, placed) @ placed.offset[..., None])[..., 0]
 
-    A link turns at its joint by R = Rx(alpha) Rz(beta) and is straight along -y (Eq. 13). Along an
-    arc the axes turn by Exp(x [a, 0, b]).
+
+def _turn(arc: bool, first: np.ndarray, second: np.ndarray, fraction: float) -> list[np.ndarray]:
+    """Return the quaternion by which axes turn along a piece, up to a fraction of it.
+
+    A link turns at its joint by Rx(alpha) Rz(beta), Eq. 13, the slices of an arc by x (a, 0, b).
     """
-    if not arcs:
-        R = _exponential(first, 0) @ _exponential(second, 2)
-        return -x * R[..., :, 1:2], R
-    z = first * first + second * second
-    sine, versine = _stumpff(x * x * z)
-    sigma, gamma = x * sine, x * x * versine
-    zero = np.zeros_like(z)
-    K = np.concatenate(
-        [
-            np.concatenate([zero, -second, zero], axis=-1),
-            np.concatenate([second, zero, -first], axis=-1),
-            np.concatenate([zero, first, zero], axis=-1),
-        ],
-        axis=-2,
-    )
-    way = np.concatenate([gamma * second, -sigma, -gamma * first], axis=-2)
-    return way, np.eye(3) + sigma * K + gamma * (K @ K)
+    if arc:
+        half = fraction * np.hypot(first, second) / 2
+        part = fraction * np.sinc(half / np.pi) / 2
+        return [np.cos(half), part * first, 0 * half, part * second]
+    (c1, s1), (c2, s2) = ((np.cos(x / 2), np.sin(x / 2)) for x in (first, second))
+    return [c1 * c2, s1 * c2, -s1 * s2, c1 * s2]
 
 
-def _exponential(angle: np.ndarray, axis: int) -> np.ndarray:
-    """Return rotations (..., 3, 3) by angles (..., 1, 1) about an axis."""
-    K = CROSS[axis]
-    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K)
-
-
-def _mounted(angles: np.ndarray) -> np.ndarray:
-    """Return axes of the tail's root, R = Rz(yaw) Rx(pitch) Ry(roll)."""
-    pitch, roll, yaw = (angles[..., k, None, None] for k in range(3))
-    return _exponential(yaw, 2) @ _exponential(pitch, 0) @ _exponential(roll, 1)
-
-
-def _stumpff(z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return sin(t) / t and (1 - cos(t)) / t^2 at t^2 = z, entire functions of z."""
-    small = np.abs(z) < SERIES**2
-    t = np.sqrt(np.where(small, 1.0, z))
-    sine, versine = np.sin(t) / t, (np.sin(t / 2) / (t / 2)) ** 2 / 2
-    powers_s, powers_v = np.ones_like(z), np.ones_like(z) / 2
-    series_s, series_v = powers_s, powers_v
-    for k in range(1, TERMS):
-        powers_s = -powers_s * z / ((2 * k) * (2 * k + 1))
-        powers_v = -powers_v * z / ((2 * k + 1) * (2 * k + 2))
-        series_s, series_v = series_s + powers_s, series_v + powers_v
-    return np.where(small, series_s, sine), np.where(small, series_v, versine)
-
-
-@dataclass(frozen=True, eq=False)
-class BodyPoints:
-    """Markers in B: points (..., M, 3) m; axes (..., M, 3, 3) of their offsets; derivatives by the
-    tail coordinates (..., M, 3, 2m), and by the geometry's numbers (..., M, 3, 6 + P).
-    """
-
-    points: np.ndarray
-    axes: np.ndarray
-    by_tail: np.ndarray
-    by_geometry: np.ndarray
-
-
-def body_points(
-    shape: Geometry, tail: np.ndarray, placed: Placements, wanted: np.ndarray
-) -> BodyPoints:
-    """Return markers in B at tail coordinates (..., 2m), with exact derivatives.
-
-    wanted: indices of the geometry's numbers by which derivatives are taken; others are left 0.
-    """
-    nt, numbers = tail.shape[-1], shape.numbers
-    count = nt + len(wanted)
-    steps = np.zeros((count + 1, nt + len(numbers)))
-    steps[range(1, nt + 1), range(nt)] = STEP
-    steps[range(nt + 1, count + 1), nt + wanted] = STEP
-    moved = tail[..., None, :] + 1j * steps[:, :nt]
-    origins, axes = frames(shape, numbers + 1j * steps[:, nt:], moved, placed)
-    # the first of all directions is zero
-    points = origins + np.einsum("...mij,mj->...mi", axes, placed.offset)
-    by = np.moveaxis(points.imag[..., 1:, :, :] / STEP, -3, -1)
-    by_geometry = np.zeros((*by.shape[:-1], len(numbers)))
-    by_geometry[..., wanted] = by[..., nt:]
-    none = points.real[..., 0, :, :]
-    return BodyPoints(none, axes.real[..., 0, :, :, :], by[..., :nt], by_geometry)
-
-
-def body_positions(shape: Geometry, tail: np.ndarray, placed: Placements) -> np.ndarray:
-    """Return markers in B at tail coordinates (..., 2m), (..., M, 3) m."""
-    origins, axes = frames(shape, shape.numbers, tail, placed)
-    return origins + (axes @ placed.offset[..., None])[..., 0]
-
-
-def on_torso(placed: Placements) -> np.ndarray:
-    """Tell which markers are on the torso, (M,)."""
-    return placed.piece == TORSO
+def _centre_line(kernel: Kernel, tail: np.ndarray, placed: Placements) -> np.ndarray:
+    """Return places on the centre line in B (N, M, 3), m; of markers on the torso 0."""
+    pieces, each = placed.pieces, np.zeros(len(placed.names), int)
+    scale = [np.ones(tail.shape[1])]
+    # for each place within an arc, a tail of which this arc is bent less
+    for marker, (k, x) in enumerate(zip(placed.piece, placed.fraction, strict=True)):
+        if k != TORSO and pieces.arc[k] and 0 < x < 1:
+            each[marker] = len(scale)
+            scale.append(np.ones(tail.shape[1]))
+            i = PER_SEGMENT * pieces.segment[k]
+            scale[-1][i + kernel.polar : i + PER_SEGMENT] = x
+    q = np.zeros((len(scale), len(tail), TAIL_Q.start + tail.shape[1]))
+    q[..., : TAIL_Q.start] = REST
+    q[..., TAIL_Q] = np.array(scale)[:, None] * tail
+    points = kernel(q.reshape(-1, q.shape[-1])).reshape(*q.shape[:2], -1, 3)
+    first, last = (points[each, :, pieces.ends[placed.piece + k]] for k in (0, 1))
+    places = first + placed.fraction[:, None, None] * (last - first)
+    places[placed.on_torso] = 0.0
+    return np.swapaxes(places, 0, 1)

@@ -9,7 +9,7 @@ from ..checks import finite_array
 from ..errors import IdentificationError
 from ..model.model import Model
 from .placement import Marker, placements
-from .trial import world_points
+from .points import world_points
 
 
 def marker_positions(model: Model, q: ArrayLike, markers: Mapping[str, Marker]) -> np.ndarray:

@@ -5,12 +5,12 @@ import io
 from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from ..errors import IdentificationError
-from ..extras import needed
+from ..files import without_quote
+from .c3d import read_c3d
 from .tracks import MarkerTracks, checked_tracks, checked_unit
 
 LARGEST = 2**30  # bytes of a file that is read
@@ -26,7 +26,7 @@ def read_markers(
     axes: str = "xyz",
     zeros: str = "refuse",
 ) -> MarkerTracks:
-    """Read marker tracks from a TRC, CSV or C3D file.
+    """Read marker tracks from a TRC, CSV or C3D file, which may be damaged or from a stranger.
 
     Parameters
     ----------
@@ -70,6 +70,8 @@ def read_markers(
             "serpentail.marker_tracks"
         )
     try:
+        if source.exists() and not source.is_file():
+            raise IdentificationError(f"{source}: is no regular file: needs one")
         if source.stat().st_size > LARGEST:
             raise IdentificationError(f"{source}: larger than {LARGEST} bytes: cut it into trials")
         times, positions, names, stated = READERS[known](source)
@@ -112,7 +114,7 @@ def _trc(source: Path) -> Read:
         )
     rows = [(k, line) for k, line in enumerate(lines[5:], 6) if line.strip()]
     cells = [_cells(source, k, line.split("\t"), 2 + 3 * count) for k, line in rows]
-    if len(cells) != frames:
+    if len(cells) != frames or not frames:
         raise IdentificationError(
             f"{source}: has {len(cells)} frames, its header says {frames}: the file is cut off, or "
             "its header is wrong"
@@ -138,10 +140,11 @@ def _check_rate(source: Path, times: np.ndarray, stated: str | None) -> None:
         rate = float(stated or "nan")
     except ValueError:
         return
-    spans = np.diff(times)
+    with np.errstate(over="ignore", invalid="ignore"):  # of times that are refused later
+        spans = np.diff(times)
     if np.isfinite(rate) and len(spans) and np.isfinite(spans).all() and (spans > 0).all():
-        found = 1 / np.median(spans)
-        if abs(found / rate - 1) > RATE_TOLERANCE:
+        found = 1 / float(np.median(spans))
+        if abs(found - rate) > RATE_TOLERANCE * abs(rate):
             raise IdentificationError(
                 f"{source}: DataRate is {rate:g} Hz, but the times have {found:g} Hz: correct one"
             )
@@ -164,8 +167,11 @@ def _cells(source: Path, line: int, cells: list[str], count: int) -> list[float]
 
 def _csv(source: Path) -> Read:
     """Read a CSV file with a line of names."""
-    rows = list(csv.reader(io.StringIO("\n".join(_lines(source)))))
-    heads = [head.strip() for head in rows[0]] if rows else []
+    try:
+        rows = list(csv.reader(io.StringIO("\n".join(_lines(source)))))
+    except csv.Error as error:
+        raise IdentificationError(f"{source}: cannot be read as CSV ({error})") from None
+    heads = [without_quote(head.strip()) for head in rows[0]] if rows else []
     names = [head[:-2] for head in heads[1::3]]
     wanted = ["time", *(f"{name}_{axis}" for name in names for axis in "xyz")]
     if heads != wanted or not names:
@@ -177,25 +183,4 @@ def _csv(source: Path) -> Read:
     return table[:, 0], table[:, 1:].reshape(len(table), len(names), 3), names, None
 
 
-def _c3d(source: Path) -> Read:
-    """Read a C3D file with ezc3d, which gives nan for markers that were not seen."""
-    ezc3d = needed("ezc3d", "c3d")
-    try:
-        content = ezc3d.c3d(str(source))
-        point = content["parameters"]["POINT"]
-        names = [str(name).strip() for name in point["LABELS"]["value"]]
-        rate = float(point["RATE"]["value"][0])
-        units: list[Any] = point["UNITS"]["value"]
-        positions = np.moveaxis(content["data"]["points"][:3], [0, 1, 2], [2, 1, 0])
-        first = int(content["header"]["points"]["first_frame"])
-    except OSError:
-        raise
-    except Exception as error:  # ezc3d raises errors of many kinds for damaged files
-        raise IdentificationError(
-            f"{source}: is not a complete C3D file ({type(error).__name__}: {error!s:.100})"
-        ) from error
-    times = (first + np.arange(len(positions))) / rate
-    return times, positions, names[: positions.shape[1]], str(units[0]) if units else None
-
-
-READERS: dict[str, Callable[[Path], Read]] = {".trc": _trc, ".csv": _csv, ".c3d": _c3d}
+READERS: dict[str, Callable[[Path], Read]] = {".trc": _trc, ".csv": _csv, ".c3d": read_c3d}

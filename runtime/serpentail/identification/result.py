@@ -151,7 +151,7 @@ class Identification:
         return residual_figure(
             chosen.trajectory,
             (chosen.tracks.names, chosen.residuals, self.noise),
-            None if bands is None else (bands.times, bands.low, bands.high),
+            None if bands is None else (bands.times, bands.low, bands.high, self.confidence),
             path,
         )
 

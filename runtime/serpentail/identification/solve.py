@@ -28,7 +28,7 @@ DEPENDENT = 1e-5  # of a column's length that is left: below, columns depend on 
 @dataclass(frozen=True, eq=False)
 class Fit:
     """Where the search ended: the point, linear problems there, the triangles (C, C) of each trial,
-    which unknowns are pinned to 0, iterations, and whether the last step was small.
+    which unknowns are at their bounds, iterations, and whether the last step was small.
     """
 
     point: Point
@@ -64,7 +64,7 @@ def fit(unknowns: Unknowns, each: tuple[Trial, ...], start: Point, stage: Stage 
             break
         point = advanced
         if pinned.any():
-            point = Point(np.where(pinned, 0.0, point.values), point.iterates)
+            point = Point(np.where(pinned, unknowns.least, point.values), point.iterates)
             point = integrated(unknowns, each, point) or advanced
     return Fit(point, linear, triangles, pinned, iteration, converged)
 

@@ -2,20 +2,23 @@
 
 import numpy as np
 
-from serpentail_scene.layout import OMEGA, QUATERNION, TAIL_Q
+from serpentail_scene.layout import PER_SEGMENT, QUATERNION, TAIL_Q, TORSO_Q
 
-from ..attitude import rotation_matrix, sign_continuous
+from ..attitude import sign_continuous
 from ..model.model import Model
 from .placement import Placements
-from .points import CROSS, body_points, body_positions, geometry_of, on_torso
+from .points import marker_points, world_points
 from .stages import difference, moved
 from .tracks import MarkerTracks
-from .trial import world_points
 
 ITERATIONS = 25
 CLOSE = 1e-5  # m and rad: the last step of a fit
 RIDGE = 1e-3  # weight of rotations, over the tail's length: holds undetermined directions
 ENOUGH = 0.5  # part of the markers that a frame needs to be fitted by itself
+TIGHT = 0.01  # of the tail's length: smaller misfits are never far
+APART = 0.5  # rad between the tails of neighbours: further apart, one is fitted again
+MOST_BENT = 0.999  # of the range of bends
+LINE = 0.05  # of their length that points must spread beside a line
 WINDOW = 7  # frames of a local parabola
 FAR = 4.0  # times the usual misfit: other frames do not begin from such a frame
 
@@ -29,24 +32,39 @@ def motion_shown(model: Model, placed: Placements, tracks: MarkerTracks) -> np.n
 def configurations(model: Model, placed: Placements, tracks: MarkerTracks) -> np.ndarray:
     """Return configurations (F, nq) that fit the markers of each frame, between others in gaps.
 
-    Where a tail is bent so far that two shapes fit, a frame continues its neighbour: the frames are
-    fitted outward from the one whose tail is straightest.
+    All frames are fitted side by side. Where a tail is bent so far that two shapes fit, a frame
+    continues its neighbour, outward from the frame whose tail is straightest.
     """
-    q = _begin(model, placed, tracks)
+    begun, laid = _begin(model, placed, tracks)
+    q = begun.copy()
     rows = np.flatnonzero(tracks.seen.mean(axis=1) >= min(ENOUGH, tracks.seen.mean(axis=1).max()))
     positions = tracks.positions[rows]
-    first, misfit = fitted(model, placed, positions, q[rows])
-    fine = misfit <= FAR * np.median(misfit)
-    straightest = np.abs(first[:, TAIL_Q]).max(axis=1)
-    anchor = int(np.where(fine, straightest, np.inf).argmin())
-    q[rows[anchor]] = first[anchor]
+    q[rows], misfit = fitted(model, placed, positions, q[rows])
+    usual = max(FAR * np.median(misfit), TIGHT * float(model.parameters["tail_length"]))
+    fine = misfit <= usual
+    straightest = np.abs(q[rows][:, TAIL_Q]).max(axis=1)
+    anchor = int(np.where(fine & laid[rows], straightest, np.inf).argmin())
+    kept = np.ones(len(rows), bool)
     for way in (range(anchor + 1, len(rows)), range(anchor - 1, -1, -1)):
-        at = rows[anchor]
+        last = q[rows[anchor]]
         for k in way:
-            begin = np.concatenate([q[rows[k], :7], q[at, TAIL_Q]])
-            q[rows[k]] = fitted(model, placed, positions[k : k + 1], begin[None])[0][0]
-            at = rows[k]
-    return _between(tracks.times, q, rows)
+            here, known = q[rows[k]], laid[rows[k]]
+            if not fine[k] or _apart(here, last, known) > APART:
+                torso = (begun[rows[k]] if known else last)[TORSO_Q]
+                begin = np.concatenate([torso, last[TAIL_Q]])[None]
+                (here,), off = fitted(model, placed, positions[k : k + 1], begin)
+                fine[k] = off[0] <= usual
+            kept[k] = fine[k] and (known or _apart(here, last, known) <= APART)
+            q[rows[k]] = here
+            last = here if kept[k] else last
+    return _between(tracks.times, q, rows[kept])
+
+
+def _apart(q: np.ndarray, other: np.ndarray, known: bool) -> float:
+    """Return how far configurations (nq,) differ, rad: in the tail; unless known, in the torso."""
+    off = float(np.abs(q - other)[TAIL_Q].max())
+    cosine = min(abs(float(q[QUATERNION] @ other[QUATERNION])), 1.0)
+    return off if known else max(off, 2 * np.arccos(cosine))
 
 
 def fitted(
@@ -58,74 +76,86 @@ def fitted(
     holds rotations where they are.
     """
     nv, reach = model.nv, float(model.parameters["tail_length"])
-    weight = np.isfinite(positions).all(axis=2)
-    q, ridge = begin.copy(), np.full(len(begin), RIDGE)
-    shape, none = geometry_of(model), np.zeros(0, int)
-    hold = np.concatenate([np.full(3, 1e-6), np.full(nv - 3, reach)]) ** 2
+    weight = np.isfinite(positions).all(axis=2)[..., None]
+    q, ridge = within(model, begin), np.full(len(begin), RIDGE)
+    hold = np.diag(np.concatenate([np.full(3, 1e-6), np.full(nv - 3, reach)]) ** 2)
 
-    def misfits(at: np.ndarray) -> np.ndarray:
-        off = np.where(weight[..., None], positions - world_points(model, placed, at), 0)
-        return (off**2).sum(axis=(1, 2))
+    def off(points: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        return np.where(weight[rows], positions[rows] - points, 0).reshape(len(rows), -1, 1)
 
-    before = misfits(q)
+    left = np.arange(len(q))  # frames that still move
+    misfit = (off(world_points(model, placed, q), left) ** 2).sum(axis=(1, 2))
     for _ in range(ITERATIONS):
-        body = body_points(shape, q[:, TAIL_Q], placed, none)
-        R = rotation_matrix(q[:, QUATERNION])[:, None]
-        J = np.zeros((*body.points.shape, nv))
-        J[..., :3] = np.eye(3)
-        J[..., OMEGA] = -R @ np.einsum("fmk,kij->fmij", body.points, CROSS)
-        J[..., 6:] = R @ body.by_tail
-        J = np.where(weight[..., None, None], J, 0).reshape(len(q), -1, nv)
-        world = q[:, None, :3] + (R @ body.points[..., None])[..., 0]
-        off = np.where(weight[..., None], positions - world, 0).reshape(len(q), -1)
-        square = np.swapaxes(J, 1, 2) @ J + ridge[:, None, None] * np.diag(hold)
-        step = np.linalg.solve(square, (np.swapaxes(J, 1, 2) @ off[..., None]))[..., 0]
-        new = turned(model, q, step)
-        after = misfits(new)
-        better = after <= before
-        q[better], before[better] = new[better], after[better]
-        ridge = np.where(better, np.maximum(ridge / 4, RIDGE**2), ridge * 8)
-        if better.all() and np.abs(step).max() < CLOSE:
+        points, by_q = marker_points(model, placed, q[left])
+        J = np.where(weight[left, ..., None], by_q, 0).reshape(len(left), -1, nv)
+        back = np.swapaxes(J, 1, 2)
+        square = back @ J + ridge[left, None, None] * hold
+        step = np.linalg.solve(square, back @ off(points, left))[..., 0]
+        new = turned(model, q[left], step)
+        after = (off(world_points(model, placed, new), left) ** 2).sum(axis=(1, 2))
+        better = after <= misfit[left]
+        q[left[better]], misfit[left[better]] = new[better], after[better]
+        ridge[left] = np.where(better, np.maximum(ridge[left] / 4, RIDGE**2), ridge[left] * 8)
+        left = left[~better | (np.abs(step).max(axis=1) >= CLOSE)]
+        if not len(left):
             break
-    return q, np.sqrt(before / np.maximum(weight.sum(axis=1), 1))
+    return q, np.sqrt(misfit / np.maximum(weight.sum(axis=(1, 2)), 1))
 
 
 def turned(model: Model, q: np.ndarray, step: np.ndarray) -> np.ndarray:
     """Return configurations (F, nq) after steps (F, nv)."""
     none = np.zeros_like(step)
     states = np.column_stack([q, none])
-    return moved(model, states, np.column_stack([step, none]))[:, : model.nq]
+    return within(model, moved(model, states, np.column_stack([step, none]))[:, : model.nq])
 
 
-def _begin(model: Model, placed: Placements, tracks: MarkerTracks) -> np.ndarray:
-    """Return configurations with a straight tail, and torsos placed by the torso's markers.
-
-    If these are too few, all markers count; a frame without any is like the one before.
-    """
-    frames = len(tracks.times)
-    q = np.zeros((frames, model.nq))
-    body = body_positions(geometry_of(model), q[:1, TAIL_Q], placed)[0]
-    torso = on_torso(placed)
-    use = torso if torso.sum() >= 3 else np.ones_like(torso)
-    last = np.array([0.0, 0, 0, 1, 0, 0, 0])
-    for frame in range(frames):
-        here = tracks.seen[frame] & use
-        if here.any():
-            last = _laid(body[here], tracks.positions[frame, here], last)
-        q[frame, :7] = last
+def within(model: Model, q: np.ndarray) -> np.ndarray:
+    """Return a copy of configurations (F, nq) without bends beyond the model's range."""
+    if "continuum" not in model.kinds:
+        return q.copy()
+    q, most = q.copy(), MOST_BENT * model.manifest["scene"]["bend_range"]
+    bends = q[:, TAIL_Q].reshape(len(q), -1, PER_SEGMENT)
+    size = np.linalg.norm(bends, axis=2, keepdims=True)
+    arcs = np.array([kind == "continuum" for kind in model.kinds])[:, None]
+    shrunk = np.where(arcs, np.minimum(1, most / np.maximum(size, 1e-9)), 1)
+    q[:, TAIL_Q] = (bends * shrunk).reshape(len(q), -1)
     return q
 
 
-def _laid(body: np.ndarray, world: np.ndarray, last: np.ndarray) -> np.ndarray:
+def _begin(model: Model, placed: Placements, tracks: MarkerTracks) -> tuple[np.ndarray, np.ndarray]:
+    """Return configurations (F, nq) with a straight tail, and which frames' torsos are laid (F,).
+
+    A torso is laid on three of its markers or more; if no frame shows these, on all markers. The
+    frames between are interpolated, those before and after are like the nearest.
+    """
+    q = np.zeros((len(tracks.times), model.nq))
+    q[:, QUATERNION.start] = 1
+    body = world_points(model, placed, q[:1])[0]
+    use = tracks.seen & placed.on_torso
+    laid = np.array([_spread(body[here]) for here in use])
+    if not laid.any():
+        use = tracks.seen
+        laid = np.array([_spread(body[here]) for here in use])
+    for frame in np.flatnonzero(laid):
+        here = use[frame]
+        q[frame, :7] = _laid(body[here], tracks.positions[frame, here])
+    return (_between(tracks.times, q, np.flatnonzero(laid)) if laid.any() else q), laid
+
+
+def _spread(points: np.ndarray) -> bool:
+    """Tell whether points (K, 3) give an attitude: three or more that are not on a line."""
+    if len(points) < 3:
+        return False
+    sizes = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return bool(sizes[1] > LINE * sizes[0])
+
+
+def _laid(body: np.ndarray, world: np.ndarray) -> np.ndarray:
     """Return position and quaternion that lay points in B over those in the world (Kabsch)."""
     middle, centre = body.mean(axis=0), world.mean(axis=0)
-    quaternion = last[3:]
-    if len(body) >= 3:
-        U, _, Vt = np.linalg.svd((world - centre).T @ (body - middle))
-        R = U @ np.diag([1, 1, np.sign(np.linalg.det(U @ Vt))]) @ Vt
-        quaternion = quaternion_of(R)
-    R = rotation_matrix(quaternion)
-    return np.concatenate([centre - R @ middle, quaternion])
+    U, _, Vt = np.linalg.svd((world - centre).T @ (body - middle))
+    R = U @ np.diag([1, 1, np.sign(np.linalg.det(U @ Vt))]) @ Vt
+    return np.concatenate([centre - R @ middle, quaternion_of(R)])
 
 
 def quaternion_of(R: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import finite_array, number, refusal
+from ..checks import finite_array, measured, number, refusal
 from ..errors import IdentificationError
 from ..motion.trajectory import Trajectory
 
@@ -22,10 +22,10 @@ class TorquePrior:
 
     Parameters
     ----------
-    std : float
-        Standard deviation at any time (N m).
-    time : float
-        Correlation time (s).
+    std : float or str
+        Standard deviation at any time (N m), or text such as "4 mN m".
+    time : float or str
+        Correlation time (s), or text such as "30 ms".
 
     Examples
     --------
@@ -34,19 +34,18 @@ class TorquePrior:
     TorquePrior(std=0.005, time=0.02)
     """
 
-    std: float
-    time: float
+    std: float | str
+    time: float | str
 
 
-def checked_prior(prior: Any) -> TorquePrior:
-    """Return a checked prior; IdentificationError otherwise."""
-    if not isinstance(prior, TorquePrior):
-        needs = "a TorquePrior: its standard deviation (N m) and correlation time (s)"
-        raise refusal("torques", prior, needs, IdentificationError)
-    return TorquePrior(
-        number("torques.std", prior.std, IdentificationError, above=0),
-        number("torques.time", prior.time, IdentificationError, above=0),
+def checked_prior(prior: TorquePrior) -> TorquePrior:
+    """Return a prior in N m and s; IdentificationError otherwise."""
+    fields, error = {"std": "N m", "time": "s"}, IdentificationError
+    std, time = (
+        number(f"torques.{name}", measured(f"torques.{name}", value, unit, error), error, above=0)
+        for (name, unit), value in zip(fields.items(), (prior.std, prior.time), strict=True)
     )
+    return TorquePrior(std, time)
 
 
 Known = Callable[[np.ndarray], np.ndarray]  # times (...) -> torques (..., 2m)
@@ -112,15 +111,15 @@ def _called(function: Callable[[float], Any], nt: int) -> Known:
 
 def knots_of(times: np.ndarray, prior: TorquePrior) -> np.ndarray:
     """Return indices of the mesh's times that are knots, about a quarter of the time apart."""
-    spans = max(int(np.ceil((times[-1] - times[0]) * PER_TIME / prior.time)), 1)
+    spans = max(int(np.ceil((times[-1] - times[0]) * PER_TIME / float(prior.time))), 1)
     even = np.linspace(times[0], times[-1], spans + 1)
     return np.unique(np.abs(times[:, None] - even).argmin(axis=0))
 
 
 def prior_rows(times: np.ndarray, prior: TorquePrior) -> np.ndarray:
     """Return W (U, U): W u are independent with variance 1 if u (U,) at knots obeys the prior."""
-    decay = np.exp(-np.diff(times) / prior.time)
-    fresh = np.sqrt(-np.expm1(-2 * np.diff(times) / prior.time))
+    spans = np.diff(times) / float(prior.time)
+    decay, fresh = np.exp(-spans), np.sqrt(-np.expm1(-2 * spans))
     W = np.diag(np.concatenate([[1.0], 1 / fresh]))
     W[range(1, len(times)), range(len(times) - 1)] = -decay / fresh
-    return W / prior.std
+    return W / float(prior.std)

@@ -1,7 +1,9 @@
 """``MarkerTracks``: positions of markers over time, nan if a marker was not seen."""
 
+import warnings
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -11,11 +13,15 @@ from numpy.typing import ArrayLike
 from serpentail_scene.units import MEASURES, plain
 
 from ..checks import finite_array, needed, one_of, real_array, refusal, shown
-from ..errors import IdentificationError
+from ..errors import IdentificationError, UnusualSize
+from ..magnitudes import LARGEST
+from ..motion.account import framed
 
 UNITS: dict[str, Fraction] = MEASURES["m"][1]
 ZEROS = ("refuse", "gap")
 FEWEST = 4  # frames
+FARTHEST = 1e6  # m from the origin, in any recording
+LATEST = 1e12  # s: times since 1970, and more
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,12 +38,26 @@ class MarkerTracks:
         Names of the markers.
     source : str
         Where they are from, for messages.
+    unit : str
+        The unit that they were given in, for messages.
     """
 
     times: np.ndarray
     positions: np.ndarray
     names: tuple[str, ...]
     source: str = "arrays"
+    unit: str = "m"
+
+    def __repr__(self) -> str:
+        frames, count = self.seen.shape
+        return framed(
+            [
+                f"MarkerTracks of {self.source}: {count} markers at {frames} times, "
+                f"{self.times[0]:.6g} to {self.times[-1]:.6g} s",
+                f"names {', '.join(self.names)}",
+                f"positions {self.positions.shape}; SI: s, m; {1 - self.seen.mean():.0%} not seen",
+            ]
+        )
 
     @property
     def seen(self) -> np.ndarray:
@@ -65,7 +85,7 @@ class MarkerTracks:
         for name in names:
             one_of(f"markers of {self.source}", name, self.names, IdentificationError)
         columns = [self.names.index(name) for name in names]
-        return MarkerTracks(self.times, self.positions[:, columns], tuple(names), self.source)
+        return replace(self, positions=self.positions[:, columns], names=tuple(names))
 
 
 def marker_tracks(
@@ -105,7 +125,12 @@ def marker_tracks(
     Raises
     ------
     IdentificationError
-        An argument is wrong.
+        An argument is wrong, or a position is more than 1000 km from the origin.
+
+    Warns
+    -----
+    UnusualSize
+        A position is more than 100 m from the origin: most often the unit is wrong.
 
     Examples
     --------
@@ -123,7 +148,7 @@ def checked_tracks(
 ) -> MarkerTracks:
     """Return tracks of arrays after checking them; how: unit, axes, zeros; source: for errors."""
     unit, axes, zeros = how
-    factor = float(UNITS[checked_unit(unit, source)])
+    unit = checked_unit(unit, source)
     t = checked_times(times, source)
     names = checked_names(names, source)
     where = real_array(f"{source}: positions", positions, IdentificationError)
@@ -137,13 +162,31 @@ def checked_tracks(
     one_of("zeros", zeros, ZEROS, IdentificationError)
     where = without_zeros(where, names, zeros, source)
     columns, signs = checked_axes(axes)
-    where = where[..., columns] * signs * factor
+    where = where[..., columns] * signs * float(UNITS[unit])
     part = np.isfinite(where)
     where = np.where(part.all(axis=2, keepdims=True), where, np.nan)
     unseen = [name for k, name in enumerate(names) if not part[:, k].all(axis=-1).any()]
     if unseen:
         raise IdentificationError(f"{source}: never seen: {', '.join(unseen)}: leave these out")
-    return MarkerTracks(t, where, names, source)
+    far, line = _farthest(where, names, source)
+    if far > FARTHEST:
+        raise IdentificationError(line)
+    if far > LARGEST["m"][0]:
+        warnings.warn(line, UnusualSize, stacklevel=3)
+    return MarkerTracks(t, where, names, source, unit)
+
+
+def _farthest(where: np.ndarray, names: Sequence[str], source: str) -> tuple[float, str]:
+    """Return the largest coordinate (m), and a line that says it is beyond what is usual."""
+    reach = np.abs(where)
+    place = np.unravel_index(np.nanargmax(reach), where.shape)
+    frame, marker, axis = map(int, place)
+    field = f"{source}: marker {shown(names[marker])}, frame {frame} (from 0), {'xyz'[axis]}"
+    line = (
+        f"{field}: value {where[place]:.6g} m: beyond {LARGEST['m'][1]}, which no recording has: "
+        'give the right unit, such as unit="mm", or nan for a gap'
+    )
+    return float(reach[place]), line
 
 
 def checked_unit(unit: Any, source: str) -> str:
@@ -166,6 +209,11 @@ def checked_times(times: Any, source: str) -> np.ndarray:
         raise IdentificationError(
             f"{source}: times have shape {t.shape}: needs {FEWEST} frames or more"
         )
+    late = np.flatnonzero(np.abs(t) > LATEST)
+    if len(late):
+        raise IdentificationError(
+            f"{source}: times[{late[0]}]: value {t[late[0]]:g}: needs seconds, up to {LATEST:g}"
+        )
     wrong = np.flatnonzero(np.diff(t) <= 0)
     if len(wrong):
         k = int(wrong[0])
@@ -180,11 +228,13 @@ def checked_times(times: Any, source: str) -> np.ndarray:
 def checked_names(names: Any, source: str) -> tuple[str, ...]:
     """Return the names of markers; IdentificationError unless they are different texts."""
     listed = tuple(names) if isinstance(names, list | tuple) else ()
-    if not listed or not all(isinstance(name, str) and name.strip() for name in listed):
-        raise refusal(f"{source}: names", names, "a name for each marker", IdentificationError)
-    twice = [name for name in listed if listed.count(name) > 1]
-    if twice:
-        raise IdentificationError(f"{source}: two markers are called {twice[0]!r}: rename one")
+    sound = (isinstance(x, str) and x.strip() and x.isprintable() for x in listed)
+    if not listed or not all(sound):
+        needs = "a name for each marker, without control characters"
+        raise refusal(f"{source}: names", names, needs, IdentificationError)
+    name, count = Counter(listed).most_common(1)[0]
+    if count > 1:
+        raise IdentificationError(f"{source}: two markers are called {shown(name)}: rename one")
     return listed
 
 

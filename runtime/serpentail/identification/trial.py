@@ -10,14 +10,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from serpentail_scene.layout import OMEGA, QUATERNION, TAIL_Q
-
-from ..attitude import rotation_matrix
 from ..errors import IdentificationError
 from ..model.model import Model
 from . import stages as radau
 from .placement import Placements
-from .points import CROSS, body_points, body_positions, geometry_of
+from .points import STEP, marker_points, offset_axes, world_points
 from .torques import Known, TorquePrior, knots_of, prior_rows
 from .tracks import MarkerTracks
 from .unknowns import Unknowns
@@ -146,29 +143,19 @@ def seen_points(model: Model, placed: Placements, trial: Trial, states: np.ndarr
     return world_points(model, placed, states[trial.frames, : model.nq])
 
 
-def world_points(model: Model, placed: Placements, q: np.ndarray) -> np.ndarray:
-    """Return the positions of the markers by the model at configurations (F, nq), (F, M, 3) m."""
-    body = body_positions(geometry_of(model), q[:, TAIL_Q], placed)
-    return q[:, None, :3] + np.einsum("fij,fmj->fmi", rotation_matrix(q[:, QUATERNION]), body)
-
-
 def marker_jacobians(
     unknowns: Unknowns, model: Model, placed: Placements, q: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return derivatives (F, M, 3, nv), (F, M, 3, P) of the markers by q's tangent and unknowns."""
-    shape = geometry_of(model)
-    by_unknowns = unknowns.geometry_jacobian(model, len(shape.numbers))
-    wanted = np.flatnonzero(by_unknowns.any(axis=1))
-    body = body_points(shape, q[:, TAIL_Q], placed, wanted)
-    R = rotation_matrix(q[:, QUATERNION])[:, None]
-    by_q = np.zeros((*body.points.shape, model.nv))
-    by_q[..., :3] = np.eye(3)
-    by_q[..., OMEGA] = -R @ np.einsum("fmk,kij->fmij", body.points, CROSS)
-    by_q[..., 6:] = R @ body.by_tail
-    by = R @ (body.by_geometry @ by_unknowns)
-    turned = R @ body.axes
-    for marker, axis, k in unknowns.offsets():
-        by[:, marker, :, k] += turned[:, marker, :, axis]
+    points, by_q = marker_points(model, placed, q)
+    by = np.zeros((*points.shape, len(unknowns.each)))
+    for k, beside in unknowns.beside(model).items():
+        above, below = (world_points(each, placed, q) for each in beside)
+        by[..., k] = (above - below) / (2 * STEP * unknowns.sizes[k])
+    if offsets := unknowns.offsets():
+        axes = offset_axes(model, placed, q)
+        for marker, axis, k in offsets:
+            by[:, marker, :, k] = axes[:, marker, :, axis]
     return by_q, by
 
 

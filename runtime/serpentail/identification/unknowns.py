@@ -17,6 +17,9 @@ from .points import STEP
 
 MARKER = "marker:"
 SAME = "same"
+GEOMETRY = ("tail_mount", "mount_angles", "tail_length", "link_lengths", "arc_lengths")
+LEAST = 1e-3  # of its size: bound of a positive number
+TINY = 1e-30  # of complex steps
 NAME = re.compile(r"([A-Za-z_]\w*)(?:\[(\d+|same)\])?")
 
 
@@ -53,6 +56,14 @@ class Unknowns:
         """The size of each, by which changes of different units are compared, (P,)."""
         return np.array([each.size for each in self.each])
 
+    @property
+    def least(self) -> np.ndarray:
+        """The bound of each (P,): 0, almost 0 if it must be positive, -inf if it has a sign."""
+        checks = {p["name"]: p["check"] for p in self.model.manifest["parameters"]}
+        bounds = {"not_negative": 0.0, "positive": LEAST, "body_inertia": LEAST}
+        each = [bounds.get(checks.get(each.of, ""), -np.inf) for each in self.each]
+        return np.array(each, float) * self.sizes
+
     def model_at(self, values: np.ndarray) -> Model:
         """Return the model with these parameters; ModelError if they are unphysical."""
         changes = independent(self.model.manifest, self.model.parameters)
@@ -61,12 +72,7 @@ class Unknowns:
         for each, value in zip(self.each, values, strict=True):
             if not each.is_offset:
                 new[each.of] = _with(new[each.of], each.entries, value)
-        if not new:
-            return self.model
-        with warnings.catch_warnings():  # an iterate may be unusual; only the result is checked
-            warnings.simplefilter("ignore", UnusualSize)
-            warnings.simplefilter("ignore", UnlikeBodies)
-            return self.model.with_parameters(**new)
+        return _changed(self.model, new) if new else self.model
 
     def placed_at(self, values: np.ndarray) -> Placements:
         """Return the markers with these offsets."""
@@ -91,23 +97,25 @@ class Unknowns:
                 jacobian[:, k] = _struct_direction(model, each)
         return jacobian
 
-    def geometry_jacobian(self, model: Model, numbers: int) -> np.ndarray:
-        """Return d(mount, angles, lengths) / d(unknowns), (numbers, P)."""
-        jacobian = np.zeros((numbers, len(self.each)))
+    def beside(self, model: Model) -> dict[int, list[Model]]:
+        """Return the models a small step above and below, by index of what moves the tail."""
+        models: dict[int, list[Model]] = {}
         for k, each in enumerate(self.each):
-            rows = _geometry_rows(each.of, numbers - 6)
-            if each.of == "tail_length":
-                jacobian[rows, k] = 1 / len(rows)  # of equal pieces
-            elif rows:
-                jacobian[[rows[entry] for entry in each.entries], k] = 1.0
-        return jacobian
+            if each.of in GEOMETRY:
+                values = np.array(model.parameters[each.of], float)
+                here = np.atleast_1d(values)[each.entries[0]]
+                ends = (here + STEP * each.size, here - STEP * each.size)
+                changes = [{each.of: _with(values, each.entries, end)} for end in ends]
+                models[k] = [_changed(model, change) for change in changes]
+        return models
 
 
-def _geometry_rows(of: str, pieces: int) -> list[int]:
-    """Return which numbers of the geometry a parameter's entries are."""
-    lengths = list(range(6, 6 + pieces))
-    known = {"tail_mount": [0, 1, 2], "mount_angles": [3, 4, 5], "tail_length": lengths}
-    return known.get(of, lengths if of in ("link_lengths", "arc_lengths") else [])
+def _changed(model: Model, changes: dict[str, Any]) -> Model:
+    """Return a model with other parameters, which may be unusual; only the result is checked."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UnusualSize)
+        warnings.simplefilter("ignore", UnlikeBodies)
+        return model.with_parameters(**changes)
 
 
 def _with(values: np.ndarray, entries: tuple[int, ...], value: float) -> Any:
@@ -124,15 +132,15 @@ def _struct_direction(model: Model, unknown: Unknown) -> np.ndarray:
     values: dict[str, Any] = dict(model.parameters)
     moved = np.array(values[unknown.of], complex)
     if moved.ndim:
-        moved[list(unknown.entries)] += 1j * STEP
+        moved[list(unknown.entries)] += 1j * TINY
     else:
-        moved = moved + 1j * STEP
+        moved = moved + 1j * TINY
     values[unknown.of] = moved
     if "link_radius" in values:
         pieces = int(np.sum(model.joints_each))
         values["link_inertia"] = np.array(ellipsoid(values, pieces))
     as_tuples = {name: tuple(np.atleast_1d(x)) for name, x in values.items()}
-    return np.array(flat(model.manifest, as_tuples)).imag / STEP
+    return np.array(flat(model.manifest, as_tuples)).imag / TINY
 
 
 def unknowns(model: Model, placed: Placements, estimate: Any) -> Unknowns:

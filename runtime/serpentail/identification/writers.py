@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import IdentificationError
-from ..files import replacing
+from ..files import replacing, write_csv
 from .tracks import MarkerTracks
 
 
@@ -35,7 +35,9 @@ def write_markers(tracks: MarkerTracks, path: str | PathLike[str]) -> Path:
     target = Path(path)
     if target.suffix not in (".trc", ".csv"):
         raise IdentificationError(f"path: value {str(path)!r}: needs a name ending in .trc or .csv")
-    lines = _trc(tracks, target.name) if target.suffix == ".trc" else _csv(tracks)
+    if target.suffix == ".csv":
+        return write_csv(target, _csv(tracks))
+    lines = _trc(tracks, target.name)
     with replacing(target) as part:
         part.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return target
@@ -63,11 +65,11 @@ def _trc(tracks: MarkerTracks, name: str) -> list[str]:
     ]
 
 
-def _csv(tracks: MarkerTracks) -> list[str]:
-    """Return the lines of a CSV file."""
+def _csv(tracks: MarkerTracks) -> list[list[str]]:
+    """Return the rows of a CSV file."""
     head = ["time", *(f"{name}_{axis}" for name in tracks.names for axis in "xyz")]
     rows = zip(tracks.times, tracks.positions, strict=True)
-    return [",".join(head), *(",".join([f"{t:.9g}", *_cells(row)]) for t, row in rows)]
+    return [head, *([f"{t:.9g}", *_cells(row)] for t, row in rows)]
 
 
 def _cells(row: np.ndarray) -> list[str]:

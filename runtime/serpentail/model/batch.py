@@ -10,6 +10,7 @@ from typing import Any
 from weakref import WeakSet
 
 from ..errors import ModelError
+from .compiler import opened
 from .kept import kept
 from .manifest import CheckedFolder, remedy
 from .snapshot import library_in_cache, model_library
@@ -57,8 +58,8 @@ class LazyLibrary:
         """Return a function that takes the address of a record and returns a status."""
         with self.lock:
             if self.library is None:
-                path = model_library(self.checked, [self.source], self.profile)
-                self.library = ctypes.CDLL(str(path))
+                sources = [self.source]
+                self.library = opened(lambda: model_library(self.checked, sources, self.profile))
         function = getattr(self.library, name, None)
         if function is None:
             raise ModelError(

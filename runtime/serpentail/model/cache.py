@@ -67,6 +67,15 @@ def refuse_others(*paths: Path) -> None:
                 raise _unsafe(path, "is writable by others", mend)
 
 
+def refuse_open(cache: Path) -> None:
+    """Raise SerpentailError if everybody may exchange a folder above the cache, as not in /tmp."""
+    for path in cache.resolve().parents if hasattr(os, "geteuid") else ():
+        with contextlib.suppress(OSError):
+            mode = os.stat(path).st_mode
+            if mode & stat.S_IWOTH and not mode & stat.S_ISVTX:
+                raise _unsafe(path, "is writable by others", f"`chmod o-w {path}`, or ")
+
+
 def _unsafe(path: Path, fault: str, remedy: str) -> SerpentailError:
     """Return the error that others could have put libraries into the cache."""
     return SerpentailError(

@@ -3,11 +3,21 @@
 import os
 import signal
 import subprocess
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 
 TICK_S = 0.2  # s between checks of a command's progress
 GRACE_S = 0.5  # s that a command has to remove its temporary files
+
+
+def inherited(**more: str) -> dict[str, str]:
+    """Return the environment of a Python process that finds the modules that this one does.
+
+    more: variables to set besides.
+    """
+    paths = dict.fromkeys(path or os.getcwd() for path in sys.path)
+    return os.environ | {"PYTHONPATH": os.pathsep.join(paths)} | more
 
 
 def run_all(

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import hashlib
+import logging
 import os
 import shlex
 import subprocess
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-from ..errors import CompileFailed, ModelError
+from ..errors import CompileFailed, ModelError, SerpentailError
 from ..stages import Stage
 from .bound import bound, limit
 from .cache import (
@@ -21,6 +24,7 @@ from .cache import (
     library_in,
     library_name,
     publish,
+    refuse_open,
     refuse_others,
     unwritable,
     workshop,
@@ -77,6 +81,7 @@ def library_of(
     """
     check_profile(profile)
     refuse_others(cache)
+    refuse_open(cache)
     library = noted(text, profile, cache, flags)
     if library:
         return library
@@ -88,6 +93,25 @@ def library_of(
         # its word.
         toolchain = _joined(examine(profile, cache), flags)
         return library_in(_place(text, toolchain, cache)) or _build(text, places, toolchain, cache)
+
+
+def opened(compiled: Callable[[], Path], kind: type[ctypes.CDLL] = ctypes.CDLL) -> Any:
+    """Return the library whose path a call of this room returns, open.
+
+    One that cannot be loaded is made anew. SerpentailError if that cannot be loaded either, and
+    errors as of the call.
+    """
+    path = compiled()
+    with contextlib.suppress(OSError):
+        return kind(str(path))
+    with contextlib.suppress(OSError):
+        path.unlink()
+    try:
+        return kind(str(compiled()))
+    except OSError as error:
+        raise SerpentailError(
+            f"the compiled model cannot be loaded ({error}): set SERPENTAIL_CACHE"
+        ) from error
 
 
 def noted(text: str, profile: str, cache: Path, flags: tuple[str, ...] = ()) -> Path | None:
@@ -173,6 +197,8 @@ def _c_library() -> str:
 def _build(text: str, places: Callable[[], Places], toolchain: Toolchain, cache: Path) -> Path:
     """Compile in a folder of our own; one rename then shows others the whole library."""
     place, most = _place(text, toolchain, cache), limit()
+    if os.path.lexists(place):
+        logging.getLogger("serpentail").warning("%s was damaged: it is made anew", place)
     sources, include = places()
     try:
         with workshop(cache) as part:

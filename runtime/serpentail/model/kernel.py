@@ -16,7 +16,7 @@ from serpentail_scene.layout import PER_SEGMENT, QUATERNION
 from ..checks import real_array, refuse_not_finite
 from ..errors import StateError
 from .batch import BatchLibrary, RecordFunction
-from .calls import Call, call_of, declined
+from .calls import Call, call_of, declined, waiting
 from .library import NOT_POSITIVE_DEFINITE, OUT_OF_RANGE
 from .workers import shared
 
@@ -145,6 +145,7 @@ class Kernel:
         self.parameters, self.work = parameters, manifest["work"][name]
         self.bend_range = manifest["scene"].get("bend_range")
         self.polar = manifest["scene"]["coordinates"] == "polar"
+        self.kinds = manifest["dimensions"].get("kinds") or ("continuum",)  # of all: arcs alone
         self.own = threading.local()  # buffers of each thread
         self.fast: Call | None = None  # made at the first call
 
@@ -157,7 +158,8 @@ class Kernel:
         """Return a fast call of the function; it returns None for arguments that it declines."""
         own = self._buffers()
         size = self.work + sum(array.size for array in (*own.inputs, *own.outputs))
-        self.fast = fast = declined if size > MOST_HELD else call_of(self.function, own)
+        fast = declined if waiting() or size > MOST_HELD else call_of(self.function, own)
+        self.fast = None if waiting() else fast
         return fast
 
     def _buffers(self) -> Buffers:
@@ -284,6 +286,7 @@ class Kernel:
             tail = tail[: len(tail) // 2]
         first, second = tail[::PER_SEGMENT], tail[1::PER_SEGMENT]
         bends = abs(second) if self.polar else np.hypot(first, second)
+        bends = np.where(np.array(self.kinds) == "continuum", bends, 0.0)  # only arcs have a range
         least, worst = int(bends.argmin()), int(bends.argmax())
         if self.polar and bends[worst] <= self.bend_range:
             what = f"segment {least + 1}{state} has theta = {bends[least]:.6g} rad"
@@ -291,8 +294,7 @@ class Kernel:
                 f"{what}: polar coordinates have no value at theta = 0; use "
                 f'coordinates = "bend" in the scene'
             )
-        what = (
+        return (
             f"segment {worst + 1}{state} is bent by {bends[worst]:.6g} rad, beyond the scene's "
-            f"{self.bend_range:.6g}"
+            f"{self.bend_range:.6g}: set a larger `bend_range`, then generate the model again"
         )
-        return f"{what}: set a larger `bend_range` in the scene, then generate the model again"

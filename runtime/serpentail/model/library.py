@@ -2,8 +2,9 @@
 
 import ctypes
 
-from ..errors import ModelError, SerpentailError
+from ..errors import ModelError
 from .batch import LAZY_SOURCES
+from .compiler import opened
 from .manifest import CheckedFolder, remedy
 from .snapshot import model_library
 
@@ -39,18 +40,12 @@ def open_library(checked: CheckedFolder, profile: str) -> ctypes.CDLL:
     manifest, prefix = checked.manifest, checked.manifest["prefix"]
     lazy = {f"src/{prefix}_{part}.c" for part in LAZY_SOURCES}
     sources = [name for name in checked.files if name.startswith("src/") and name not in lazy]
-    path = model_library(checked, sources, profile)
-    try:
-        library = ctypes.CDLL(str(path))
-    except OSError as error:
-        raise SerpentailError(
-            f"the compiled model cannot be loaded ({error}): set SERPENTAIL_CACHE"
-        ) from error
+    library = opened(lambda: model_library(checked, sources, profile))
     abi_hash = getattr(library, f"{prefix}_abi_hash")
     abi_hash.restype = ctypes.c_char_p
     if abi_hash().decode() != manifest["abi_hash"]:
         raise ModelError(
-            f"{path} has interface {abi_hash().decode()}, the manifest {manifest['abi_hash']}: "
-            f"{remedy(checked.folder)}"
+            f"{library._name} has interface {abi_hash().decode()}, the manifest "
+            f"{manifest['abi_hash']}: {remedy(checked.folder)}"
         )
     return library

@@ -9,6 +9,7 @@ import numpy as np
 from ..errors import ModelError
 from .batch import BatchLibrary
 from .cores import checked_threads
+from .even_arcs import warn_of_even_arcs
 from .library import open_library
 from .manifest import CheckedFolder, read_folder
 from .methods.evaluated import without_c
@@ -96,6 +97,7 @@ def model_from(
     manifest = checked.manifest
     values = resolve(manifest, parameters)
     warn_of_sizes(manifest, values, 3)  # 3: the caller of st.load
+    warn_of_even_arcs(manifest, values, 3)
     profile = manifest["scene"]["profile"] if profile is None else profile
     if not isinstance(compiled, bool | np.bool_):
         raise ModelError(f"compiled: value {compiled!r:.60}: needs True or False")

@@ -9,7 +9,7 @@ import numpy as np
 
 from serpentail_scene.units import in_unit
 
-from ..checks import did_you_mean, numbers_in, shown
+from ..checks import did_you_mean, numbers_in, one_line, shown
 from ..errors import ModelError
 
 Value = float | tuple[float, ...]
@@ -223,7 +223,7 @@ def checked_value(
         parts = [part for part in TOTALS.get(name, ()) if part in fields]
         remedy = did_you_mean(name, fields) or f"there are {', '.join(fields)}"
         remedy = f"it is the sum of {parts[0]}, change these" if parts else remedy
-        return f"{name}: no such parameter; {remedy}"
+        return f"{one_line(f'{name}')}: no such parameter; {remedy}"
     # the required value, in words and as a shape
     size, unit = fields[name]["size"], fields[name]["unit"]
     holds, words = CHECKS[fields[name]["check"]]

@@ -39,20 +39,19 @@ def stored_energy(values: Mapping[str, Any], angles: Any) -> Any:
 
 
 def behind_stops(values: Mapping[str, Any], angles: Any) -> str:
-    """Return the first tail coordinate of (k, 2m) that is more than a stop's width beyond it.
+    """Return which tail coordinate of (k, 2m) is the furthest beyond a stop, by more than its
+    width.
 
     The text is empty if there is none.
     """
     for (name, _), (way, _) in zip(ENDS, _ways(values, angles), strict=False):
-        wrong = np.argwhere(way > 1)
-        if len(wrong):
-            run, coordinate = wrong[0]
+        run, coordinate = np.unravel_index(way.argmax(), way.shape)
+        if way[run, coordinate] > 1:
             stop = np.broadcast_to(_of(values, name), np.shape(angles))[run, coordinate]
             width = np.broadcast_to(_of(values, "tail_stop_width"), np.shape(angles))
             return (
                 f"tail coordinate {coordinate} is {angles[run, coordinate]:.6g} rad, behind "
-                f"{name} {stop:.6g} by more than tail_stop_width {width[run, coordinate]:.6g}: "
-                "give one between the stops, or move them"
+                f"{name} {stop:.6g} by more than tail_stop_width {width[run, coordinate]:.6g}"
             )
     return ""
 

@@ -82,7 +82,7 @@ def _checked(stream: BinaryIO, size: int, needed: Iterable[str]) -> dict[str, An
             raise ValueError(f"it would unpack to {unpacked / 1e9:.2g} GB")
         damaged = archive.testzip()
     if damaged:
-        raise ValueError(f"the checksum of {damaged} is wrong")
+        raise ValueError(f"the checksum of {damaged!r} is wrong")
     stream.seek(0)
     with np.load(stream, allow_pickle=False) as stored:
         touching = [name for name in stored.files if name.startswith(CONTACT)]

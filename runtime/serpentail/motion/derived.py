@@ -6,6 +6,7 @@ from typing import Any, TypeVar
 T = TypeVar("T")
 
 LATER = "later"  # attribute of a motion that holds the function deriving its fields
+AGAIN = "again"  # that of a run: the function that makes it again, less exactly
 # the name of a field -> this field and related ones, by name
 Later = Callable[[str], dict[str, Any]]
 
@@ -20,8 +21,7 @@ def made(kind: type[T], fields: Mapping[str, Any], later: Later) -> T:
 def settled(motion: Any, names: Iterable[str]) -> dict[str, Any]:
     """Return the state of a motion after deriving the fields of these names."""
     state = vars(motion) | {name: getattr(motion, name) for name in names}
-    state.pop(LATER, None)
-    return state
+    return {name: value for name, value in state.items() if name not in (LATER, AGAIN)}
 
 
 class Derived:

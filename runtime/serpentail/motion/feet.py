@@ -25,7 +25,5 @@ def feet_times(motion: Trajectory, kind: str, which: int) -> dict[str, float | N
 
 def _touching(motion: Trajectory) -> dict[str, NDArray[np.bool_]]:
     """Return for each foot the samples (K,) at which the ground pushes it."""
-    return {
-        name: np.asarray((foot.forces[..., 2] > 0).any(axis=1))
-        for name, foot in feet(motion).items()
-    }
+    pushes = {name: forces[..., 2] > 0 for name, forces in feet(motion).items()}
+    return {name: np.asarray(pushed.any(axis=1)) for name, pushed in pushes.items()}

@@ -1,15 +1,24 @@
-"""Peaks of the ground's forces at a motion's samples: of points, feet, groups and all together."""
+"""Peaks of the ground's forces: on all points together, on groups and on feet."""
 
-from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..model.model import Model
 from .body import weight
-from .contact import Contact
-from .trajectory import Trajectory
+from .contact import Array
+
+if TYPE_CHECKING:
+    from .trajectory import Trajectory
 
 FEET = ("right_foot", "left_foot")
+
+
+class Peak(NamedTuple):
+    """A largest force (N), and its time (s)."""
+
+    force: float
+    time: float
 
 
 def in_weights(model: Model, force: float | None) -> float | None:
@@ -18,34 +27,30 @@ def in_weights(model: Model, force: float | None) -> float | None:
     return force / whole if force is not None and whole else None
 
 
-def peak_total(motion: Trajectory) -> float | None:
-    """The largest force (N) on all points together; None in flight."""
-    return None if motion.contact is None else float(motion.contact.total.max())
+def peaks(motion: "Trajectory") -> dict[str, Peak]:
+    """The largest forces on all points, each group and each foot; nothing in flight.
+
+    They are those at the ends of the integrator's steps, which do not depend on the samples, and at
+    the samples, which are all that a motion of other origin has.
+    """
+    contact = motion.contact
+    if contact is None:
+        return {}
+    groups = {group: contact.of(group).forces for group in contact.groups}
+    found = {}
+    for name, forces in ({"all": contact.forces} | groups | feet(motion)).items():
+        total = np.linalg.norm(forces.sum(axis=1), axis=1)
+        k = int(total.argmax())
+        found[name] = Peak(float(total[k]), float(motion.t[k]))
+        recorded = Peak(*motion.info.get("peaks", {}).get(name, found[name]))
+        if motion.t[0] <= recorded.time <= motion.t[-1]:  # a resampled motion may be a part
+            found[name] = max(found[name], recorded)
+    return found
 
 
-def peaks(motion: Trajectory) -> dict[str, float] | None:
-    """The largest force (N) on each group, and on each foot; None in flight."""
-    if motion.contact is None:
-        return None
-    groups = {group: motion.contact.of(group) for group in motion.contact.groups}
-    parts = groups | feet(motion)
-    return {name: float(part.total.max()) for name, part in parts.items()}
-
-
-def feet(motion: Trajectory) -> dict[str, Contact]:
-    """Return the points of the right and of the left foot; nothing without feet."""
+def feet(motion: "Trajectory") -> dict[str, Array]:
+    """Return the forces (K, points, 3) on the right and on the left foot; nothing without feet."""
     if motion.contact is None or "feet" not in motion.contact.groups:
         return {}
-    both = motion.contact.of("feet")
-    sides = np.split(both.forces, 2, axis=1)
-    return {name: replace(both, forces=side) for name, side in zip(FEET, sides, strict=True)}
-
-
-def peak_force(motion: Trajectory, group: str) -> float | None:
-    """Largest force (N) on a point of a group, of both feet together; None without the group."""
-    if motion.contact is None or group not in motion.contact.groups:
-        return None
-    forces = motion.contact.of(group).forces
-    if group == "feet":
-        forces = np.add(*np.split(forces, 2, axis=1))
-    return float(np.linalg.norm(forces, axis=-1).max())
+    sides = np.split(motion.contact.of("feet").forces, 2, axis=1)
+    return dict(zip(FEET, sides, strict=True))

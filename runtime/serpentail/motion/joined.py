@@ -31,6 +31,14 @@ def joined(parts: Sequence[Trajectory]) -> Trajectory:
     return replace(parts[0], **arrays, info=_info([part.info for part in parts]), contact=contact)
 
 
+def joined_again(repeats: Sequence[Any], coarse: int) -> Trajectory:
+    """Return motions made again by their functions, each from the end of the one before, as one."""
+    parts: list[Trajectory] = []
+    for again in repeats:
+        parts.append(again(coarse, *parts[-1:]))
+    return joined(parts)
+
+
 def _end_to_end(arrays: Sequence[np.ndarray]) -> np.ndarray:
     """Samples one after another, each once."""
     return np.concatenate([arrays[0], *(array[1:] for array in arrays[1:])])
@@ -48,6 +56,9 @@ def _info(parts: Sequence[dict[str, Any]]) -> dict[str, Any]:
     if all("events" in part for part in parts):
         info["events"] = [event for part in parts for event in part["events"]]
     info["warnings"] = list(dict.fromkeys(w for part in parts for w in part.get("warnings", [])))
+    peaks = [item for part in parts for item in part.get("peaks", {}).items()]
+    if peaks:  # sorted by force, so that the largest of each name is kept
+        info["peaks"] = dict(sorted(peaks, key=lambda item: item[1][0]))
     if all("imbalance" in part for part in parts):
         for name in BOOKS:
             info[name] = {

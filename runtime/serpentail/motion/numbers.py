@@ -13,7 +13,7 @@ from ..model.model import Model
 from ..model.passive import stored_energy
 from .body import weight
 from .doubts import warnings_of
-from .forces import in_weights, peak_force, peak_total, peaks
+from .forces import Peak, in_weights, peaks
 from .landing import (
     MAX_SPEED,
     MIN_SHARE,
@@ -65,11 +65,20 @@ def _ground_impulse(motion: Trajectory) -> list[float] | None:
     return np.sum(list(impulses.values()), axis=0).tolist() if impulses else None
 
 
-def _peaks_in_weights(model: Model, motion: Trajectory) -> dict[str, float | None] | None:
-    found = peaks(motion)
-    if found is None:
-        return None
-    return {name: in_weights(model, force) for name, force in found.items()}
+def _of_all(found: dict[str, Peak], which: int) -> float | None:
+    """Return the force or the time of the peak of all points."""
+    return found["all"][which] if found else None
+
+
+def _of_parts(motion: Trajectory) -> dict[str, float] | None:
+    """Return the peaks of groups and feet."""
+    found = {name: peak.force for name, peak in peaks(motion).items() if name != "all"}
+    return found or None
+
+
+def _parts_in_weights(model: Model, motion: Trajectory) -> dict[str, float | None] | None:
+    found = _of_parts(motion) or {}
+    return {name: in_weights(model, force) for name, force in found.items()} or None
 
 
 def _real_time_factor(motion: Trajectory) -> float | None:
@@ -77,7 +86,7 @@ def _real_time_factor(motion: Trajectory) -> float | None:
     return float(motion.t[-1] - motion.t[0]) / seconds if seconds else None
 
 
-SAMPLES = "at the samples, which may miss the peak of an impact or of legs that start to move"
+STEPS = "at the ends of the integrator's steps; quote the impulse of a blow, not its peak"
 ONE_FOOT = "of each foot by the samples"
 NUMBERS = (
     Number("model", "", "name of the model", lambda model, motion: model.name),
@@ -145,30 +154,6 @@ NUMBERS = (
         lambda model, motion: weight(model) or None,
     ),
     Number(
-        "peak_ground_force_N", "N", f"largest force on all points together, {SAMPLES}",
-        lambda model, motion: peak_total(motion),
-    ),
-    Number(
-        "peak_ground_force_weights", "body weights", "the same in body weights",
-        lambda model, motion: in_weights(model, peak_total(motion)),
-    ),
-    Number(
-        "peak_group_force_N", "N", "largest force on each group and on each foot, at the samples",
-        lambda model, motion: peaks(motion),
-    ),
-    Number(
-        "peak_group_force_weights", "body weights", "the same in body weights", _peaks_in_weights
-    ),
-    Number(
-        "peak_foot_force_N", "N",
-        "largest force on a point A, M or T, both feet together, at the samples",
-        lambda model, motion: peak_force(motion, "feet"),
-    ),
-    Number(
-        "peak_tail_force_N", "N", "largest force on one point of the tail, at the samples",
-        lambda model, motion: peak_force(motion, "tail"),
-    ),
-    Number(
         "ground_impulse_N_s", "N s",
         "impulse of the ground on all points (x, y, z), summed by the integrator",
         lambda model, motion: _ground_impulse(motion),
@@ -176,6 +161,25 @@ NUMBERS = (
     Number(
         "impulse_N_s", "N s", "the same for each group",
         lambda model, motion: motion.info.get("impulse_N_s") or None,
+    ),
+    Number(
+        "peak_ground_force_N", "N", f"largest force on all points together, {STEPS}",
+        lambda model, motion: _of_all(peaks(motion), 0),
+    ),
+    Number(
+        "peak_ground_force_weights", "body weights", "the same in body weights",
+        lambda model, motion: in_weights(model, _of_all(peaks(motion), 0)),
+    ),
+    Number(
+        "peak_ground_force_s", "s", "time of this force",
+        lambda model, motion: _of_all(peaks(motion), 1),
+    ),
+    Number(
+        "peak_group_force_N", "N", "the same force on each group and on each foot",
+        lambda _, motion: _of_parts(motion),
+    ),
+    Number(
+        "peak_group_force_weights", "body weights", "the same in body weights", _parts_in_weights
     ),
     Number(
         "touching_s", "s", f"total time for which each group touched the ground; {ONE_FOOT}",

@@ -81,15 +81,15 @@ def check_unit(attitude: Array) -> None:
 
 def json_text(info: Any) -> str:
     """Return the text of info, a dict of plain JSON values; ValueError otherwise."""
+    if not isinstance(info, dict):
+        raise ValueError(f"info is a {type(info).__name__}: give a dict of plain JSON values")
+    _check_lists(info)
     try:
-        if isinstance(info, dict):
-            _check_lists(info)
-            return json.dumps(info, allow_nan=False)
+        return json.dumps(info, allow_nan=False)
     except (TypeError, ValueError) as error:
         raise ValueError(
             f"info is not JSON-ready ({error}): convert arrays by tolist(), use None for nan"
         ) from error
-    raise ValueError(f"info is a {type(info).__name__}: give a dict of plain JSON values")
 
 
 def _check_lists(info: dict[str, Any]) -> None:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from serpentail_scene.layout import QUATERNION, Layout
 
 from ..attitude import Array, pose_of
+from ..checks import needed
 from ..model.model import Model
 from . import archive
 from .account import account
@@ -92,6 +93,8 @@ class Trajectory(Exports, Showable):
                 raise ValueError(
                     f"{name} has shape {actual}: give {shape}, to match the shapes of t and q"
                 )
+        if not isinstance(self.contact, Contact | None):
+            raise ValueError(needed("contact", self.contact, "a serpentail.Contact, or None"))
         if self.contact is not None and len(self.contact.points) != len(self.t):
             raise ValueError(
                 f"contact has {len(self.contact.points)} samples: give {len(self.t)}, as t has"

@@ -69,7 +69,7 @@ def tail(motion: Trajectory, model: Model | None) -> Panel:
 
     Tail coordinates if no model is known.
     """
-    names, styles, order = _of_segments(motion)
+    names, styles, order = of_segments(motion)
     if model is None:
         told, angles = "tail coord.\n[deg]", motion.tail
     else:
@@ -79,7 +79,7 @@ def tail(motion: Trajectory, model: Model | None) -> Panel:
 
 def torque(motion: Trajectory, model: Model | None) -> Panel:
     """Torques of the tail coordinates."""
-    names, styles, order = _of_segments(motion)
+    names, styles, order = of_segments(motion)
     return Panel("tail torque\n[mN m]", 1e3 * motion.tau[:, order], names, styles, 0.01)
 
 
@@ -128,7 +128,7 @@ PANELS: dict[str, Callable[[Trajectory, Model | None], Panel]] = {
 }
 
 
-def _of_segments(motion: Trajectory) -> tuple[list[str], list[tuple[Any, str]], list[int]]:
+def of_segments(motion: Trajectory) -> tuple[list[str], list[tuple[Any, str]], list[int]]:
     """Names and styles of tail coordinates, a colour a segment, yaw dashed; and their order."""
     from matplotlib import colormaps
 

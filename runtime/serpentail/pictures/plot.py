@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 WIDTH, TALL, ROW = 7.2, 1.05, 0.15  # inches: the figure, a panel, a row of its legend on top
 LETTER, HANDLE = 0.056, 0.55  # inches in a legend
 APART = 0.07  # of the time axis, between labels of events
+ABOVE = 0.09  # of a panel, from the first row of labels to the second
+FIRST = ("feet", "torso", "tail")  # whose events are labelled where there is no room for all
 LEGEND: dict[str, Any] = {
     **{"fontsize": 7, "labelspacing": 0.25, "columnspacing": 1.2, "borderaxespad": 0.2},
     **{"borderpad": 0.1, "frameon": True, "fancybox": False, "framealpha": 1.0},
@@ -80,7 +82,7 @@ def plot(
     chosen = [PANELS[name](motion, model).without_still() for name in names or PANELS]
     chosen = chosen if names else [panel for panel in chosen if panel.names]
     if ax is None:
-        return drawn(lambda: _figure(motion, chosen), path)
+        return drawn(lambda: stacked(motion, chosen), path)
     return drawn_on(ax, motion, chosen, path)
 
 
@@ -97,7 +99,7 @@ def drawn_on(
     return every[0].figure, ax
 
 
-def _figure(motion: Trajectory, chosen: list[Panel]) -> tuple["Figure", Array]:
+def stacked(motion: Trajectory, chosen: list[Panel]) -> tuple["Figure", Array]:
     """A figure of stacked panels."""
     from .figure import Drawing
 
@@ -140,7 +142,12 @@ def _draw_panel(axes: "Axes", t: Array, panel: Panel) -> None:
     steps = [1, 1.5, 3, 4.5, 9, 10] if "[deg]" in panel.label else [1, 2, 2.5, 5, 10]
     axes.yaxis.set_major_locator(MaxNLocator(5, steps=steps))
     if rows:
-        axes.legend(loc="upper left", ncols=columns, **LEGEND)
+        labelled(axes, columns)
+
+
+def labelled(axes: "Axes", columns: int) -> None:
+    """A legend of all that has a label."""
+    axes.legend(loc="upper left", ncols=columns, **LEGEND)
 
 
 def _limits(panel: Panel) -> tuple[float, float]:
@@ -186,11 +193,14 @@ def _draw_events(axes: "Axes", motion: Trajectory) -> None:
 
 
 def _label_events(axes: "Axes", motion: Trajectory) -> None:
-    """What happens, above the first axes; of events close to each other the first."""
-    words, last = {"touch_down": "on", "take_off": "off"}, -math.inf
-    for event in _events(motion):
-        if event["time"] - last > APART * (motion.t[-1] - motion.t[0]):
-            last, text = event["time"], f"{event['group']} {words[event['kind']]}"
+    """What happens, above the first axes, in two rows: feet first, then torso, then tail."""
+    words = {"touch_down": "on", "take_off": "off"}
+    apart, rows = APART * (motion.t[-1] - motion.t[0]), [[math.inf], [math.inf]]
+    for event in sorted(_events(motion), key=lambda each: FIRST.index(each["group"])):
+        time, text = event["time"], f"{event['group']} {words[event['kind']]}"
+        free = [k for k, row in enumerate(rows) if min(abs(time - x) for x in row) > apart]
+        if free:
+            rows[free[0]].append(time)
             look: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": 6}
             look |= {"transform": axes.get_xaxis_transform(), "color": "#555555"}
-            axes.text(last, 1.02, text, **look)
+            axes.text(time, 1.02 + ABOVE * free[0], text, **look)

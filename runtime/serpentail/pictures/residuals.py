@@ -7,14 +7,16 @@ import numpy as np
 
 from ..extras import needed
 from ..motion.trajectory import Trajectory
-from .style import Array, drawn
+from .panels import Panel, of_segments, torque
+from .plot import labelled, stacked
+from .style import QUIET, Array, drawn
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-WIDTH, ROW = 7.2, 1.9  # inches
 Residuals = tuple[tuple[str, ...], Array, float]  # names, (F, M, 3) m, noise m
-Bands = tuple[Array, Array, Array] | None  # times (U,), low and high (U, 2m)
+Bands = tuple[Array, Array, Array, float] | None  # times (U,), low and high (U, 2m), probability
+ROOM = 0.3  # of a panel, for its legend
 
 
 def residual_figure(
@@ -34,31 +36,33 @@ def residual_figure(
 
 def _figure(motion: Trajectory, residuals: Residuals, bands: Bands) -> tuple["Figure", Any]:
     """A figure of three panels on one time axis."""
-    from .figure import Drawing
+    from matplotlib import colormaps
 
     names, off, noise = residuals
-    figure = Drawing(figsize=(WIDTH, 3 * ROW), layout="constrained")
-    every = figure.subplots(3, 1, sharex=True)
-    for name, each in zip(names, np.moveaxis(np.linalg.norm(off, axis=2), 1, 0), strict=True):
-        every[0].plot(motion.t, 1e3 * each, ".", markersize=3, label=name)
-    every[0].axhline(1e3 * noise * np.sqrt(3), color="#999999", linewidth=0.8)
-    every[0].set_ylabel("residual [mm]")
-    # torques, and the power of each
-    coordinates = range(motion.tau.shape[1])
-    rates = motion.v[:, -motion.tau.shape[1] :]
-    for k in coordinates:
-        (line,) = every[1].plot(motion.t, 1e3 * motion.tau[:, k], label=f"tail coordinate {k}")
-        if bands is not None:
-            times, low, high = bands
-            shade = {"color": line.get_color(), "alpha": 0.2, "linewidth": 0}
-            every[1].fill_between(times, 1e3 * low[:, k], 1e3 * high[:, k], **shade)
-        every[2].plot(motion.t, 1e3 * motion.tau[:, k] * rates[:, k])
-    every[1].set_ylabel("torque [mN m]")
-    every[2].set_ylabel("power [mW]")
-    every[2].set(xlabel="time [s]", xlim=(motion.t[0], motion.t[-1]))
-    for axes in every:
-        axes.grid(color="#e6e6e6", linewidth=0.6)
-    for axes in every[:2]:
-        axes.legend(loc="upper right", fontsize=6, ncols=4)
-    figure.align_ylabels(every)
+    distances = 1e3 * np.linalg.norm(off, axis=2)
+    colours = colormaps["viridis"](np.linspace(0, 0.9, len(names)))
+    tau = torque(motion, None)
+    coordinates, styles, order = of_segments(motion)
+    rates = motion.v[:, -motion.tau.shape[1] :][:, order]
+    power = Panel("power\n[mW]", tau.curves * rates, coordinates, styles, 0.01)
+    dots = [(colour, ".") for colour in colours]
+    figure, every = stacked(
+        motion, [Panel("residual\n[mm]", distances, names, dots, 0.1), tau, power]
+    )
+    usual = 1e3 * noise * np.sqrt(3)
+    told = f"rms of noise: {usual:.2g} mm"
+    every[0].axhline(usual, color=QUIET, linewidth=0.8, zorder=0.5, label=told)
+    labelled(every[0], len(names) + 1)
+    if bands is not None:
+        times, low, high, probability = bands
+        shown = np.stack([np.interp(times, motion.t, row) for row in rates.T], axis=1)
+        ends = 1e3 * np.stack([low[:, order], high[:, order]])
+        for axes, pair in ((every[1], ends), (every[2], np.sort(ends * shown, axis=0))):
+            for k, (colour, _) in enumerate(styles):
+                shade = {"color": colour, "alpha": 0.2, "linewidth": 0}
+                label = None if k else f"{100 * probability:g} %"
+                axes.fill_between(times, pair[0, :, k], pair[1, :, k], label=label, **shade)
+            least, most = float(pair.min()), float(pair.max())
+            axes.set_ylim(least, least + (most - least) / (1 - ROOM))
+            labelled(axes, len(styles) + 1)
     return figure, every

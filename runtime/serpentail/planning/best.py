@@ -1,10 +1,10 @@
 """Searches for a plan, round by round, and returns the best one."""
 
-import time
 from collections.abc import Callable
 from dataclasses import replace
 
 from ..model.model import Model
+from ..simulation.simulate import read_clocks
 from ..stages import Stage
 from .momentum import refuse_impossible
 from .nlp.equations import equations_of_motion
@@ -31,12 +31,12 @@ def best_plan(
     watch: Callable[[Plan], object] | None,
 ) -> Plan:
     """Search round by round, and return the best plan."""
+    begun, easier = read_clocks(), None
     missing = [name for name in NEEDED if name not in model.generated]
     if missing:
         raise model.without(*missing)
     refuse_impossible(model, problem)
     refuse_violated(model, problem)
-    begun, easier = time.perf_counter(), None
     with forks_wait(), Stage("plan", model.name) as stage:
         equations = equations_of_motion(model, settings.dynamics, problem.design)
         with stoppable(settings.time_limit, stage.tell):
@@ -59,7 +59,7 @@ def rounds_of(
     search: Search,
     stage: Stage,
     watch: Callable[[Plan], object] | None = None,
-    begun: float = 0.0,
+    begun: tuple[float, float] = (0.0, 0.0),
 ) -> list[Round]:
     """Return all rounds of a search; each is reported and passed to ``watch`` when it is found."""
     rounds: list[Round] = []

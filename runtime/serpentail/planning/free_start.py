@@ -47,7 +47,9 @@ def checked_free_start(model: Model, value: Any, attitude: Any) -> dict[str, Ran
     for angles in ranges.get("tail", ()):
         behind = behind_stops(model.parameters, angles[None])
         if behind:
-            raise PlanningError(f"free_start.tail: {behind}")
+            raise PlanningError(
+                f"free_start.tail: {behind}: give one between the stops, or move them"
+            )
     return ranges
 
 

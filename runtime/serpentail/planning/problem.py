@@ -10,7 +10,7 @@ import numpy as np
 from serpentail_scene.layout import QUATERNION, TAIL_Q, TAIL_V
 
 from ..brief import brief
-from ..checks import Refusals, number, numbers, numbers_in, one_of, refusal, shown
+from ..checks import Refusals, number, numbers_in, one_of, refusal, refuse_not_finite, shown
 from ..errors import PlanningError
 from ..model.model import Model
 from ..model.passive import behind_stops
@@ -103,11 +103,12 @@ def checked_problem(
 
 
 def _vector(field: str, value: Any, size: int) -> np.ndarray:
-    """Return finite numbers (size,); PlanningError otherwise, also for a single number."""
+    """Return a copy of finite numbers (size,); PlanningError otherwise."""
     array = numbers_in(value)
-    if array is None or array.shape == ():
+    if array is None or array.shape != (size,):
         raise refusal(field, value, f"{size} numbers", PlanningError)
-    return numbers(field, value, size, PlanningError)
+    refuse_not_finite(field, array, PlanningError)
+    return array.copy()
 
 
 def _unit_quaternion(field: str, quaternion: np.ndarray) -> np.ndarray:
@@ -184,7 +185,7 @@ def _start_inside(values: np.ndarray, bound: np.ndarray | None, name: str, unit:
 def _between_stops(name: str, model: Model, angles: np.ndarray) -> None:
     behind = behind_stops(model.parameters, angles[None])
     if behind:
-        raise PlanningError(f"{name}: {behind}")
+        raise PlanningError(f"{name}: {behind}: give one between the stops, or move them")
 
 
 def _goal_inside(name: str, values: np.ndarray | None, bound: np.ndarray | None) -> None:

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from ..model.model import Model
+from ..simulation.simulate import spent
 from .found import chosen, flown, guessed
 from .nlp.coordinates import attitude
 from .nlp.equations import Equations
@@ -139,8 +140,8 @@ class Search:
         """Tell whether a round is solved and nothing in it is wrong."""
         return bool(found.solution.success and self._wrong(found) <= 1)
 
-    def plan(self, best: Round, rounds: int, begun: float) -> Plan:
-        """Return the plan of a round; rounds: their number so far; begun: the clock's time then."""
+    def plan(self, best: Round, rounds: int, begun: tuple[float, float]) -> Plan:
+        """Return the plan of a round; rounds: their number; begun: what ``read_clocks`` gave."""
         success = self._is_true(best)
         trajectory = sampled(best.model, best.problem, best.curve)
         summary = {"success": success} | report(self, best, trajectory)
@@ -150,11 +151,12 @@ class Search:
             "guesses": self.attempts,
             "stopped": self.stopped,
         }
-        wall = {"wall_s": time.perf_counter() - begun}
+        taken = spent(begun)
+        whole = {"call_cpu_s": taken["cpu_seconds"], "wall_s": taken["seconds"]}
         return Plan(
             success=success,
             trajectory=trajectory,
-            report=summary | self.spent | wall,
+            report=summary | self.spent | whole,
             problem=best.problem,
             curve=best.curve,
             mesh=best.nlp.mesh,

@@ -61,6 +61,14 @@ def read(table: Mapping, key: Key, where: str, refused: Refusals, part: str = ""
     return found
 
 
+TYPES: Mapping[Any, tuple[Any, str]] = {  # of a form: in Python, and in words
+    "boolean": (bool, "true or false, without quotes"),
+    "integer": (int, "a whole number"),
+    "number": (int | float, "a number"),
+    "string": (str, 'a text, in "quotes"'),
+    "array": (list, "a list"),
+    "object": (Mapping, "a table"),
+}
 Part = tuple[
     Refusals, str
 ]  # where errors about a value are collected, and the part that they belong to
@@ -72,12 +80,17 @@ def _read(value: Any, key: Key, where: str, part: Part) -> Any:
         return value
     if key.each and isinstance(value, list):
         return [_read(x, key.each, f"{where}[{k}]", part) for k, x in enumerate(value)]
-    if isinstance(value, Mapping):
+    if isinstance(value, Mapping) and not key.form:
         return _read_table(value, key, where, part)
     if key.is_table and key.each is None:
         needs = ", or ".join([f"a table, under a line [{where}]", *map(repr, key.words)])
         part[0].add(part[1], needed(where, value, needs))
-    return _read_numbers(value, key, where, part) if key.unit else value
+    if key.unit:
+        return _read_numbers(value, key, where, part)
+    types, needs = TYPES.get(key.form.get("type"), (object, ""))
+    if not isinstance(value, types) or (isinstance(value, bool) and types not in (bool, object)):
+        part[0].add(part[1], needed(where, value, needs))
+    return value
 
 
 def _read_table(table: Mapping, key: Key, where: str, part: Part) -> Mapping:

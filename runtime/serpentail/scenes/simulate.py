@@ -120,20 +120,22 @@ class Scenario:
         sequence = Sequence(self.model, self.phases, settings=settings, **angles)
         return sequence.simulate(self.q0, self.v0, bristles)
 
-    def summary(self, motion: Trajectory) -> Summary:
+    def summary(self, motion: Trajectory, errors: bool = False) -> Summary:
         """Return the numbers of a motion by name; see ``serpentail.summary``.
 
         Parameters
         ----------
         motion : Trajectory
             The motion.
+        errors : bool, default False
+            Whether to estimate the numerical error of each number.
 
         Returns
         -------
         Summary
             The numbers, SI.
         """
-        return summary(self.model, motion)
+        return summary(self.model, motion, errors)
 
 
 def scenario(

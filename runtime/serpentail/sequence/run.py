@@ -2,11 +2,13 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from ..brief import brief
 from ..errors import PlanningError, SimulationError
-from ..motion.joined import joined
+from ..motion.derived import AGAIN
+from ..motion.joined import joined, joined_again
 from ..motion.trajectory import Trajectory
 from ..planning.result.plan import Plan
 from .phase import Phase
@@ -74,7 +76,11 @@ def whole(parts: list[Trajectory], runs: list[PhaseRun], phases: Iterable[Phase]
                 f"phase {run.name!r} ended without {phase.words} within {phase.duration:.6g} s"
             )
     told = {"phases": [run.info() for run in runs], "warnings": warnings}
-    return replace(motion, info=motion.info | told)
+    found = replace(motion, info=motion.info | told)
+    repeats = [vars(part).get(AGAIN) for part in parts]
+    if all(repeats):
+        vars(found)[AGAIN] = partial(joined_again, repeats)
+    return found
 
 
 def told(

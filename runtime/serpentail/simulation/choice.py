@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import shown
+from ..checks import number, shown
 from ..errors import ModelError, SimulationError
 from ..model.model import Model
 from ..model.parameters import RunParameters
@@ -16,7 +16,16 @@ from .controllers import Controller
 from .decay import FastestDecay
 from .ground import Ground
 from .limits import MOST_STEPS, refuse_endless
-from .methods import SCIPY, IntegrationMethod, checked_method, chosen, step_counts
+from .methods import (
+    ADAPTIVE,
+    SCIPY,
+    IntegrationMethod,
+    checked_method,
+    chosen,
+    default_rtol,
+    step_counts,
+    usual_most_steps,
+)
 from .records import Records
 from .start import EPS, Start
 
@@ -34,7 +43,6 @@ def prepared(
             "model.with_parameters"
         )
     parameters = model.parameters_of_runs(changes, start.runs)
-    start.refuse_behind_stops(parameters.values)
     ground = Ground.checked(model, start, parameters, settings)
     acting = Acting(Records(model), controller, start, ground.legs.curve if ground.legs else None)
     choice = choose(acting, start, parameters, method, settings)
@@ -56,13 +64,20 @@ def choose(
     model, single = acting.model, acting.records.real is ctypes.c_float
     available, reason = model.manifest["simulation"]["methods"], "asked for"
     if isinstance(name, str) and name == "auto":
-        decay = None
-        if not model.contacts:
+        decay = 0.0
+        if "step" not in settings:
+            usual = default_rtol("switching" if "switching" in available else "tsit5", single)
+            rtol = number("rtol", settings.get("rtol", usual), SimulationError, above=0)
+            settings["rtol"] = rtol
             decay = FastestDecay(acting, start.runs, parameters)(start.q0)
-        name, reason = chosen(settings, available, decay, model.fixed)
+        name, reason = chosen(settings, available, decay, place_of(model))
     refuse_misplaced(model, settings)
+    span = start.end - start.start
     method = checked_method(name, settings, available, single)
-    span, most_steps = start.end - start.start, method.settings.get("most_steps", MOST_STEPS)
+    if name in ADAPTIVE:
+        most: dict[str, float] = {"most_steps": usual_most_steps(span)}
+        method = replace(method, settings=most | method.settings)
+    most_steps = method.settings.get("most_steps", MOST_STEPS)
     for each in ("step", "most_step"):
         length = method.settings.get(each, np.inf)
         refuse_vanishing(start, each, length)
@@ -72,6 +87,11 @@ def choose(
         steps = step_counts(interval, 1e-12 * interval, method.settings["step"])
         return replace(method, reason=reason, settings={"step": start.interval / int(steps[0])})
     return replace(method, reason=reason)
+
+
+def place_of(model: Model) -> str:
+    """Return where runs of a model take place, in the words of ``chosen``."""
+    return "ground" if model.contacts else "fixed base" if model.fixed else "flight"
 
 
 def refuse_misplaced(model: Model, settings: dict[str, Any]) -> None:
@@ -86,11 +106,11 @@ def refuse_misplaced(model: Model, settings: dict[str, Any]) -> None:
 
 def still_chosen(run: CompiledRun, name: str) -> bool:
     """Tell whether "auto" chooses a run's method again for a new start; store the reason."""
-    if name != "auto" or run.ground.points:  # on the ground "auto" asks for no start
+    if name != "auto" or "step" in run.method.settings:
         return True
     method, available = run.method, run.model.manifest["simulation"]["methods"]
     decay = run.decay(run.memory.state["q"])
-    name, reason = chosen(method.settings, available, decay, run.model.fixed)
+    name, reason = chosen(method.settings, available, decay, place_of(run.model))
     run.method = replace(method, reason=reason)
     return name == method.name
 

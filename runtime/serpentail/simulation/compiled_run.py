@@ -76,12 +76,14 @@ class Memory:
             self.state["bristles"] = np.array(ground.bristles.reshape(start.runs, -1), dtype)
         entries = model.manifest["simulation"]["ledger"]
         self.state["ledger"] = np.zeros((start.runs, sum(size for _, size in entries)), dtype)
+        parts = model.manifest["simulation"].get("parts", [])
+        self.peaks = np.zeros((start.runs, len(parts), 2), dtype)
         self.out = {
             name: np.zeros((start.runs, start.intervals + 1, size), dtype)
             for name, size in sizes.items()
         }
         # addresses of the first run's arrays, and the distances between those of two runs
-        arrays = {"parameters": parameters.vectors} | self.state
+        arrays = {"parameters": parameters.vectors, "peaks": self.peaks} | self.state
         arrays |= {f"{name}_out": array for name, array in self.out.items()}
         self.places = []
         for member, array in arrays.items():
@@ -91,6 +93,7 @@ class Memory:
     def restart(self, q0: np.ndarray, v0: np.ndarray) -> None:
         """Take other starts q0 (k, nq), v0 (k, nv)."""
         self.state["q"][...], self.state["v"][...], self.state["ledger"][...] = q0, v0, 0
+        self.peaks[...] = 0
         if self.ground.points:
             self.state["bristles"][...] = self.ground.bristles.reshape(self.start.runs, -1)
 
@@ -204,12 +207,22 @@ class CompiledRun:
             times, kinds = self.event_times[:count].tolist(), self.event_kinds[:count].tolist()
             info["events"] = self.ground.events(times, kinds)
             info["unfelt"] = record.unfelt
+            info["peaks"] = self._peaks()
+            if record.near_error > 0:
+                info["near"] = self.ground.near(record)
         failure = self.actuation.error
         if failure is None and status not in (0, STOPPED_AT_EVENT):
             failure = failed(status, record.t, self._extremes())
         stop = self._stop() if status == STOPPED_AT_EVENT else None
         ledger = self.state["ledger"].copy()
         return Outcome(record.done, record.t, ledger, info, failure, stop)
+
+    def _peaks(self) -> dict[str, list[float]]:
+        """Return the largest force (N) at steps, and its time (s), of parts that numbers hold."""
+        found = zip(
+            self.model.manifest["simulation"]["parts"], self.memory.peaks[self.k], strict=True
+        )
+        return {name: peak.tolist() for name, peak in found if np.isfinite(peak).all()}
 
     def samples(self, status: int) -> Samples:
         """Return the samples written, with the meaning of a status."""

@@ -169,6 +169,12 @@ class Phases:
         object.__setattr__(self, "phases", tuple(zip(times.tolist(), acting, strict=True)))
 
 
+def remembers(controller: Any) -> bool:
+    """Tell whether a controller calls a user's function that may remember an earlier run."""
+    each = [law for _, law in controller.phases] if isinstance(controller, Phases) else [controller]
+    return any(isinstance(law, Sampled) for law in each)
+
+
 Single = Damping | TorqueTable | TorqueCurve | Pfl | Sampled | NativeTorque | TorqueFunction
 Controller = Single | Phases | None
 

@@ -1,4 +1,4 @@
-"""Fastest rate of a tail's damping and springs, which can make a flight stiff."""
+"""Fastest decay by a tail's damping, which can make a flight stiff."""
 
 import numpy as np
 
@@ -9,10 +9,11 @@ from .acting import Acting
 
 
 class FastestDecay:
-    """The fastest rate (1/s) of tails at starts q0 (runs, nq).
+    """The fastest decay (1/s) of tails at starts q0 (runs, nq).
 
-    It is the largest eigenvalue of K (H^-1)_tt with the joint damping K; with springs, the largest
-    modulus of the eigenvalues of both together. For one thread.
+    It is the largest eigenvalue of K (H^-1)_tt with the joint damping K; with springs, that of both
+    together whose real part is least. Oscillations do not count, however fast: whoever wants their
+    motion needs steps that resolve them. For one thread.
     """
 
     def __init__(self, acting: Acting, runs: int, parameters: RunParameters):
@@ -26,8 +27,8 @@ class FastestDecay:
         self.damping = acted + own(values, "tail_damping", (runs, nt))
         self.stiffness = own(values, "tail_stiffness", (runs, nt))
         self.sprung = bool(self.stiffness.any())
-        self.moved = self.sprung or bool(self.damping.any())
-        if not self.moved:
+        self.damped = bool(self.damping.any()) and "forward_dynamics" in model.generated
+        if not self.damped:
             return
         # without torque and with unit torques: the differences are columns of H^-1
         kernel, self.tail = model.kernel("forward_dynamics"), model.layout.tail_v
@@ -41,8 +42,8 @@ class FastestDecay:
         self.evaluate = RunKernel(kernel, parameters.vectors, (self.q, v, tau), (self.v_dot,))
 
     def __call__(self, q0: np.ndarray) -> float:
-        """Return it; 0 without damping and springs, or if no start has accelerations."""
-        if not self.moved:
+        """Return it; 0 without damping, or if no start has accelerations."""
+        if not self.damped:
             return 0.0
         self.q[...] = q0[:, None]
         sound = [k for k in range(self.runs) if self._evaluated(k)]
@@ -69,12 +70,12 @@ def own(values: Values, name: str, shape: tuple[int, int]) -> np.ndarray:
 
 
 def fastest(mobility: np.ndarray, stiffness: np.ndarray, damping: np.ndarray) -> float:
-    """Return the largest modulus (1/s) of the rates of q_ddot = -mobility (stiffness q + damping
-    q_dot), mobility (runs, n, n).
+    """Return the fastest decay (1/s) of q_ddot = -mobility (stiffness q + damping q_dot), mobility
+    (runs, n, n).
     """
     n = mobility.shape[-1]
     rates = np.zeros((len(mobility), 2 * n, 2 * n))
     rates[:, :n, n:] = np.eye(n)
     rates[:, n:, :n] = -mobility * stiffness[:, None, :]
     rates[:, n:, n:] = -mobility * damping[:, None, :]
-    return float(np.abs(np.linalg.eigvals(rates)).max(initial=0.0))
+    return float(-np.linalg.eigvals(rates).real.min(initial=0.0))

@@ -59,6 +59,12 @@ class Ground:
         """Number of points that can touch the ground."""
         return sum(self.groups.values())
 
+    def near(self, record: Any) -> dict[str, Any]:
+        """The pass above the ground, of a record of C, that is the closest for its error."""
+        point = {"group": self._group_of(record.near_point), "point": record.near_point}
+        numbers = {name: getattr(record, f"near_{name}") for name in ("time", "height", "error")}
+        return point | numbers
+
     def legs_at(self, t: ArrayLike) -> tuple[np.ndarray, ...]:
         """Return the argument ``legs`` (8,) or (K, 8) at t (s); nothing without feet."""
         return () if self.legs is None else (np.concatenate(self.legs.curve.at(t)[:2], axis=-1),)

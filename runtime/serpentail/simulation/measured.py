@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import SimulationError, StateError
 from ..model.model import Model
-from ..model.passive import stored_energy
+from ..model.passive import behind_stops, stored_energy
 from ..motion.origin import origin
 from ..motion.trajectory import Trajectory
 from .audit import BALANCED, Between, allowance, audited, warnings_of
@@ -120,7 +120,11 @@ class Measures:
             self._ends(),
             Between(allowance(info, eps), self._all),
         )
-        return info | books.info() | {"warnings": warnings_of(books, info, eps)}
+        warnings = warnings_of(books, info, eps)
+        behind = behind_stops(self.model.parameters, samples.q[:, self.model.layout.tail_q])
+        if behind:
+            warnings.append(f"{behind}: make the stop stiffer, or its width larger")
+        return info | books.info() | {"warnings": warnings}
 
     def _ends(self) -> dict[str, np.ndarray]:
         """Return energies (2,), linear momentum (2, 3), stored energy at start and end."""

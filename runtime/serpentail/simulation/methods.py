@@ -1,7 +1,7 @@
 """Integration methods, their settings, and the choice of "auto"."""
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ from ..checks import number, one_of
 from ..errors import SimulationError
 
 FIXED = ("rk4", "implicit_euler")
-ADAPTIVE = ("tsit5", "ros34pw2")
+ADAPTIVE = ("tsit5", "ros34pw2", "switching")
 SCIPY = ("dop853", "lsoda")
 SETTINGS = {
     **dict.fromkeys(FIXED, ("step",)),
@@ -19,12 +19,15 @@ SETTINGS = {
     ),
     **dict.fromkeys(SCIPY, ("rtol", "atol")),
 }
-# 1/s: a fastest decay beyond this limits the steps of an explicit method, not their accuracy
-STIFF_DECAY = 5e3
+# times the tolerances, times the steps, of runs that are made again to estimate errors
+LOOSER, LONGER = (4.0, 10.0), (2, 3)
+# 1/s: a decay beyond this limits the steps of tsit5 at rtol 1e-4 to less than those of ros34pw2,
+# whose lengths are as the third root of the tolerance
+STIFF_DECAY = 3e3
 MIN_ROUNDINGS = 100  # rounding errors that a relative tolerance must allow, as in SciPy's methods
 # default tolerances
-SINGLE_RTOL = {"tsit5": 1e-4, "ros34pw2": 1e-3}
-DOUBLE_RTOL = {"tsit5": 1e-8, "ros34pw2": 1e-4}
+SINGLE_RTOL = {"tsit5": 1e-4, "ros34pw2": 1e-3, "switching": 1e-3}
+DOUBLE_RTOL = {"tsit5": 1e-8, "ros34pw2": 1e-4, "switching": 1e-4}
 
 
 def step_counts(spans: np.ndarray, slack: np.ndarray, step: float) -> np.ndarray:
@@ -45,6 +48,20 @@ class IntegrationMethod:
         """What a trajectory's info says of it."""
         finite = {name: x for name, x in self.settings.items() if x is not np.inf}
         return finite | {"method": self.name, "reason": self.reason}
+
+    def coarser(self, coarse: int, interval: float) -> "IntegrationMethod":
+        """Return this method at some times its error, for samples so far apart (s).
+
+        Where so few steps fill an interval that they cannot be longer, there is one more.
+        """
+        settings = dict(self.settings)
+        for name in ("rtol", "atol", "least_step", "most_step"):
+            if np.isfinite(settings.get(name, np.inf)):
+                settings[name] *= LOOSER[coarse]
+        if "step" in settings:
+            steps = round(interval / settings["step"])
+            settings["step"] = interval / (steps // LONGER[coarse] or steps + 1)
+        return replace(self, settings=settings)
 
 
 def checked_method(
@@ -70,6 +87,18 @@ def checked_method(
     return IntegrationMethod(name, "", _defaults(name, single, checked))
 
 
+def default_rtol(name: str, single: bool) -> float:
+    """Return the relative tolerance of an adaptive method of the generated C, if none is given."""
+    return (SINGLE_RTOL if single else DOUBLE_RTOL)[name]
+
+
+def usual_most_steps(span: float) -> int:
+    """Return the largest number of steps of a run over a time (s), if none is given: some seconds
+    of work for short runs, a minute for long ones.
+    """
+    return int(min(max(3e5 * span, 3e5), 1e6))
+
+
 def _defaults(name: str, single: bool, chosen: dict[str, float]) -> dict[str, float]:
     """Return settings with defaults: tolerances that suit method and precision, steps of 0.1 ms."""
     if name in FIXED:
@@ -77,31 +106,27 @@ def _defaults(name: str, single: bool, chosen: dict[str, float]) -> dict[str, fl
     if name in SCIPY:
         tolerances = {"rtol": 1e-6, "atol": 1e-6} if single else {"rtol": 1e-10, "atol": 1e-12}
         return tolerances | chosen
-    rtol = chosen.get("rtol", SINGLE_RTOL[name] if single else DOUBLE_RTOL[name])
-    defaults = {"rtol": rtol, "atol": rtol, "most_step": np.inf, "most_steps": 10**6}
-    return defaults | chosen
+    rtol = chosen.get("rtol", default_rtol(name, single))
+    return {"rtol": rtol, "atol": rtol, "most_step": np.inf} | chosen
 
 
 def chosen(
-    settings: dict[str, Any], available: Collection[str], decay: float | None, fixed: bool
+    settings: dict[str, Any], available: Collection[str], decay: float, place: str
 ) -> tuple[str, str]:
     """Return the method of "auto" and the reason.
 
-    decay (1/s): fastest rate of damping and springs; None on the ground. fixed: the base is fixed.
+    decay (1/s): fastest one of damping. place: "flight", "fixed base" or "ground".
     """
     if "step" in settings:
-        implicit = decay is None and "implicit_euler" in available
+        implicit = place == "ground" and "implicit_euler" in available
         name = "implicit_euler" if implicit else "rk4"
         return name, "a step of a fixed length was asked for"
-    if decay is None:
-        if "ros34pw2" in available:
-            return "ros34pw2", "contact with the ground: stiff"
+    if place == "ground" and "switching" not in available:
         lack = "the scene lacks `implicit`, which suitable methods need"
         return "tsit5", f"contact with the ground, but {lack}"
-    # without contacts, damping and springs alone are stiff
-    if decay > STIFF_DECAY and "ros34pw2" in available:
-        return "ros34pw2", f"damping and springs act at {decay:.2g} 1/s: stiff"
-    place = "fixed base" if fixed else "flight"
-    if decay:
-        return "tsit5", f"{place}, damping and springs act at {decay:.2g} 1/s"
-    return "tsit5", place
+    damped = f"damping acts at {decay:.2g} 1/s"
+    if decay > STIFF_DECAY * (1e-4 / settings["rtol"]) ** (1 / 3) and "ros34pw2" in available:
+        return "ros34pw2", f"{damped}: stiff"
+    if place == "ground":
+        return "switching", "tsit5 in flight, ros34pw2 in contact with the ground: stiff"
+    return "tsit5", f"{place}, {damped}" if decay else place

@@ -14,14 +14,18 @@ from ..errors import SimulationError
 from ..magnitudes import warn_of_degrees
 from ..model.cores import checked_threads
 from ..model.model import Model
+from ..motion.derived import AGAIN
 from ..motion.trajectory import Trajectory
 from ..stages import Stage
+from .acting import Acting
 from .choice import prepared, still_chosen
-from .compiled_run import CompiledRun, Samples
-from .controllers import Controller
+from .compiled_run import CompiledRun, Memory, Samples
+from .controllers import Controller, remembers
+from .ground import Ground
 from .measured import trajectory_or_error
-from .methods import SCIPY
+from .methods import SCIPY, IntegrationMethod
 from .parallel_runs import run_parallel
+from .records import Records
 from .rollouts import Rollouts
 from .start import Start
 from .waiting import asked_for, let_wait, taken
@@ -59,9 +63,10 @@ def simulate(
     t_span : float or (float, float), default (0, 1)
         Start and end (s), or the end alone.
     method : str, default "auto"
-        "tsit5" or "ros34pw2": adaptive, in C; "rk4" or "implicit_euler": steps of a fixed
-        length, in C; "dop853" or "lsoda": SciPy's, as a check; "auto" chooses, and ``info``
-        of the result gives its choice and reason.
+        "tsit5" or "ros34pw2": adaptive, in C; "switching": the first in flight, the second while
+        a point touches the ground; "rk4" or "implicit_euler": steps of a fixed length, in C;
+        "dop853" or "lsoda": SciPy's, as a check; "auto" chooses, and ``info`` of the result gives
+        its choice and reason.
 
     Returns
     -------
@@ -73,13 +78,15 @@ def simulate(
     output_step : float, optional
         Time between samples (s); it is rounded to divide the span. Default: span / 200.
     rtol, atol : float, optional
-        Tolerances of adaptive methods. Defaults: 1e-8 for "tsit5" and 1e-4 for "ros34pw2"
-        (float models: 1e-4 and 1e-3), ``atol`` equal to ``rtol``; for SciPy's methods 1e-10 and
-        1e-12 (float models: 1e-6 and 1e-6).
+        Tolerances of adaptive methods. At the same ``rtol`` all methods have errors of about the
+        same size. Defaults: 1e-8 in flight, 1e-4 with contacts and for "ros34pw2" by name (float
+        models: 1e-4 and 1e-3), ``atol`` equal to ``rtol``; for SciPy's methods 1e-10 and 1e-12
+        (float models: 1e-6 and 1e-6).
     first_step, least_step, most_step : float, optional
-        Bounds of the steps of "tsit5" and "ros34pw2" (s).
-    most_steps : int, default 1000000
-        Largest number of steps of these two.
+        Bounds of the steps of "tsit5", "ros34pw2" and "switching" (s).
+    most_steps : int, optional
+        Largest number of steps of these. Default: 300000 for each second, at least 300000 and at
+        most 1000000.
     step : float, default 1e-4
         Step of "rk4" and "implicit_euler" (s); it is shortened to divide ``output_step``.
     legs : Legs
@@ -168,8 +175,41 @@ def simulate(
     samples = integrate(run, watch)
     info = samples.info | run.method.info | spent(clocks)
     motion = trajectory_or_error(model, replace(samples, info=info), run.ground)
+    if not remembers(controller):
+        made_of = run.start, run.ground, run.method
+        vars(motion)[AGAIN] = partial(
+            _again, model, controller, made_of, (samples.q[0], samples.v[0])
+        )
     let_wait(model, asked, run)
     return motion
+
+
+def _again(
+    model: Model,
+    controller: Controller,
+    made_of: tuple[Start, Ground, IntegrationMethod],
+    state: tuple[np.ndarray, np.ndarray],
+    coarse: int,
+    last: Trajectory | None = None,
+) -> Trajectory:
+    """Return a run from a state made again, less exactly; of a sequence from the last part's end.
+
+    SimulationError if it fails, or the last part ends too late.
+    """
+    start, ground, method = made_of
+    (q0, v0), begin = state, start.start
+    if last is not None:
+        q0, v0, begin = last.q[-1], last.v[-1], float(last.t[-1])
+        if last.contact is not None:
+            ground = replace(ground, bristles=last.contact.bristles[-1:])
+        if begin >= start.end:
+            raise SimulationError(f"at t = {begin:.6g} s a phase ends after the next one")
+    start = replace(start, q0=q0[None], v0=v0[None], start=begin)
+    acting = Acting(Records(model), controller, start, ground.legs.curve if ground.legs else None)
+    memory = Memory(acting.records, start, ground, model.parameters_of_runs(None, 1))
+    method = method.coarser(coarse, start.interval)
+    samples = integrate(CompiledRun(memory, acting, method))
+    return trajectory_or_error(model, replace(samples, info=samples.info | method.info), ground)
 
 
 def _doubt(model: Model, start: Start) -> None:

@@ -12,8 +12,6 @@ from ..checks import finite_array, number, real_array, refusal, refuse_not_finit
 from ..errors import SimulationError, StateError
 from ..model.kept import kept
 from ..model.model import Model
-from ..model.parameters import Values
-from ..model.passive import behind_stops
 from .limits import refuse_overfull
 
 MOST_SAMPLES = 10_000_000  # of all runs: more are a mistake, and would fill the memory
@@ -66,12 +64,6 @@ class Start:
             )
         refuse_overfull(model, checked.runs, checked.intervals + 1)
         return checked
-
-    def refuse_behind_stops(self, values: Values) -> None:
-        """StateError if a tail begins behind its stops; values: parameters of the runs."""
-        behind = behind_stops(values, self.q0[:, self.tail])
-        if behind:
-            raise StateError(f"q0: {behind}")
 
     @property
     def runs(self) -> int:

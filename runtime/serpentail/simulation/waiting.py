@@ -58,8 +58,7 @@ def taken(
 ) -> CompiledRun | None:
     """Return a kept run for the same request, at its new start; None if there is none.
 
-    StateError if the start is wrong or behind the tail's stops, SimulationError if it is deep in
-    the ground.
+    StateError if the start is wrong, SimulationError if it is deep in the ground.
     """
     runs = None if asked is None else _waiting.get(model)
     if not runs or asked not in runs:
@@ -69,7 +68,6 @@ def taken(
     if run is None:
         return None
     start, parameters = replace(run.start, q0=q0, v0=v0), run.memory.parameters
-    start.refuse_behind_stops(parameters.values)
     if run.ground.points:
         run.ground.refuse_deep(model, start, parameters)
     run.again(q0, v0)

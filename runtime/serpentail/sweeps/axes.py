@@ -1,9 +1,8 @@
 """The axes of a sweep together: which points they give."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,9 @@ import numpy as np
 from ..checks import needed, refusal, shown
 from ..errors import SweepError
 from .axis import Grid, Spread, in_units
+from .draws import drawn
 
+FEW_VALUES = 1000  # of a grid, which travel with every block
 MOST_POINTS = 10_000_000
 MOST_SEED = 2**63 - 1
 Point = dict[str, Any]  # name -> plain data
@@ -47,8 +48,14 @@ class Axes:
         """Names that a point has, grids first."""
         return (*(name for names in self.grids for name in names), *self.spreads)
 
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """How many values each grid has, and last, how many samples all spreads together."""
+        grids = (len(each.values) for each in self.grids.values())
+        return (*grids, self.points) if self.spreads else tuple(grids)
+
     def __len__(self) -> int:
-        return math.prod(len(each.values) for each in self.grids.values()) * self.points
+        return math.prod(self.sizes)
 
     def measured(self, units: Mapping[str, str | Sequence[str] | None]) -> "Axes":
         """Return the axes with texts such as "2 g" as numbers, for the names that have a unit."""
@@ -59,33 +66,53 @@ class Axes:
         }
         return replace(self, grids=grids, spreads=spreads)
 
-    def samples(self) -> dict[str, list]:
-        """Return the numbers of each random axis, one for each point."""
+    def places(self, numbers: Sequence[int] | np.ndarray) -> tuple[np.ndarray, ...]:
+        """Return the place on each grid, and among the samples, of the points of some numbers."""
+        return np.unravel_index(np.asarray(numbers, np.int64), self.sizes)
+
+    def samples(self, places: np.ndarray) -> dict[str, list]:
+        """Return the numbers of each random axis at some places among the samples."""
         if not self.spreads:
             return {}
         sizes = [each.low.size for each in self.spreads.values()]
         (way,) = {each.way for each in self.spreads.values()}
-        unit = _unit(way, self.points, sum(sizes), self.seed)
+        unit = drawn(way, places, sum(sizes), self.seed, self.points)
         parts = np.split(unit, np.cumsum(sizes)[:-1], axis=1)
         pairs = zip(self.spreads.items(), parts, strict=True)
         return {name: each.at(part).tolist() for (name, each), part in pairs}
 
+    def at(self, numbers: Sequence[int] | np.ndarray) -> list[Point]:
+        """Return the points of some numbers: the last axis changes first, random ones together."""
+        places = self.places(numbers)
+        columns: dict[str, Iterable] = {}
+        for (names, axis), where in zip(self.grids.items(), places, strict=False):
+            if len(names) == 1:
+                columns[names[0]] = [axis.values[k] for k in where]
+            else:
+                columns |= {
+                    name: [axis.values[k][i] for k in where] for i, name in enumerate(names)
+                }
+        columns |= self.samples(places[-1])
+        rows = zip(*columns.values(), strict=True)
+        return [dict(zip(columns, row, strict=True)) for row in rows]
+
+    def part(self, numbers: np.ndarray) -> tuple["Axes", np.ndarray]:
+        """Return axes without values of long grids that some points have not, and their numbers
+        there.
+        """
+        if all(len(axis.values) <= FEW_VALUES for axis in self.grids.values()):
+            return self, numbers
+        places, grids = list(self.places(numbers)), {}
+        for k, (names, axis) in enumerate(self.grids.items()):
+            used, places[k] = np.unique(places[k], return_inverse=True)
+            grids[names] = Grid(tuple(axis.values[i] for i in used))
+        own = replace(self, grids=grids)
+        return own, np.ravel_multi_index(tuple(places), own.sizes)
+
     def __iter__(self) -> Iterator[Point]:
-        """Yield the points: the last axis changes first, those that are spread together."""
-        samples = self.samples()
-        drawn: list[Point] = [
-            dict(zip(samples, each, strict=True)) for each in zip(*samples.values(), strict=True)
-        ] or [{}]
-        rows = [
-            [dict(zip(names, _entries(names, value), strict=True)) for value in each.values]
-            for names, each in self.grids.items()
-        ]
-        for chosen in product(*rows):
-            fixed: Point = {}
-            for part in chosen:
-                fixed |= part
-            for sample in drawn:
-                yield fixed | sample
+        """Yield the points in order."""
+        for first in range(0, len(self), FEW_VALUES):
+            yield from self.at(range(first, min(first + FEW_VALUES, len(self))))
 
 
 def axes_of(over: Any, points: Any, seed: Any) -> Axes:
@@ -172,16 +199,3 @@ def _entries(names: Sequence[str], value: Any) -> list:
     if not isinstance(value, list) or len(value) != len(names):
         raise SweepError(needed(f"over: {', '.join(names)}", value, f"{len(names)} entries each"))
     return value
-
-
-def _unit(way: str, points: int, size: int, seed: int) -> np.ndarray:
-    """Return points (points, size) from 0 to 1."""
-    if way == "random":
-        return np.random.default_rng(seed).random((points, size))
-    from scipy.stats import qmc
-
-    kind = {"latin": qmc.LatinHypercube, "sobol": qmc.Sobol}[way]
-    generator = kind(size, seed=np.random.default_rng(seed))
-    if way == "sobol":  # SciPy warns where points are no power of two: take some of one
-        return generator.random_base2(max(points - 1, 0).bit_length())[:points]
-    return generator.random(points)

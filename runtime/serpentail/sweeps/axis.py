@@ -118,7 +118,7 @@ def random(low: Any, high: Any, law: str = "uniform") -> Spread:
 def latin(low: Any, high: Any, law: str = "uniform") -> Spread:
     """Make an axis whose points are a Latin hypercube: each of k equal parts has one point.
 
-    scipy.stats.qmc.LatinHypercube makes the points.
+    Another number of points gives other points.
 
     Parameters
     ----------
@@ -193,6 +193,14 @@ def plain(field: str, value: Any) -> Any:
         raise SweepError(
             f"{field}: value {shown(value)}: needs numbers, texts, lists or tables ({reason})"
         ) from None
+
+
+def as_json(value: Any) -> str:
+    """Return plain data as JSON, the same text for the same data."""
+    return _ENCODER.encode(value)
+
+
+_ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"))
 
 
 def in_units(field: str, value: Any, unit: str | Sequence[str] | None = None) -> Any:

@@ -15,18 +15,22 @@ from ..errors import SerpentailError
 from .bundles import model_of
 from .job import Job
 from .runs import run_points
+from .supervision import importing
 
 
 def main(descriptor: int) -> None:
-    """Run blocks that come through a socket, until it is closed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the driver's to answer
+    """Run points that come through a socket, until it is closed.
+
+    The system ends the process by SIGPROF once a point has taken more processor time than its
+    limit. Ctrl-C is the driver's to answer: whoever starts this process blocks it.
+    """
     os.dup2(2, 1)  # output of functions must not mix with reports
     link: Connection = Connection(descriptor)
     tasks: queue.SimpleQueue = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(link, tasks), daemon=True).start()
     jobs: dict[bytes, Job] = {}
     while True:
-        script, data, bundle, points = tasks.get()
+        script, data, bundle, points, first, limit = tasks.get()
         try:
             if data not in jobs:
                 jobs.clear()
@@ -37,8 +41,11 @@ def main(descriptor: int) -> None:
             link.send(("refused", f"{reason}"))
             continue
         link.send(("ready", None))
+        signal.setitimer(signal.ITIMER_PROF, first)
         for told in run_points(jobs[data], model, points):
+            signal.setitimer(signal.ITIMER_PROF, limit)
             link.send(("told", told))
+        signal.setitimer(signal.ITIMER_PROF, 0)
         link.send(("end", None))
 
 
@@ -56,7 +63,11 @@ def _as_main(script: str | None) -> None:
     if script is None or getattr(sys.modules["__main__"], "__file__", None) == script:
         return
     module = types.ModuleType("__mp_main__")
-    module.__dict__.update(runpy.run_path(script, run_name="__mp_main__"))
+    importing.set()
+    try:
+        module.__dict__.update(runpy.run_path(script, run_name="__mp_main__"))
+    finally:
+        importing.clear()
     sys.modules["__main__"] = sys.modules["__mp_main__"] = module
 
 

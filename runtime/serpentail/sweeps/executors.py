@@ -82,9 +82,13 @@ def _dask(address: str) -> Iterator[Place]:
             where = {"scheduler_file": address}
         cluster = None
     else:
-        count = threads()
+        # threads of this process, because each block has a process of its own
         cluster = distributed.LocalCluster(
-            n_workers=count, threads_per_worker=1, dashboard_address=None
+            n_workers=1,
+            threads_per_worker=threads(),
+            processes=False,
+            dashboard_address=None,
+            scheduler_kwargs={"dashboard_address": ":0"},  # any port: others may have sweeps
         )
         where = {"address": cluster}
     try:

@@ -1,11 +1,11 @@
 """The points of a sweep by their models, each with the key of its row."""
 
-import hashlib
-from collections import deque
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from .. import __version__
 from ..building.build import built
@@ -21,12 +21,11 @@ from ..scenes.overrides import changed
 from ..scenes.plan_keys import PLAN
 from ..scenes.simulate_keys import SIMULATE
 from .axes import Axes, Point
+from .axis import as_json, plain
 from .bundles import Bundle
-from .driver import Group, Task
 from .job import DATA, STARTS, Job
 from .measures import Units, unit_at, units_of
 from .recordings import digest_of
-from .store import as_json
 
 TABLES: Mapping[str, tuple[Key, type[Exception]]] = {
     "simulate": (SIMULATE, SimulationError),
@@ -42,18 +41,30 @@ NO_SHAPE = "the shape of a model is fixed: give the sweep a scene, or a function
 
 
 @dataclass(frozen=True)
-class Entry:
-    """A point, also as JSON, the key of its row, and which job and model it is of."""
+class Posed:
+    """A sweep that is well posed: its axes in SI, its job, and its models.
 
-    key: str
-    text: str
-    point: Point
+    varied: the axes whose places, raveled, tell which model a point has; None of these: one model.
+    spec: plain data that tells this sweep from others, see ``Store``.
+    """
+
+    axes: Axes
     job: Job
-    bundle: Bundle | None
+    bundles: list[Bundle | None]
+    varied: list[int]
+    spec: dict[str, Any]
+
+    def models(self, numbers: np.ndarray) -> np.ndarray:
+        """Return which of the bundles the points of some numbers have."""
+        if not self.varied:
+            return np.zeros(len(numbers), int)
+        places = self.axes.places(numbers)
+        sizes = [self.axes.sizes[k] for k in self.varied]
+        return np.ravel_multi_index(tuple(places[k] for k in self.varied), sizes)
 
 
-def entries_of(what: Any, axes: Axes, job: Job, of: Any) -> tuple[Axes, list[Entry]]:
-    """Return the axes, with numbers in SI, and all points with their keys, in order.
+def pose(what: Any, axes: Axes, job: Job, of: Any) -> Posed:
+    """Return the axes with numbers in SI, the job and the models of a sweep.
 
     SweepError if two points are the same.
 
@@ -61,52 +72,77 @@ def entries_of(what: Any, axes: Axes, job: Job, of: Any) -> tuple[Axes, list[Ent
     rows depend on.
     """
     if isinstance(what, Model):
-        find, units = _of_model(what, axes, job)
+        own, find, units = _of_model(what, axes, job)
     elif what is not None:
-        find, units = _of_scene(what, axes, job)
+        own, find, units = _of_scene(what, axes, job)
     else:
-        find, units = _without_model(job), {}
+        own, find, units = _without_model(job), lambda _: None, {}
     axes = axes.measured(units)
     if isinstance(what, Model):
         _refuse_shapes(what, axes)
-    found: dict[str, Entry] = {}
-    besides = as_json(of)
-    for number, point in enumerate(axes):
-        own, bundle, told = find(point)
-        text = as_json(point)
-        if own.run == "identify":
-            told += digest_of(own, point)
-        key = hashlib.sha256(f"{told}\n{besides}\n{text}".encode()).hexdigest()[:32]
-        if key in found:
-            raise SweepError(f"over: point {number} occurs twice, {shown(point)}: needs each once")
-        found[key] = Entry(key, text, point, own, bundle)
-    return axes, list(found.values())
+    told = [_told(names, axis.values, own) for names, axis in axes.grids.items()]
+    _refuse_twice(axes, told)
+    varied = _varied(axes, own.built)
+    bundles = [find(point) for point in axes.at(_first_of_each(axes, varied))]
+    files = digest_of(own, {}) if own.run == "identify" and DATA not in axes.names else ""
+    spec = {
+        "family": [__version__, own.identity(), plain("of", of), files, sorted(own.built)],
+        "grids": list(zip(axes.grids, told, strict=True)),
+        "spreads": [
+            [name, [each.way, each.low.tolist(), each.high.tolist(), each.law]]
+            for name, each in axes.spreads.items()
+        ],
+        "points": axes.points,
+        "seed": axes.seed,
+        "models": [each.manifest_hash if each else "" for each in bundles],
+        "varied": varied,
+    }
+    return Posed(axes, own, bundles, varied, spec)
 
 
-def groups_of(entries: list[Entry], done: Mapping[str, bool]) -> list[Group]:
-    """Return the points that are still to be run, by model."""
-    groups: dict[tuple[str, int], Group] = {}
-    for each in entries:
-        if each.key in done:
-            continue
-        name = each.bundle.manifest_hash if each.bundle else ""
-        group = groups.setdefault((name, id(each.job)), Group(each.bundle, each.job, deque()))
-        group.left.append(Task(each.key, each.text, each.point))
-    return list(groups.values())
+def _told(names: tuple[str, ...], values: Sequence, job: Job) -> list[str]:
+    """Return what tells each value of a grid from others; of a file, also its content."""
+    told = [as_json(value) for value in values]
+    if job.run != "identify" or DATA not in names:
+        return told
+    files = [value[names.index(DATA)] if len(names) > 1 else value for value in values]
+    digests = [digest_of(job, {DATA: file}) for file in files]
+    return [f"{one}\n{digest}" for one, digest in zip(told, digests, strict=True)]
 
 
-Find = Callable[[Point], tuple[Job, Bundle | None, str]]  # job, model, and what the key is made of
+def _refuse_twice(axes: Axes, told: Sequence[Sequence[str]]) -> None:
+    """SweepError for a grid that has a value twice."""
+    for k, values in enumerate(told):
+        if len(set(values)) < len(values):
+            place = next(i for i, value in enumerate(values) if value in values[:i])
+            number = place * int(np.prod(axes.sizes[k + 1 :]))
+            point = shown(axes.at([number])[0])
+            raise SweepError(f"over: point {number} occurs twice, {point}: needs each once")
 
 
-def _without_model(job: Job) -> Find:
-    """Points of a function that takes nothing else."""
+def _varied(axes: Axes, built: Collection[str]) -> list[int]:
+    """Return the axes that decide on the model of a point; the last one has all random ones."""
+    own = [k for k, names in enumerate(axes.grids) if set(names) & set(built)]
+    return [*own, len(axes.grids)] if set(axes.spreads) & set(built) else own
+
+
+def _first_of_each(axes: Axes, varied: list[int]) -> np.ndarray:
+    """Return the number of the first point of each model."""
+    sizes = [axes.sizes[k] if k in varied else 1 for k in range(len(axes.sizes))]
+    return np.ravel_multi_index(np.unravel_index(np.arange(np.prod(sizes)), sizes), axes.sizes)
+
+
+Find = Callable[[Point], Bundle | None]  # the model of a point
+
+
+def _without_model(job: Job) -> Job:
+    """Return the job of a function that takes nothing else."""
     if isinstance(job.run, str):
         raise SweepError(f"model: None: run = {job.run!r} needs a model or a scene")
-    told = f"{__version__}\n{job.identity()}"
-    return lambda point: (job, None, told)
+    return job
 
 
-def _of_model(model: Model, axes: Axes, job: Job) -> tuple[Find, Units]:
+def _of_model(model: Model, axes: Axes, job: Job) -> tuple[Job, Find, Units]:
     """Points that change parameters, the start or settings of one model."""
     known = {entry["name"] for entry in model.manifest["parameters"]}
     others = frozenset(name for name in axes.names if name not in known)
@@ -128,14 +164,13 @@ def _of_model(model: Model, axes: Axes, job: Job) -> tuple[Find, Units]:
         job, keys=others, parameters=parameters, profile=model.profile, parent=str(Path.cwd())
     )
     bundle = Bundle.of(model.checked)
-    told = f"{__version__}\n{bundle.manifest_hash}\n{own.identity()}"
-    return (lambda point: (own, bundle, told)), units
+    return own, lambda _: bundle, units
 
 
-def _of_scene(scene: Any, axes: Axes, job: Job) -> tuple[Find, Units]:
+def _of_scene(scene: Any, axes: Axes, job: Job) -> tuple[Job, Find, Units]:
     """Return points that change parameters, keys of the model, or keys of the scene's table."""
     tables, path = read_scene(scene, SweepError)
-    first = next(iter(axes))
+    first = axes.at([0])[0]
     shape = [name for name in axes.names if name in MADE_OF]
     keys: list[str] = []
     units: Units = {}
@@ -173,19 +208,13 @@ def _of_scene(scene: Any, axes: Axes, job: Job) -> tuple[Find, Units]:
         keys=frozenset(keys),
         built=frozenset((*shape, *making)),
     )
-    models: dict[str, tuple[Job, Bundle, str]] = {}
 
-    def find(point: Point) -> tuple[Job, Bundle, str]:
-        name = as_json([point[each] for each in (*shape, *making)])
-        if name not in models:
-            made = tables | {each: point[each] for each in shape}
-            checked, _ = built(made, path.stem, {each: point[each] for each in making})
-            bundle = Bundle.of(checked)
-            told = f"{__version__}\n{bundle.manifest_hash}\n{own.identity()}"
-            models[name] = own, bundle, told
-        return models[name]
+    def find(point: Point) -> Bundle:
+        made = tables | {each: point[each] for each in shape}
+        checked, _ = built(made, path.stem, {each: point[each] for each in making})
+        return Bundle.of(checked)
 
-    return find, units
+    return own, find, units
 
 
 def _refuse_keys(job: Job, values: Mapping[str, Any]) -> None:
@@ -198,7 +227,7 @@ def _refuse_keys(job: Job, values: Mapping[str, Any]) -> None:
 
 def _refuse_shapes(model: Model, axes: Axes) -> None:
     """SweepError for a start whose values at the first point have a wrong shape."""
-    first = next(iter(axes))
+    first = axes.at([0])[0]
     for name, size in zip(STARTS, (model.nq, model.nv), strict=True):
         given = numbers_in(first.get(name))
         if name in first and (given is None or given.shape != (size,)):

@@ -10,7 +10,7 @@ from typing import Any
 from ..checks import shown
 from ..errors import SweepError
 from .axes import Point
-from .store import as_json
+from .axis import as_json
 
 RUNS = ("simulate", "plan", "identify")
 STARTS = ("q0", "v0")

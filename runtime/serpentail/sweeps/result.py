@@ -1,18 +1,23 @@
 """``Sweep``: the rows of a sweep, from its store."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import islice
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..brief import brief
+from ..checks import one_line
 from ..errors import SweepError
 from .axes import Axes, checked_row
 from .driver import Spent
-from .groups import Entry
-from .store import Row, Store
+from .groups import Posed
+from .shards import AT_ONCE, Row
+from .store import Store
 
 if TYPE_CHECKING:
     import pandas
@@ -38,37 +43,59 @@ class Status:
 class Sweep:
     """The rows of a sweep; ``sweep[k]`` is the row of point k, and ``len(sweep)`` their number.
 
-    A row is a dict of the point's values and the run's outputs.
+    A row is a dict of the point's values and the run's outputs. Rows are read when they are asked
+    for: ``for row in sweep`` holds some thousands of them at a time, ``rows()`` all.
 
     Attributes
     ----------
-    axes : Axes
-        The axes of the sweep.
-    entries : sequence of Entry
-        The points, with the keys of their rows.
+    posed : Posed
+        The checked axes, job and models.
     store : Store
         Where the rows are kept.
     spent : Spent
-        What this call took: ``wall_s`` and ``busy_s`` (s, of all workers), ``blocks``, ``points``
-        and ``workers``.
+        What this call took: ``wall_s`` and ``busy_s`` (s, of all workers), ``blocks``, ``points``,
+        ``workers``, and ``hung``: the number of points that were given up without a row.
     """
 
-    axes: Axes = field(repr=False)
-    entries: Sequence[Entry] = field(repr=False)
+    posed: Posed = field(repr=False)
     store: Store = field(repr=False)
     spent: Spent
     __repr__ = brief
 
+    @property
+    def axes(self) -> Axes:
+        """Return the axes of the sweep, in SI."""
+        return self.posed.axes
+
     def __len__(self) -> int:
-        return len(self.entries)
+        return len(self.axes)
 
     def __getitem__(self, k: int) -> dict[str, Any]:
         """Return the row of point k; KeyError if it has none yet, IndexError if k is no point."""
-        entry = self.entries[range(len(self))[k]]
-        found = self.store.rows([entry.key])
-        if not found:
+        found = self.store.row(range(len(self))[k])
+        if found is None:
             raise KeyError(f"point {k} has no row yet")
-        return row_of(k, entry, found[entry.key])
+        return self._row(found, self.axes.at([found.number])[0])
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        """Yield all rows that exist, in the order of their points."""
+        rows = self.store.rows()
+        while some := list(islice(rows, AT_ONCE)):
+            points = self.axes.at([row.number for row in some])
+            yield from map(self._row, some, points)
+
+    @staticmethod
+    def _row(row: Row, point: dict[str, Any]) -> dict[str, Any]:
+        """Return a stored row as a dict; SweepError if it is damaged."""
+        try:
+            outcome = {} if row.outcome is None else json.loads(row.outcome)
+            told = {"error": row.error, "seconds": row.seconds}
+            return {"number": row.number} | point | outcome | told
+        except (RecursionError, TypeError, ValueError) as reason:
+            raise SweepError(
+                f"store: the row of point {row.number} is damaged ({one_line(str(reason))}): "
+                "restore a copy, or name another folder"
+            ) from None
 
     def rows(self) -> list[dict[str, Any]]:
         """Return all rows that exist, in the order of their points.
@@ -79,12 +106,7 @@ class Sweep:
             Each has "number", the point's values, the run's outputs, "error" (None for success) and
             "seconds" (s).
         """
-        found = self.store.rows(entry.key for entry in self.entries)
-        return [
-            row_of(k, entry, found[entry.key])
-            for k, entry in enumerate(self.entries)
-            if entry.key in found
-        ]
+        return list(self)
 
     def status(self) -> Status:
         """Return how far the sweep is, from the store's present content.
@@ -94,8 +116,8 @@ class Sweep:
         Status
             ``points``, ``done`` and ``failed``.
         """
-        known = self.store.known(entry.key for entry in self.entries)
-        return Status(len(self), len(known), sum(not good for good in known.values()))
+        self.store.look()
+        return Status(len(self), int(self.store.done.sum()), self.store.failed)
 
     def motion(self, k: int) -> Any:
         """Run a point again and return its motion.
@@ -120,8 +142,9 @@ class Sweep:
         from .bundles import model_of
         from .runs import run_point
 
-        entry = self.entries[checked_row(k, len(self))]
-        _, motion = run_point(entry.job, model_of(entry.bundle, entry.job), entry.point)
+        number, job = [checked_row(k, len(self))], self.posed.job
+        bundle = self.posed.bundles[self.posed.models(np.array(number))[0]]
+        _, motion = run_point(job, model_of(bundle, job), self.axes.at(number)[0])
         if motion is None:
             raise SweepError(
                 f"point {k}: its run returned no motion: let the function return it as "
@@ -167,7 +190,7 @@ class Sweep:
         """
         from .tables import frame
 
-        return frame(self.rows())
+        return frame(self)
 
     def to_xarray(self) -> "xarray.Dataset":
         """Convert the rows to an xarray dataset; needs the extra "xarray".
@@ -185,10 +208,11 @@ class Sweep:
         """
         from .tables import dataset
 
-        return dataset(self.axes, len(self), self.rows())
+        return dataset(self)
 
     def save(self, path: str | PathLike[str]) -> Path:
-        """Write the rows to a file, whole or not at all.
+        """Write the rows to a file, whole or not at all. A .nc file is made in memory, others are
+        not.
 
         Parameters
         ----------
@@ -212,10 +236,3 @@ class Sweep:
         from .tables import write
 
         return write(self, path)
-
-
-def row_of(k: int, entry: Entry, row: Row) -> dict[str, Any]:
-    """Return a row as a dict."""
-    outcome = {} if row.outcome is None else json.loads(row.outcome)
-    told = {"error": row.error, "seconds": row.seconds}
-    return {"number": k} | entry.point | outcome | told

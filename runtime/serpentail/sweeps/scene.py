@@ -7,6 +7,7 @@ from typing import Any
 from ..checks import Refusals, none_of, refusal, shown
 from ..errors import SweepError
 from ..scenes.file import read_scene, subtable
+from ..scenes.keys import read
 from ..scenes.sweep_keys import SWEEP
 from .axis import Grid, Spread, grid, latin, random, sobol
 from .job import RUNS
@@ -23,10 +24,7 @@ def arguments_of(path: str) -> dict[str, Any]:
     tables, place = read_scene(path, SweepError)
     table = subtable(tables, "sweep", place, SweepError)
     refused = Refusals(SweepError)
-    for name in table:
-        wrong = none_of("sweep: key", name, SWEEP.keys)
-        if wrong:
-            refused.add(name, wrong)
+    table = read(table, SWEEP, "sweep", refused)
     run = table.get("run", "simulate")
     wrong = none_of("sweep.run", run, RUNS)
     if wrong:
@@ -40,7 +38,7 @@ def arguments_of(path: str) -> dict[str, Any]:
         for name, axis in over.items()
     }
     refused.tell()
-    store = place.parent / table.get("store", f"{place.stem}.db")
+    store = place.parent / table.get("store", f"{place.stem}.rows")
     given = {name: table[name] for name in ("points", "seed", "outputs", "limit") if name in table}
     return {"model": str(place), "over": axes, "run": run, "store": Path(store)} | given
 

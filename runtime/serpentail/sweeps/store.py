@@ -1,67 +1,51 @@
-"""The rows of a sweep in an SQLite file; each has a key made of all that it depends on."""
+"""The store of a sweep: a folder with a folder of shards for each sweep, or memory."""
 
+import hashlib
 import json
-import sqlite3
-from collections.abc import Iterable, Iterator
+import os
+import secrets
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
+import numpy as np
 from filelock import FileLock, Timeout
 
-from ..errors import NotWritten, SweepError
-from ..files import refuse_unwritable
+from ..errors import SweepError
+from ..files import refuse_unusable, replacing
+from .adoption import Mapped
+from .axis import as_json
+from .shards import NAME, Row, Shard, in_order, parquet_library
+from .supervision import ShardFolder
 
-FORMAT = 0x53525031  # of this file, in its header
-TABLE = (
-    "create table if not exists rows (key text primary key, point text not null, outcome text, "
-    "error text, seconds real not null) without rowid"
-)
-INSERT = "insert into rows values (?, ?, ?, ?, ?) on conflict (key) do nothing"
-IN_ONE_QUERY = 500
-
-
-class Row(NamedTuple):
-    """Result of a point: its outcome, or the error in place of it; seconds that it took."""
-
-    key: str
-    point: str  # JSON
-    outcome: str | None  # JSON
-    error: str | None
-    seconds: float
+MARK = "store.json"  # tells that a folder is a store, and which one
+SPEC = "sweep.json"
+LOCK = "lock"
+FORMAT = 2
 
 
 class Store:
-    """Rows in a file, or in memory if the path is None.
+    """The rows of one sweep, in its folder of a store, or in memory if the path is None.
 
-    One process writes at a time, any number may read. An existing row is never replaced.
+    spec: plain data on which the rows depend, which tells one sweep from others; "family" is what
+    sweeps have in common whose rows can be the same. One process writes at a time, any number may
+    read. An existing row is never replaced. ``look`` finds the rows, as ``writing`` does.
     """
 
-    def __init__(self, path: str | PathLike[str] | None):
-        self.path = None if path is None else Path(path)
-        if self.path is not None:
-            try:
-                refuse_unwritable(self.path)
-                self.path.parent.mkdir(parents=True, exist_ok=True)
-            except OSError as reason:
-                raise SweepError(f"store: {reason}: name another file") from None
-        with self._told():
-            # blocks finish in any thread, but one thread at a time writes
-            self.base = sqlite3.connect(self.path or ":memory:", check_same_thread=False)
-            (found,) = self.base.execute("pragma application_id").fetchone()
-            (tables,) = self.base.execute("select count(*) from sqlite_master").fetchone()
-            if tables and found != FORMAT:
-                raise SweepError(f"store: {self.path} is another program's: name another file")
-            if not tables:
-                self._begin()
-
-    def _begin(self) -> None:
-        """Make an empty store."""
-        self.base.execute("pragma journal_mode = wal")
-        with self.base:
-            self.base.execute(TABLE)
-            self.base.execute(f"pragma application_id = {FORMAT}")
+    def __init__(self, path: str | os.PathLike[str] | None, spec: Mapping[str, Any], total: int):
+        self.path = None if path is None else Path(path).absolute()
+        self.spec = json.loads(as_json(spec))
+        self.shards: list[Shard] = []
+        self.done = np.zeros(total, bool)
+        if self.path is None:
+            return
+        parquet_library()
+        _refuse_other(self.path)
+        family, own = (
+            hashlib.sha256(as_json(x).encode()).hexdigest()[:16] for x in (spec["family"], spec)
+        )
+        self.folder = self.path / f"{family}-{own}"
 
     @contextmanager
     def writing(self) -> Iterator[None]:
@@ -69,65 +53,154 @@ class Store:
         if self.path is None:
             yield
             return
+        lock = FileLock(self.path / LOCK)
         try:
-            with FileLock(self.path.with_name(f".{self.path.name}.lock"), timeout=0):
-                self.base.execute("pragma synchronous = normal")
-                yield
+            self.path.mkdir(parents=True, exist_ok=True)
+            lock.acquire(timeout=0)
         except Timeout:
             raise SweepError(
                 f"store: another process is writing {self.path}: wait for its end, look with "
-                "--status, or name another file"
+                "--status, or name another folder"
             ) from None
-
-    def add(self, rows: Iterable[Row]) -> None:
-        """Write rows, all or none of them; NotWritten if the disk refuses."""
-        with self._told(), self.base:
-            self.base.executemany(INSERT, rows)
-
-    def known(self, keys: Iterable[str]) -> dict[str, bool]:
-        """Return which of the keys have rows, and whether each went well."""
-        wanted = set(keys)
-        rows = self.base.execute("select key, error is null from rows")
-        return {key: bool(good) for key, good in rows if key in wanted}
-
-    def rows(self, keys: Iterable[str]) -> dict[str, Row]:
-        """Return the rows that there are of some keys."""
-        wanted = list(keys)
-        found: dict[str, Row] = {}
-        for first in range(0, len(wanted), IN_ONE_QUERY):
-            part = wanted[first : first + IN_ONE_QUERY]
-            marks = ",".join("?" * len(part))
-            query = f"select key, point, outcome, error, seconds from rows where key in ({marks})"
-            found |= {row[0]: Row(*row) for row in self.base.execute(query, part)}
-        return found
-
-    def forget(self, keys: Iterable[str]) -> None:
-        """Delete rows, so that they are made again."""
-        with self._told(), self.base:
-            self.base.executemany("delete from rows where key = ?", [(key,) for key in keys])
-
-    def close(self) -> None:
-        """Close the file, after writing SQLite's log into it."""
-        self.base.close()
-
-    @contextmanager
-    def _told(self) -> Iterator[None]:
-        """Turn errors of SQLite into one line."""
+        except OSError as reason:
+            raise SweepError(f"store: {reason}: name another folder") from None
         try:
+            self._begin(self.path)
             yield
-        except sqlite3.DatabaseError as reason:
-            name = getattr(reason, "sqlite_errorname", "")
-            if name == "SQLITE_NOTADB":
-                raise SweepError(f"store: {self.path} is not a store: name another file") from None
-            raise NotWritten(
-                f"store: {self.path} is not written ({reason}): make room, or mend the disk; its "
-                "rows are intact, and the same call resumes from them"
-            ) from reason
+            self._remove_others()
+        finally:
+            lock.release()
+
+    def _begin(self, path: Path) -> None:
+        """Mark the folder, take rows of sweeps that have the same, and find all rows."""
+        if not (path / MARK).exists():
+            _write(path / MARK, {"format": FORMAT, "id": secrets.token_hex(8)})
+        if not (self.folder / SPEC).exists():
+            for other in sorted(path.glob(f"{self.folder.name[:16]}-*/{SPEC}")):
+                self._adopt(other)
+            _write(self.folder / SPEC, self.spec)
+        self.look()
+
+    def _remove_others(self) -> None:
+        """Remove shards whose rows others have: of workers that were thought to be lost."""
+        own = {shard.where for shard in self.shards}
+        for path in set(_files(self.folder)) - own:
+            Path(path).unlink(missing_ok=True)
+
+    def _adopt(self, other: Path) -> None:
+        """Take the rows of another sweep that are rows of this one, too."""
+        try:
+            mapped = Mapped(json.loads(other.read_bytes()), self.spec)
+        except (ArithmeticError, LookupError, MemoryError, RecursionError, TypeError, ValueError):
+            raise SweepError(f"store: {other} is damaged: delete its folder") from None
+        for shard in _accepted(other.parent, np.zeros(mapped.old_total, bool)):
+            rows = [
+                row._replace(number=number)
+                for row, number in zip(shard.rows(), mapped(shard), strict=True)
+                if number >= 0 and not self.done[number]
+            ]
+            if rows:
+                self.accept(Shard.of(sorted(rows)))
+
+    @property
+    def place(self) -> ShardFolder | None:
+        """Return where workers write shards; None: in memory."""
+        if self.path is None:
+            return None
+        marked = self.path / MARK
+        return ShardFolder(self.folder, marked, marked.read_bytes())
+
+    def look(self) -> None:
+        """Find the rows that there are now."""
+        if self.path is not None:
+            self.done[:] = False
+            self.shards = _accepted(self.folder, self.done)
+
+    def accept(self, shard: Shard) -> None:
+        """Take notice of a shard, and write it if that was not done."""
+        if self.path is not None and not isinstance(shard.where, str):
+            shard = shard.written(self.folder)
+        self.done[shard.numbers()] = True
+        self.shards.append(shard)
+
+    @property
+    def failed(self) -> int:
+        """How many rows tell of a failure."""
+        return sum(shard.failed for shard in self.shards)
+
+    def rows(self) -> Iterator[Row]:
+        """Yield all rows in the order of their numbers."""
+        return in_order(sorted(self.shards, key=lambda shard: shard[:4]))
+
+    def row(self, number: int) -> Row | None:
+        """Return the row of a number; None if it has none."""
+        for shard in self.shards:
+            if shard.first <= number <= shard.last:
+                for row in shard.rows():
+                    if row.number == number:
+                        return row
+        return None
+
+    def forget(self, numbers: Sequence[int] | None = None) -> None:
+        """Delete rows, by default those of failures, so that they are made again."""
+        gone = None if numbers is None else set(numbers)
+        for shard in list(self.shards):
+            if shard.failed if gone is None else self.done[list(gone)].any():
+                kept = [
+                    row
+                    for row in shard.rows()
+                    if (row.error is None if gone is None else row.number not in gone)
+                ]
+                if len(kept) < shard.size:
+                    self._replace(shard, kept)
+
+    def _replace(self, shard: Shard, kept: Sequence[Row]) -> None:
+        """Have fewer rows in place of a shard."""
+        self.shards.remove(shard)
+        self.done[shard.numbers()] = False
+        if kept:
+            self.accept(Shard.of(kept))
+        if self.path is not None:
+            os.unlink(shard.where)
 
 
-def as_json(value: Any) -> str:
-    """Return plain data as JSON, the same text for the same data."""
-    return _ENCODER.encode(value)
+def _files(folder: Path) -> list[str]:
+    """Return the paths of shards in a folder, in the order of their first numbers."""
+    found: list[str] = []
+    for inner in folder.glob("[0-9]*"):
+        with os.scandir(inner) as entries:
+            found += [entry.path for entry in entries if NAME.fullmatch(entry.name)]
+    return sorted(found)
 
 
-_ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"))
+def _accepted(folder: Path, done: np.ndarray) -> list[Shard]:
+    """Return the shards of a folder but those that have rows of others, and mark rows as done."""
+    accepted = []
+    for shard in map(Shard.at, _files(folder)):
+        numbers = shard.numbers()
+        if not done[numbers].any():
+            done[numbers] = True
+            accepted.append(shard)
+    return accepted
+
+
+def _refuse_other(path: Path) -> None:
+    """SweepError if a path is that of anything but a store or a place for one."""
+    try:
+        if path.is_file():
+            raise SweepError(
+                f"store: {path} is a file, of an earlier version or of another program: a store "
+                "is a folder: name another"
+            )
+        names = {each.name for each in path.iterdir()} if path.is_dir() else set()
+        if names and not names & {MARK, LOCK}:
+            raise SweepError(f"store: {path} is a folder of other files: name another")
+        refuse_unusable(path)
+    except OSError as reason:
+        raise SweepError(f"store: {reason}: name another folder") from None
+
+
+def _write(path: Path, value: Any) -> None:
+    """Write plain data as JSON."""
+    with replacing(path) as part:
+        part.write_text(as_json(value), encoding="utf-8")

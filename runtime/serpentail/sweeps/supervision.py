@@ -1,25 +1,53 @@
-"""Runs blocks of points in processes of their own, and survives crashes of these."""
+"""Runs blocks of points in processes of their own, survives crashes of these, and writes shards."""
 
 import atexit
 import os
+import signal
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from ..errors import SweepError
+from ..model.commands import inherited
 from ..model.cores import VARIABLE
-from .axes import Point
+from .axes import Axes, Point
 from .bundles import Bundle
 from .runs import Told
+from .shards import Row, Shard
 
 TRIES = 2  # of a point whose process ends: something else may have ended it
+TOGETHER = 2048  # points that a process gets at once: it holds the motions of flights of them
+HANGS = 10  # limits on the clock in which a point hangs if it takes less processor time than
+LEAST = 0.1  # limits
+
+
+@dataclass(frozen=True)
+class ShardFolder:
+    """Where workers write shards: a sweep's folder, and a file that tells its store from others.
+
+    A worker that does not find this very store returns the rows to the driver.
+    """
+
+    folder: Path
+    marked: Path
+    mark: bytes
+
+    def is_here(self) -> bool:
+        """Tell if this process sees the store."""
+        try:
+            return self.marked.read_bytes() == self.mark
+        except OSError:
+            return False
 
 
 @dataclass(frozen=True)
@@ -27,24 +55,29 @@ class Block:
     """Points of one model that are sent as one task.
 
     job: pickled; script: the driver's main program, None if the job needs none of its names;
-    limit: seconds that a point may take, None: no limit; together: whether points may be run side
-    by side, with all results at once.
+    axes, places: what makes the points; numbers: of their rows; limit: seconds of processor time
+    that a point may take, None: no limit; together: whether points may be run side by side, with
+    all results at once; store: None: the rows are returned.
     """
 
     job: bytes
     script: str | None
     bundle: Bundle | None
-    points: Sequence[Point]
+    axes: Axes
+    places: np.ndarray
+    numbers: np.ndarray
     limit: float | None
     together: bool
+    store: ShardFolder | None
 
 
 class Ran(NamedTuple):
-    """What came of a block: of its points, or why none could be run; seconds of work."""
+    """What came of a block: a shard or None, points that hung, why none could be run; seconds."""
 
-    told: list[Told]
-    refused: str | None
-    seconds: float
+    shard: Shard | None
+    hung: int = 0
+    refused: str | None = None
+    seconds: float = 0.0
 
 
 class Child:
@@ -52,13 +85,19 @@ class Child:
 
     def __init__(self) -> None:
         here, there = Pipe()
-        paths = [path or os.getcwd() for path in sys.path]
-        environment = os.environ | {"PYTHONPATH": os.pathsep.join(dict.fromkeys(paths))}
-        environment |= {VARIABLE: "1"}  # its siblings use the other cores
+        environment = inherited(**{VARIABLE: "1"})  # its siblings use the other cores
         command = [sys.executable, "-m", "serpentail.sweeps.child", str(there.fileno())]
-        self.process = subprocess.Popen(command, env=environment, pass_fds=[there.fileno()])
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])  # it inherits that
+        try:
+            self.process = subprocess.Popen(command, env=environment, pass_fds=[there.fileno()])
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
         there.close()
         self.link: Connection[Any, Any] = here
+
+    def used(self) -> float:
+        """Return the processor time that it took (s); OSError if it is gone."""
+        return time.clock_gettime((~self.process.pid << 3) | 2)  # Linux's clock of a process
 
     def end(self) -> int:
         """End the process in any case; return its status."""
@@ -70,28 +109,56 @@ class Child:
 _idle: list[Child] = []
 _all: set[Child] = set()
 _lock = threading.Lock()
+importing = threading.Event()  # in a worker process, while it imports the driver's main program
 _ending = threading.Event()  # while all are ended, and no new one is to begin
 
 
 def run_block(block: Block) -> Ran:
-    """Run a block; every point gets a result, whatever happens to the process that runs it.
+    """Run a block, and write its shard; NotWritten if it cannot be written."""
+    told: list[Told] = []
+    for first in range(0, len(block.places), TOGETHER):
+        points = block.axes.at(block.places[first : first + TOGETHER])
+        found = _run_all(block, points)
+        if isinstance(found, str):
+            return Ran(None, refused=found)
+        told += found
+    return ran(block.numbers, told, block.store)
 
-    A point fails if it takes longer than the limit, or if the process ends twice while it runs.
+
+def ran(numbers: np.ndarray, told: list[Told], store: ShardFolder | None) -> Ran:
+    """Return the results of points as a shard, which is written if its store is here."""
+    seconds = sum(each.seconds for each in told)
+    rows = [
+        Row(number, each.outcome, each.error, each.seconds)
+        for number, each in zip(numbers.tolist(), told, strict=True)
+        if each.outcome is not None or each.error is not None
+    ]
+    shard = Shard.of(rows) if rows else None
+    if shard and store and store.is_here():
+        shard = shard.written(store.folder)
+    return Ran(shard, len(told) - len(rows), None, seconds)
+
+
+def _run_all(block: Block, points: list[Point]) -> list[Told] | str:
+    """Run points; each gets a result, whatever happens to the process that runs it.
+
+    A point fails if it takes more processor time than the limit, or if the process ends twice while
+    it runs. If it hangs, its result has neither an outcome nor an error. A text tells why no
+    process can run them.
     """
     told: dict[int, Told] = {}
     ended: dict[int, int] = {}
-    begun, apart = time.perf_counter(), False
-    while len(told) < len(block.points):
-        left = [k for k in range(len(block.points)) if k not in told]
+    apart = False
+    while len(told) < len(points):
+        left = [k for k in range(len(points)) if k not in told]
         places = left[:1] if apart else left
         child = _taken()
-        found = _run(child, block, places)
+        found = _run(child, block, {k: points[k] for k in places})
         told |= {each.place: each for each in found.told}
-        if isinstance(found.trouble, str):
+        if isinstance(found.trouble, str) or found.trouble is None:
             _give_back(child)
-            return Ran([], found.trouble, 0.0)
-        if found.trouble is None:
-            _give_back(child)
+            if found.trouble:
+                return found.trouble
             continue
         # the process is gone, or has to go: the point that it was at is to blame, if it was alone
         status = _drop(child)
@@ -100,32 +167,40 @@ def run_block(block: Block) -> Ran:
             apart = True
             continue
         ended[at] = ended.get(at, 0) + 1
-        if found.trouble is TOO_LONG or ended[at] >= TRIES:
-            told[at] = Told(at, None, _why(found.trouble, status, block.limit), found.seconds)
-    return Ran([told[k] for k in sorted(told)], None, time.perf_counter() - begun)
+        if found.trouble is HANGING:
+            told[at] = Told(at, None, None, found.seconds)
+        elif status == -signal.SIGPROF or ended[at] >= TRIES:
+            told[at] = Told(at, None, _why(status, block.limit), found.seconds)
+    return [told[k] for k in sorted(told)]
 
 
-TOO_LONG, GONE = object(), object()
+HANGING, GONE = object(), object()
 
 
 class Found(NamedTuple):
-    """What a process sent; trouble: None, TOO_LONG, GONE, or a refusal in words."""
+    """What a process sent; trouble: None, HANGING, GONE, or a refusal in words."""
 
     told: list[Told]
     trouble: Any
     seconds: float
 
 
-def _run(child: Child, block: Block, places: list[int]) -> Found:
-    """Let a process run some points of a block."""
+def _run(child: Child, block: Block, points: dict[int, Point]) -> Found:
+    """Let a process run points by their places."""
     told: list[Told] = []
-    begun, limit = time.perf_counter(), None
+    begun, places = time.perf_counter(), list(points)
+    limit = block.limit or 0.0  # of one point
+    first = limit * len(points) if block.together else limit  # of what is told first
+    patience = None  # s until the next word
     try:
-        points = [block.points[k] for k in places]
-        child.link.send((block.script, block.job, block.bundle, points))
+        task = (block.script, block.job, block.bundle, list(points.values()), first, limit)
+        child.link.send(task)
         while True:
-            if limit is not None and not child.link.poll(limit):
-                return Found(told, TOO_LONG, time.perf_counter() - begun)
+            used = child.used()
+            while patience and not child.link.poll(patience):
+                before, used = used, child.used()
+                if used - before < LEAST * limit:
+                    return Found(told, HANGING, time.perf_counter() - begun)
             kind, content = child.link.recv()
             if kind == "refused":
                 return Found(told, content, 0.0)
@@ -134,21 +209,14 @@ def _run(child: Child, block: Block, places: list[int]) -> Found:
             if kind == "told":
                 told += [each._replace(place=places[each.place]) for each in content]
             begun = time.perf_counter()
-            limit = _limit(block, len(places)) if kind == "ready" else block.limit
+            patience = HANGS * (first if kind == "ready" else limit)
     except (EOFError, OSError):
         return Found(told, GONE, time.perf_counter() - begun)
 
 
-def _limit(block: Block, count: int) -> float | None:
-    """Return how long the first word of some points may take."""
-    if block.limit is None:
-        return None
-    return block.limit * count if block.together else block.limit
-
-
-def _why(trouble: Any, status: int, limit: float | None) -> str:
-    if trouble is TOO_LONG:
-        return f"TimeLimit: took longer than {limit:g} s"
+def _why(status: int, limit: float | None) -> str:
+    if status == -signal.SIGPROF:
+        return f"TimeLimit: took more than {limit:g} s of processor time"
     how = f"signal {-status}" if status < 0 else f"status {status}"
     return f"ProcessEnded: the process that ran it ended with {how}, {TRIES} times"
 

@@ -12,11 +12,13 @@ from ..errors import SweepError
 from ..model.model import Model
 from .axes import axes_of
 from .axis import Grid, Spread, plain
-from .driver import Driver, Spent
-from .groups import entries_of, groups_of
+from .blocks import Missing
+from .driver import Driver, Group, Spent
+from .groups import pose
 from .job import RUNS, STARTS, Job
 from .result import Sweep
 from .store import Store
+from .supervision import importing
 
 WITHOUT = ("watch", "threads", "parameters")  # settings of a run that a sweep has itself
 
@@ -50,8 +52,9 @@ def sweep(  # noqa: PLR0913 - the public face names all that it takes
         What to run. A function f(model, point) or f(point) of a module returns a dict of plain
         data. It may add its Trajectory or Plan as "motion", for pages.
     store : str or path, optional
-        SQLite file on a local disk. Default: in memory. A row is identified by a hash of model,
-        run and point, so a second call runs only what is missing.
+        Folder for the rows, in Parquet files; needs the extra "parquet". Default: in memory. A
+        second call with the same model, run and points runs only what is missing. Workers that see
+        the folder, also on other machines, write into it; others send their rows to this process.
     points : int, optional
         Number of points of the axes made by ``random``, ``latin`` or ``sobol``.
     seed : int, default 0
@@ -64,12 +67,13 @@ def sweep(  # noqa: PLR0913 - the public face names all that it takes
         (together the default), or names of ``summary``. The outputs of "plan" and "identify" are
         their reports.
     limit : float, optional
-        Time that a point may take (s). A point fails if it takes longer, if its run raises an
-        error, or if its process ends.
+        Processor time that a point may take (s). A point fails if it takes more, if its run raises
+        an error, or if its process ends. A point that takes less than a tenth of it in ten times
+        the limit on the clock hangs: it gets no row, so that the next call runs it again.
     executor : str or concurrent.futures.Executor, optional
         Where the points run: "processes", "processes:4", "dask" (a cluster on this machine),
-        "dask:ADDRESS", "dask:FILE.json", or an executor. They are sent in blocks of about one
-        second of work. Default: worker processes, but flights without a limit run in this
+        "dask:ADDRESS", "dask:FILE.json", or an executor. They are sent in blocks of one
+        second of work or more. Default: worker processes, but flights without a limit run in this
         process for the first 3 s.
     of : plain data, optional
         What else the rows of a function depend on, such as its version.
@@ -95,54 +99,48 @@ def sweep(  # noqa: PLR0913 - the public face names all that it takes
     --------
     >>> import serpentail as st
     >>> over = {"tail_mass": st.grid(["2 g", "3 g"]), "start.pitch": st.random(-1.0, 1.0)}
-    >>> sweep = st.sweep("kick", over, points=8, store="kick.db")  # doctest: +SKIP
+    >>> sweep = st.sweep("kick", over, points=8, store="kick.rows")  # doctest: +SKIP
     >>> sweep.to_pandas()  # doctest: +SKIP
     """
-    found = _posed(model, over, run, (points, seed, settings, outputs, of), store)
-    limit = None if limit is None else number("limit", limit, SweepError, above=0)
-    with found.store.writing():
-        known = found.store.known(entry.key for entry in found.entries)
-        if retry_failed:
-            found.store.forget(key for key, good in known.items() if not good)
-            known = {key: good for key, good in known.items() if good}
-        failed = sum(not good for good in known.values())
-        name = model.name if isinstance(model, Model) else Path(model or _function(run)).stem
-        driver = Driver(
-            found.store,
-            groups_of(list(found.entries), known),
-            limit,
-            _script(found.entries[0].job.pickled()),
-            name,
-            total=len(found),
-            done=len(known),
-            failed=failed,
-            spent=found.spent,
+    if importing.is_set():
+        raise SweepError(
+            "the main program calls sweep where a worker imports its functions: put the call below "
+            'the line if __name__ == "__main__":'
         )
+    found = posed(
+        model, over, run, store, points=points, seed=seed, settings=settings, outputs=outputs, of=of
+    )
+    limit = None if limit is None else number("limit", limit, SweepError, above=0)
+    own, store_ = found.posed, found.store
+    with store_.writing():
+        if retry_failed:
+            store_.forget()
+        groups = [
+            Group(bundle, Missing(store_.done, own.models, k))
+            for k, bundle in enumerate(own.bundles)
+        ]
+        name = model.name if isinstance(model, Model) else Path(model or _function(run)).stem
+        script = _script(own.job.pickled())
+        driver = Driver(store_, own.axes, own.job, groups, limit, script, name, found.spent)
         driver.drive(executor)
     return found
 
 
 def posed(model: Any, over: Any, run: Any, store: Any, **rest: Any) -> Sweep:
-    """Return the rows that a store has of a sweep; run nothing."""
-    names = ("points", "seed", "settings", "outputs", "of")
-    given = {"seed": 0} | rest
-    return _posed(model, over, run, tuple(given.get(name) for name in names), store)
-
-
-def _posed(model: Any, over: Any, run: Any, rest: tuple, store: Any) -> Sweep:
-    """Return a sweep with checked points and its store."""
-    points, seed, settings, outputs, of = rest
+    """Return a sweep with checked points; ``status`` finds the rows of its store. Run nothing."""
+    names = ("points", "settings", "outputs", "of")
+    points, settings, outputs, of = (rest.get(name) for name in names)
     if isinstance(run, str):
         wrong = none_of("run", run, RUNS)
         if wrong:
             raise SweepError(f"{wrong}, or a function")
-    axes = axes_of(over, points, seed)
+    axes = axes_of(over, points, rest.get("seed", 0))
     own = _settings(settings, run)
     job = Job(run, own, _outputs(outputs, run))
     job.identity()  # refuses functions that other processes cannot import
     job.pickled()
-    axes, entries = entries_of(model, axes, job, plain("of", of))
-    return Sweep(axes, entries, Store(store), Spent())
+    found = pose(model, axes, job, of)
+    return Sweep(found, Store(store, found.spec, len(found.axes)), Spent())
 
 
 def _settings(settings: Any, run: Any) -> dict[str, Any]:

@@ -1,8 +1,8 @@
 """The rows of a sweep in the forms that other tools take."""
 
-import csv
 import math
-from contextlib import suppress
+from collections.abc import Iterable, Iterator
+from itertools import chain, islice
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,8 +12,8 @@ import numpy as np
 from ..checks import shown
 from ..errors import SweepError
 from ..extras import needed
-from ..files import refuse_unwritable, replacing
-from .axes import Axes
+from ..files import refuse_unwritable, replacing, write_csv
+from .shards import AT_ONCE, parquet_library
 
 if TYPE_CHECKING:
     import pandas
@@ -35,7 +35,6 @@ def checked(path: str | PathLike[str]) -> Path:
         )
     for module, extra, ending in (
         ("pyarrow", "parquet", ".parquet"),
-        ("pandas", "parquet", ".parquet"),
         ("xarray", "xarray", ".nc"),
     ):
         if ending == target.suffix:
@@ -50,25 +49,49 @@ def checked(path: str | PathLike[str]) -> Path:
 def write(sweep: "Sweep", path: str | PathLike[str]) -> Path:
     """Write the rows to a file, whole or not at all, and return its path."""
     target = checked(path)
+    if target.suffix == ".csv":
+        return _write_csv(sweep, target)
     with replacing(target) as part:
         if target.suffix == ".parquet":
-            frame(sweep.rows()).to_parquet(part, engine="pyarrow", index=False)
-        elif target.suffix == ".nc":
-            data = sweep.to_xarray()
-            data.to_netcdf(part, engine="scipy", format="NETCDF3_64BIT")
+            _write_parquet(sweep, part)
         else:
-            _write_csv(sweep.rows(), part)
+            dataset(sweep).to_netcdf(part, engine="scipy", format="NETCDF3_64BIT")
     return target
 
 
-def _write_csv(rows: Rows, path: Path) -> None:
+def _write_csv(sweep: "Sweep", path: Path) -> Path:
     """Write one line for each row; numbers have all their digits, missing values are empty."""
-    found = [flat(row) for row in rows]
-    names = list(dict.fromkeys(name for row in found for name in row))
-    with path.open("w", encoding="utf-8", newline="") as stream:
-        writer = csv.DictWriter(stream, names, restval="", lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(found)
+    names = list(dict.fromkeys(name for row in sweep for name in flat(row)))
+    rows = ([row.get(name, "") for name in names] for row in map(flat, sweep))
+    return write_csv(path, chain([names], rows))
+
+
+def _write_parquet(sweep: "Sweep", path: Path) -> None:
+    """Write a column for each entry; SweepError if one has texts and numbers."""
+    arrow, parquet = parquet_library()
+    schema = arrow.schema([])
+    try:
+        for part in _parts(sweep):
+            schemas = [schema, arrow.table(_columns(part)).schema]
+            schema = arrow.unify_schemas(schemas, promote_options="permissive")
+    except (arrow.ArrowInvalid, arrow.ArrowTypeError) as reason:
+        raise SweepError(f"export: {reason}: write a .csv file") from None
+    with parquet.ParquetWriter(path, schema, compression="zstd") as writer:
+        for part in _parts(sweep):
+            writer.write_table(arrow.table(_columns(part, schema.names), schema))
+
+
+def _parts(sweep: "Sweep") -> Iterator[Rows]:
+    """Yield the rows in parts, with a column for each entry."""
+    rows = map(flat, sweep)
+    while part := list(islice(rows, AT_ONCE)):
+        yield part
+
+
+def _columns(part: Rows, names: Iterable[str] = ()) -> dict[str, list]:
+    """Return rows by columns, by default by all that they have; None where one has no value."""
+    names = names or dict.fromkeys(name for row in part for name in row)
+    return {name: [row.get(name) for row in part] for name in names}
 
 
 def flat(row: dict[str, Any], before: str = "") -> dict[str, Any]:
@@ -84,42 +107,45 @@ def flat(row: dict[str, Any], before: str = "") -> dict[str, Any]:
     return found
 
 
-def frame(rows: Rows) -> "pandas.DataFrame":
+def frame(sweep: "Sweep") -> "pandas.DataFrame":
     """Return the rows as a table of pandas."""
     pandas = needed("pandas", "pandas")
-    return pandas.DataFrame([flat(row) for row in rows])
+    return pandas.DataFrame([flat(row) for row in sweep])
 
 
-def dataset(axes: Axes, count: int, rows: Rows) -> "xarray.Dataset":
+def dataset(sweep: "Sweep") -> "xarray.Dataset":
     """Return the rows as a dataset over the grids and the samples."""
     xarray = needed("xarray", "xarray")
+    axes = sweep.axes
     dims = ["_".join(names) for names in axes.grids]
-    sizes = [len(each.values) for each in axes.grids.values()]
     coordinates: dict[str, Any] = {}
     for dim, (names, each) in zip(dims, axes.grids.items(), strict=True):
         coordinates |= _grid_coordinates(dim, names, each.values)
     if axes.spreads:
-        dims, sizes = [*dims, SAMPLE], [*sizes, axes.points]
-        for name, numbers in axes.samples().items():
+        dims = [*dims, SAMPLE]
+        for name, numbers in axes.samples(np.arange(axes.points)).items():
             coordinates |= _entries(name, np.array(numbers))
-    placed = _placed(count, rows)
-    filled = dict.fromkeys(name for row in placed for name in row)
-    columns = {name: [row.get(name) for row in placed] for name in filled}
     given = set(axes.names) | {"number"}
-    variables = {
-        name: (dims, _array(name, values).reshape(sizes))
-        for name, values in columns.items()
-        if not any(name == one or name.startswith(f"{one}_") for one in given)
-    }
+    columns: dict[str, np.ndarray] = {}
+    for row in sweep:
+        for name, value in flat(row).items():
+            if not any(name == one or name.startswith(f"{one}_") for one in given):
+                _put(columns, name, len(sweep), row["number"], value)
+    variables = {name: (dims, each.reshape(axes.sizes)) for name, each in columns.items()}
     return xarray.Dataset(variables, coordinates)
 
 
-def _placed(count: int, rows: Rows) -> Rows:
-    """Return a row for every point, empty if it has none yet."""
-    found: Rows = [{}] * count
-    for row in rows:
-        found[row["number"]] = flat(row)
-    return found
+def _put(columns: dict[str, np.ndarray], name: str, count: int, place: int, value: Any) -> None:
+    """Put a value into its column: of numbers, NaN where there is none, or else of texts."""
+    if name not in columns:
+        columns[name] = np.full(count, "", object) if name == "error" else np.full(count, math.nan)
+    if value is None:
+        return
+    number = isinstance(value, int | float) and columns[name].dtype != object
+    if not number and columns[name].dtype != object:
+        texts = ["" if math.isnan(x) else str(x) for x in columns[name].tolist()]
+        columns[name] = np.array(texts, object)
+    columns[name][place] = value if number else str(value)
 
 
 def _grid_coordinates(dim: str, names: tuple[str, ...], values: tuple) -> dict[str, Any]:
@@ -142,11 +168,3 @@ def _entries(name: str, numbers: np.ndarray) -> dict[str, Any]:
         return {name: (SAMPLE, numbers)}
     columns = numbers.reshape(len(numbers), -1)
     return {f"{name}_{k}": (SAMPLE, column) for k, column in enumerate(columns.T)}
-
-
-def _array(name: str, values: list[Any]) -> np.ndarray:
-    """Return a column as numbers with NaN for missing ones, or else as texts."""
-    with suppress(TypeError, ValueError):
-        if name != "error":
-            return np.array([math.nan if x is None else float(x) for x in values])
-    return np.array(["" if x is None else str(x) for x in values])

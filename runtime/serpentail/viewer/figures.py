@@ -20,10 +20,11 @@ LABELS = {  # of the numbers that the page shows
     "com_rise_m": "rise of the centre of mass",
     "tilt_max_deg": "largest tilt of the back",
     "tilt_end_deg": "tilt at the end",
-    "peak_ground_force_N": "largest force of the ground at the samples",
-    "peak_ground_force_weights": "largest force of the ground at the samples",
-    "peak_group_force_N": "largest force at the samples",
-    "peak_torque_N_m": "largest joint torque at the samples",
+    "impulse_N_s": "impulse of the ground",
+    "peak_ground_force_N": "largest force of the ground",
+    "peak_ground_force_weights": "largest force of the ground",
+    "peak_group_force_N": "largest force",
+    "peak_torque_N_m": "largest joint torque",
     "energy_change_J": "energy gained",
 }
 

@@ -1,5 +1,7 @@
 """``live``: a page that shows a run while it is integrated, or a plan while it is refined."""
 
+import io
+from contextlib import redirect_stdout
 from typing import Any, Self
 
 import numpy as np
@@ -60,7 +62,9 @@ def live(model: Model, *, host: str = "127.0.0.1", port: int = 8080) -> "Live":
     """
     model.kernel("tail_points")
     viser = needed("viser", "live")
-    return Live(model, viser.ViserServer(host=host, port=port, label=model.name, verbose=False))
+    with redirect_stdout(io.StringIO()):  # it prints a box, whatever `verbose` says
+        server = viser.ViserServer(host=host, port=port, label=model.name, verbose=False)
+    return Live(model, server)
 
 
 class Live:
@@ -142,7 +146,8 @@ class Live:
 
     def stop(self) -> None:
         """Stop serving the page."""
-        self.server.stop()
+        with redirect_stdout(io.StringIO()):
+            self.server.stop()
 
     def __enter__(self) -> Self:
         return self

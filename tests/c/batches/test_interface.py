@@ -16,11 +16,7 @@ from tests.support.rows import row
 
 from .tails import TOUCHING, alone, evaluated, given, on_ground, states
 
-
-@cache
-def model_of(name):
-    """A model that other files of tests do not have: once it has lanes, they are used."""
-    return st.load(zoo.folder(name))
+model_of = cache(zoo.own)  # once a model has lanes, they are used
 
 
 @pytest.fixture(autouse=True)
@@ -32,7 +28,7 @@ def test_a_few_states_compile_nothing_and_many_do_once(monkeypatch):
     monkeypatch.setattr("serpentail.model.batch.MIN_BATCH", 1000)
     built, place = [], "serpentail.model.batch.model_library"
     monkeypatch.setattr(place, lambda *a: built.append(a) or model_library(*a))
-    found = st.load(zoo.folder("m1_n1"))
+    found = zoo.own("m1_n1")
     found.mass_matrix(states(found, 999)["q"])
     assert not built
     found.mass_matrix(states(found, 1000)["q"])
@@ -71,6 +67,10 @@ def test_the_state_that_is_wrong_is_named():
     bent[17, 9] = 7.0
     with pytest.raises(st.StateError, match="segment 2 of state 17 is bent by 7"):
         model_of("arcs2").mass_matrix(bent)
+    straight = states(model_of("mixed"), 20)["q"]  # its arcs are segments 1 and 3
+    straight[17, 7:] = [6.3, 0, 9, 0, 1, 0, 9, 0]
+    with pytest.raises(st.StateError, match=r"segment 1 of state 17 is bent by 6\.3 "):
+        model_of("mixed").mass_matrix(straight)
     touching = model_of("ground")
     values = on_ground(touching, TOUCHING * 4)
     values["bristles"][7, 3] = np.nan

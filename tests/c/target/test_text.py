@@ -21,19 +21,6 @@ every_model = pytest.mark.parametrize(
 )
 
 
-def known(model, source, compiler):
-    """Return flags for warnings that are known, in their files alone: delete them when mended."""
-    flags, part = [], source.stem.removeprefix(model.name)
-    if part == "" and not model.scene.contacts and "implicit" in model.scene.functions:
-        flags.append("-Wno-unused-parameter")  # v of implicit_factor
-    if part.startswith("_batch") and model.scene.base == "fixed" and compiler == "clang":
-        flags.append("-Wno-unused-function")  # rows_have_attitude
-    if part == "_simulation" and "feet" in model.scene.contacts and model.scene.real == "float":
-        flags += ["-Wno-conversion"]  # feet in leg_hulls
-        flags += ["-Wno-implicit-int-float-conversion"] if compiler == "clang" else []
-    return flags
-
-
 # Warnings
 
 
@@ -44,7 +31,7 @@ def test_compiles_without_a_warning(tmp_path, compiler, models):
         clang()
     for model in map(model_of, models):
         for source in (*model.sources, model.example):
-            flags = (*C99, *known(model, source, compiler), "-fsyntax-only")
+            flags = (*C99, "-fsyntax-only")
             compiled(tmp_path, source, *flags, compiler=compiler)
 
 
@@ -149,7 +136,7 @@ def test_every_symbol_has_the_prefix_and_libc_gives_the_rest(models):
 def test_optimiser_warns_about_nothing_and_asks_for_no_more_than_sincos(tmp_path, name):
     model, objects = model_of(name), {}
     for source in model.sources:
-        flags = (*C99, *PLAIN, *known(model, source, "gcc"), "-O2")
+        flags = (*C99, *PLAIN, "-O2")
         objects[source.stem.removeprefix(name)] = compiled(tmp_path, source, *flags)
     assert_own_symbols(model, objects, "sincos")
 

@@ -1,5 +1,6 @@
 """One text gives one library for a compiler and a machine, in a cache of bounded size."""
 
+import hashlib
 import json
 import os
 import shutil
@@ -149,6 +150,16 @@ def test_damaged_notes_and_libraries_are_made_again(model, cache, tmp_path):
     part.mkdir()
     publish(part, place, lambda place: place == library.parent)
     assert place.exists() and part.exists()
+
+
+def test_a_library_that_cannot_be_loaded_is_made_anew_and_told_in_a_line(model, cache, caplog):
+    library, damaged = compiler.compile_library(*model), b"no library"
+    library.unlink()
+    (library.parent / f"{hashlib.sha256(damaged).hexdigest()}.so").write_bytes(damaged)
+    opened = compiler.opened(lambda: compiler.compile_library(*model))
+    assert call_twice(opened._name) == 42 and libraries(cache) == [library]
+    (record,) = caplog.records
+    assert f"{library.parent} was damaged" in record.getMessage()
 
 
 def built(model, number):

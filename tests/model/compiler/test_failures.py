@@ -135,6 +135,12 @@ def test_place_of_the_cache_and_what_cannot_be_one(model, monkeypatch, tmp_path)
             message = refusal(model)
             assert f"{path} belongs to user 12345" in message and "SERPENTAIL_CACHE" in message
             os.chown(path, 0, 0)
+    # nor may everybody exchange a folder above it
+    cache.parent.chmod(0o777)
+    message = refusal(model)
+    assert f"{cache.parent} is writable by others" in message
+    assert f"`chmod o-w {cache.parent}`" in message and "SERPENTAIL_CACHE" in message
+    cache.parent.chmod(0o770)
     assert compiler.compile_library(*model) == library
 
 

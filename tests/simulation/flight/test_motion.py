@@ -93,6 +93,11 @@ def test_what_does_not_suffice_is_told():
     with pytest.raises(st.SimulationError, match=words) as caught:
         fly(controller=lambda t, q, v: [5.0, 0, 0, 0], most_steps=2000)
     assert float(re.search(words, str(caught.value))[1]) > 1000
+    fast = [1e308, *np.zeros(7)]  # of B alone: accelerations are finite when its position is not
+    with pytest.raises(st.SimulationError, match=r"t = 1\.75 s .*finite"):
+        st.simulate(
+            zoo.model("m1_n3"), [*np.eye(7)[3], 0, 0], fast, t_span=10, method="rk4", step=1
+        )
 
 
 def test_quintic_blends_rest_at_nodes():

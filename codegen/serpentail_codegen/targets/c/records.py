@@ -46,7 +46,8 @@ def records(has: SimulationFeatures) -> dict[str, list[Field]]:
         + SETTINGS
         + SAMPLES
         + (contact_samples(has))
-        + KEPT,
+        + KEPT
+        + (CONTACT_KEPT if has.contacts else []),
     }
 
 
@@ -155,6 +156,12 @@ SAMPLES = fields(
 )
 EVENT_FIELDS = fields(
     (
+        "peaks",
+        "real *",
+        "[parts][2] largest force (N) so far on all points, each group, each foot, and its time "
+        "(s); or NULL",
+    ),
+    (
         "stop_at",
         "int",
         "sum of 1 << event for events that end the run; event = 2 group + (0: it begins to press, "
@@ -182,6 +189,15 @@ KEPT = fields(
     ("next_step", "real", "length of the next step (s)"),
     ("error_before", "real", "error of the last step relative to the tolerance"),
     ("known", "int", "whether the workspace contains the rate at t"),
+)
+
+
+CONTACT_KEPT = fields(
+    ("touching", "int", "whether a point touches the ground at t"),
+    ("near_point", "int", "point that passed above the ground, the closest for its error"),
+    ("near_time", "real", "time of this pass (s)"),
+    ("near_height", "real", "height of the point (m)"),
+    ("near_error", "real", "estimated error of the height (m), larger than it; 0: no such pass"),
 )
 
 

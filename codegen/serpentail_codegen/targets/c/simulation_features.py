@@ -5,8 +5,14 @@ from dataclasses import dataclass
 
 from ...functions.tail import Tail
 
-# The methods' numbers in C, in order; those with True need `implicit`.
-METHODS = {"rk4": False, "tsit5": False, "ros34pw2": True, "implicit_euler": True}
+# The methods' numbers in C, in order, and what a scene needs for them.
+METHODS = {
+    "rk4": (),
+    "tsit5": (),
+    "ros34pw2": ("implicit",),
+    "implicit_euler": ("implicit",),
+    "switching": ("implicit", "contacts"),
+}
 
 
 @dataclass(frozen=True)
@@ -28,6 +34,17 @@ class SimulationFeatures:
         return tuple((name, 1) for name in works) + tuple((name, 3) for name, _ in self.groups)
 
     @property
+    def parts(self) -> tuple[tuple[str, int, int], ...]:
+        """Return what a run keeps the largest force of: all points, groups, feet; their limits."""
+        found, first = [("all", 0, self.contacts)], 0
+        for name, count in self.groups:
+            found.append((name, first, first + count))
+            first += count
+        half = dict(self.groups).get("feet", 0) // 2  # they come first
+        feet = [("right_foot", 0, half), ("left_foot", half, 2 * half)]
+        return tuple(found + feet * bool(half))
+
+    @property
     def implicit(self) -> bool:
         """Tell if it can take implicit steps."""
         return self.factors > 0
@@ -40,7 +57,9 @@ class SimulationFeatures:
     @property
     def methods(self) -> list[str]:
         """Return the methods that it has."""
-        return [name for name, implicit in METHODS.items() if self.implicit or not implicit]
+        return [
+            name for name, needs in METHODS.items() if all(getattr(self, each) for each in needs)
+        ]
 
 
 def simulation_features(tail: Tail, names: Collection[str], factors: int) -> SimulationFeatures:

@@ -53,6 +53,7 @@ def c_entries(context: dict[str, Any]) -> dict[str, Any]:
         entries["simulation"] = {
             "methods": methods,
             "ledger": list(map(list, has.ledger)),
+            **({"parts": [name for name, *_ in has.parts]} if has.contacts else {}),
             "records": layouts(has),
         }
     return entries

@@ -88,7 +88,7 @@ class UncheckedView:
     def __init__(self, view: FunctionView, body: CFunction, prefix: str):
         self.doc, self.lines = view.doc, body.lines
         self.prototype = view.prototype_of(f"{prefix}_unchecked_{view.name}", prefix)
-        self.unused = unused(body.lines)
+        self.unused = unused(body.lines, [a.name for a in view.inputs])
 
 
 def zero_where_finite(helper: str, arguments: Sequence[ArgumentView]) -> str:

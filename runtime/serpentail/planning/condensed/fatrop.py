@@ -12,7 +12,7 @@ import numpy as np
 
 from ...checks import shown
 from ...errors import CompilerNotFound, PlanningError
-from ...model.compiler import compile_library
+from ...model.compiler import compile_library, opened
 from ..nlp.interrupt import stop_reason
 from ..nlp.solver import Solution
 from .helpers import crew_of, helped
@@ -119,12 +119,12 @@ def kernel() -> ctypes.CDLL:
 
     headers = Path(ca.__file__).parent / "include"
     version = f"-DCASADI_{''.join(c if c.isalnum() else '_' for c in ca.CasadiMeta.version())}"
-    sources = sorted(NATIVE.glob("*.c"))
+    sources, flags = sorted(NATIVE.glob("*.c")), (*FLAGS, version, "-I", str(headers))
     try:
-        path = compile_library(sources, NATIVE, flags=(*FLAGS, version, "-I", str(headers)))
+        made = opened(lambda: compile_library(sources, NATIVE, flags=flags))
     except CompilerNotFound as error:
         raise PlanningError(f"solver: value 'fatrop': {error}") from error
-    made, pointer = ctypes.CDLL(str(path)), ctypes.c_void_p
+    pointer = ctypes.c_void_p
     made.program_new.restype = pointer
     made.program_new.argtypes = (ctypes.POINTER(Task),)
     made.program_free.argtypes = made.program_variables.argtypes = (pointer,)

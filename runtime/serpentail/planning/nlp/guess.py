@@ -22,6 +22,7 @@ from .program import Program
 from .start import StartRows
 from .transcription import Transcription
 
+ROUGH = 1e-4  # rtol of a guess, whose damping can be stiff
 PUSH_SAMPLES = 33  # of a random push
 PUSH_WAVES = 3  # sines that it sums
 
@@ -49,7 +50,7 @@ def passive(
     times = np.linspace(0, duration, len(push))
     law = TorqueTable(times, push, max(damping, problem.damping))
     try:
-        motion = flight(model, (problem.q0, problem.v0), law, duration)
+        motion = flight(model, (problem.q0, problem.v0), law, duration, rtol=ROUGH)
     except SimulationError as error:
         if error.trajectory is None or len(error.trajectory.t) < 2:
             raise

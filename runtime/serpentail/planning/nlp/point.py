@@ -63,12 +63,26 @@ def asked(
     except (NotImplementedError, RuntimeError):
         needs = "a result of numbers or of CasADi expressions of the point"
         raise PlanningError(needed(field, value, needs)) from None
+    if _has_nan(found):
+        raise PlanningError(
+            f"{field}: a part of the result is nan, as float(...) of a block is: use operations of "
+            "CasADi on the point's blocks"
+        )
     if single and found.shape != (1, 1):
         raise PlanningError(
             f"{field}: a result of shape {found.shape}: needs one number, such as "
             "casadi.sumsqr(point.torque)"
         )
     return found
+
+
+def _has_nan(expression: "ca.SX") -> bool:
+    """Tell if a constant of an expression is no number."""
+    import casadi as ca
+
+    tape = ca.Function("tape", [ca.vertcat(*ca.symvar(expression))], [expression])
+    constants = (k for k in range(tape.n_instructions()) if tape.instruction_id(k) == ca.OP_CONST)
+    return any(np.isnan(tape.instruction_constant(k)) for k in constants)
 
 
 def point_of(

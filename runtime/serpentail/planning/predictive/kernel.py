@@ -5,7 +5,7 @@ from functools import cache
 from pathlib import Path
 
 from ...errors import CompilerNotFound, PlanningError
-from ...model.compiler import compile_library
+from ...model.compiler import compile_library, opened
 
 NATIVE = Path(__file__).parent / "native"
 SOURCES = ("plan.c", "motion.c", "program.c", "quadratic.c", "tick.c")
@@ -55,10 +55,10 @@ class Simulation(ctypes.Structure):
 def kernel() -> ctypes.CDLL:
     """The controller in C, compiled once; PlanningError if no compiler works."""
     try:
-        path = compile_library([NATIVE / name for name in SOURCES], NATIVE, flags=FLAGS)
+        sources = [NATIVE / name for name in SOURCES]
+        made = opened(lambda: compile_library(sources, NATIVE, flags=FLAGS))
     except CompilerNotFound as error:
         raise PlanningError(f"Mpc: {error}") from error
-    made = ctypes.CDLL(str(path))
     made.mpc_memory_size.restype = ctypes.c_size_t
     made.mpc_memory_size.argtypes = (_pointer,)
     made.mpc_begin.argtypes = (_pointer,) * 3

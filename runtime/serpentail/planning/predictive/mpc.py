@@ -172,7 +172,7 @@ class Mpc:
         Parameters
         ----------
         folder : str or path, default "."
-            An existing folder.
+            The folder; a missing one is made.
 
         Returns
         -------
@@ -182,7 +182,9 @@ class Mpc:
         Raises
         ------
         PlanningError
-            There is no such folder.
+            ``folder`` is no path.
+        NotWritten
+            The system refuses the folder or a file.
         """
         return write_c(self.model, self.task, self.memory_size, folder)
 

@@ -91,7 +91,8 @@ class Plan:
                 f"degree {self.rule.degree}, {len(self.trajectory.t)} samples; {UNITS}",
                 f"effort {effort} N^2 m^2 s, energy {energy} J, peak power {power} W",
                 f"true attitude at the end: {to_plan} deg from the plan, {to_goal} from the goal",
-                f"{told['rounds']} rounds, {told['iterations']} iterations, {told['wall_s']:.3g} s",
+                f"{told['rounds']} rounds, {told['iterations']} iterations; processor time "
+                f"{told['call_cpu_s']:.3g} s, of it {told['solve_cpu_s']:.3g} s in the solver",
                 *([f"design: {chosen}"] if chosen else []),
             ]
         )

@@ -124,15 +124,19 @@ def effort(curve: Curve) -> float:
 
 
 def tracked(model: Model, problem: PlanningProblem, planned: Trajectory) -> Trajectory:
-    """Return the simulated motion whose tail tracks the plan by PFL."""
+    """Return the simulated motion whose tail tracks the plan by PFL.
+
+    Without the function "pfl" the law is Python: fewer calls change its errors by 1e-4 deg.
+    """
+    loose = 1.0 if "pfl" in model.kernels else 100.0
     return flight(
         model,
         (problem.q0, problem.v0),
         Pfl(model, planned, torque=problem.bounds.torque),
         planned.t[-1],
         method="tsit5",
-        rtol=1e-8,
-        atol=1e-10,
+        rtol=1e-8 * loose,
+        atol=1e-10 * loose,
         output_step=planned.t[-1] / TRACKED_SAMPLES,
     )
 

@@ -1,0 +1,88 @@
+"""How many points are sent as one task, and how many tasks a second."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+LEAST_S = 1.0  # s of work that a block is to have
+MOST_S = 60.0  # s of work that a kill may cost
+TASKS_PER_S = 100  # that blocks are made for: one scheduler of Dask does about 220
+MOST_TASKS_PER_S = 180  # that are sent
+BURST = 20  # tasks that are sent at once in the beginning
+GROWTH = 8  # times more points than in the block before
+MOST_IN_BLOCK = 50_000
+SHARE = 3  # blocks a worker that what is left is cut into, so that all end at about one time
+OLDER = 0.98  # weight of what is known when a block comes back
+SHORTEST = 0.25  # of its usual time that a block has in the end
+
+
+@dataclass
+class Pace:
+    """How long points take: seconds of recent points, and the points of the largest block."""
+
+    seconds: float = 0.0
+    points: float = 0.0
+    largest: int = 0
+
+    def learn(self, points: int, seconds: float) -> None:
+        """Note how long a block took; of a much larger one, the start of workers is a less part."""
+        kept = OLDER if points < 2 * self.largest else 0.0
+        self.seconds = kept * self.seconds + seconds
+        self.points = kept * self.points + points
+        self.largest = max(self.largest, points)
+
+    def block(self, left: int, workers: int) -> int:
+        """Return how many points the next block has, of those that are not sent yet."""
+        if not self.points:
+            return 1
+        pace = max(self.seconds / self.points, 1e-9)
+        usual = min(max(LEAST_S, workers / TASKS_PER_S), MOST_S) / pace
+        in_the_end = max(SHORTEST * usual, left / (SHARE * workers))
+        return max(1, round(min(usual, in_the_end, GROWTH * self.largest, MOST_IN_BLOCK, left)))
+
+
+@dataclass
+class Gate:
+    """Lets tasks pass, so many a second; ``free`` of them may pass now."""
+
+    at: float
+    free: float = BURST
+
+    def passes(self, now: float) -> bool:
+        """Tell if one more task may pass now."""
+        self.free = min(BURST, self.free + (now - self.at) * MOST_TASKS_PER_S)
+        self.at = now
+        if self.free < 1:
+            return False
+        self.free -= 1
+        return True
+
+
+class Missing:
+    """The numbers of points without rows, in order, each taken once; of one model of several.
+
+    done: which points have rows; models: returns the model of each of some numbers.
+    """
+
+    def __init__(self, done: np.ndarray, models: Callable, model: int):
+        self.done, self.models, self.model = done, models, model
+        self.at = 0
+        self.left = sum(len(self._window(k)) for k in range(0, len(done), MOST_IN_BLOCK))
+
+    def take(self, most: int) -> np.ndarray:
+        """Return the next numbers, at most so many."""
+        parts, count = [np.empty(0, np.int64)], 0
+        while count < most and self.at < len(self.done):
+            numbers = self._window(self.at)
+            part = numbers[: most - count]
+            whole = len(part) == len(numbers)
+            self.at = self.at + MOST_IN_BLOCK if whole else int(part[-1]) + 1
+            parts.append(part)
+            count += len(part)
+        self.left -= count
+        return np.concatenate(parts)
+
+    def _window(self, first: int) -> np.ndarray:
+        numbers = first + np.flatnonzero(~self.done[first : first + MOST_IN_BLOCK])
+        return numbers[self.models(numbers) == self.model]

@@ -1,0 +1,181 @@
+"""Whatever is in a file from a stranger, it is read, or refused in one line: no traceback, no
+signal, no endless work, no memory without bound.
+"""
+
+import contextlib
+import faulthandler
+import os
+import resource
+import shutil
+import subprocess
+import tempfile
+import warnings
+from pathlib import Path
+
+import ezc3d  # noqa
+import pytest
+
+import serpentail as st
+from serpentail.identification import c3d, c3d_child
+from serpentail.scenes.file import read_scene, subtable
+from serpentail.scenes.identify import identify_arguments
+from serpentail.scenes.plan import plan_arguments
+from serpentail.sweeps.result import Sweep
+from serpentail.sweeps.scene import arguments_of
+from serpentail.sweeps.shards import Row, Shard
+from serpentail.sweeps.sweep import posed
+from serpentail_codegen.scene.parse import load_scene
+from serpentail_codegen.scene.problems import SceneError
+from tests.identification.test_c3d import c3d as c3d_of
+from tests.identification.test_files import some
+from tests.support import swept, zoo
+from tests.support.rows import row
+from tests.support.scenes import SCENES, VALID
+
+from .conftest import in_time
+from .mutants import mutants
+
+MEMORY = 2**30  # bytes that a read may need
+ERRORS = st.SerpentailError
+SWEEP = """[sweep]
+points = 8
+seed = 3
+limit = 2.5
+outputs = ["end_s", "q_end"]
+store = "study.rows"
+[sweep.over]
+tail_mass = {grid = ["2 g", 3e-3]}
+"start.pitch" = {random = [-1.0, "1 rad"], law = "uniform"}
+duration = [0.1, 0.2]
+"""
+OVER = {"x": st.grid(range(20)), "word": st.grid(["a", "b"])}
+
+
+def shard(path):
+    rows = [Row(k, '{"square":4.0}' if k else None, None if k else "no", 0.1) for k in range(40)]
+    shutil.copy(Shard.of(rows).written(path.parent / "made").where, path)
+
+
+def rows_of(path):
+    return [Sweep._row(row, {}) for row in Shard(0, 39, 40, 1, str(path)).rows()]
+
+
+def sweep_of(folder, over):
+    return posed(None, over, swept.square, folder / "store").store
+
+
+def described(path):
+    """Write what tells a sweep from others."""
+    begun = sweep_of(path.parent, OVER)
+    with begun.writing():
+        shutil.copy(begun.folder / "sweep.json", path)
+
+
+def adopted(path):
+    """Begin another sweep, which looks for its rows in that one."""
+    begun, folder = sweep_of(path.parent, OVER | {"x": st.grid(range(9))}), path.parent / "store"
+    (folder / f"{begun.folder.name[:16]}-0").mkdir(parents=True)
+    shutil.copy(path, folder / f"{begun.folder.name[:16]}-0" / "sweep.json")
+    with begun.writing():
+        begun.look()
+
+
+def motion(path):
+    model, q = zoo.model("m1_n1"), [0, 0, 0.3, 1, 0, 0, 0, 0, 0]
+    return st.simulate(model, q, [0] * 8, t_span=0.01).save(path)
+
+
+def packaged(path):
+    path.write_bytes((SCENES / path.name).read_bytes())
+
+
+def swept_scene(path):
+    path.write_text(VALID + SWEEP)
+
+
+def read_by(read, name):
+    return lambda path: read(
+        subtable(read_scene(path, st.ModelError)[0], name, path, st.ModelError)
+    )
+
+
+def forked(command, **_):
+    """In place of a process that is begun for each of many files."""
+    *_, path, memory, seconds = command
+    read, write = os.pipe()
+    child = os.fork()
+    if child == 0:
+        faulthandler.disable()  # signals are expected here
+        quiet, ended = os.open(os.devnull, os.O_WRONLY), 1
+        os.dup2(quiet, 1), os.dup2(quiet, 2)
+        try:
+            with open(write, "wb") as answer:
+                c3d_child.main(path, int(memory), int(seconds), answer)
+            ended = 0
+        finally:
+            os._exit(ended)
+    os.close(write)
+    with open(read, "rb") as answer:
+        said = answer.read()
+    status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    return subprocess.CompletedProcess(command, status, said)
+
+
+MARKERS = (lambda path: st.write_markers(some(), path), lambda path: st.read_markers(path, None))
+FORMATS = {  # how a file is made and read, and the errors that say what is wrong
+    "run.trc": (*MARKERS, ValueError),
+    "run.csv": (MARKERS[0], lambda path: st.read_markers(path, "m"), ValueError),
+    "run.c3d": (lambda path: c3d_of(some(), path), MARKERS[1], ValueError),
+    "run.npz": (motion, st.Trajectory.load, ValueError),
+    "run.parquet": (shard, rows_of, st.SweepError),
+    "sweep.json": (described, adopted, st.SweepError),
+    "kick_and_land.toml": (packaged, lambda path: st.scenario(path, zoo.folder("ground")), ERRORS),
+    "righting_m1_n3.toml": (packaged, read_by(plan_arguments, "plan"), ERRORS),
+    "identify_tail.toml": (packaged, read_by(identify_arguments, "identify"), ERRORS),
+    "sweep.toml": (swept_scene, arguments_of, ERRORS),
+    "mixed_tail.toml": (packaged, load_scene, SceneError),
+}
+
+
+@contextlib.contextmanager
+def bounded():
+    """Refuse memory beyond what this process has and a read may need."""
+    usual = resource.getrlimit(resource.RLIMIT_AS)
+    with open("/proc/self/statm") as told:
+        has = int(told.read().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (has + MEMORY, usual[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, usual)
+
+
+@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize("many", [100, pytest.param(2000, marks=pytest.mark.slow)])
+def test_any_file_is_read_or_refused_in_a_line(name, many, tmp_path, monkeypatch):
+    make, read, refusals = FORMATS[name]
+    if name == "run.c3d":
+        pytest.importorskip("ezc3d")  # once, not in each fork
+        monkeypatch.setattr(c3d.subprocess, "run", forked)
+        monkeypatch.setattr(c3d, "SECONDS", 1)
+    make(tmp_path / name)
+    read(tmp_path / name)
+    content, refused = (tmp_path / name).read_bytes(), 0
+    for k, mutant in enumerate(mutants(content, many)):
+        with (
+            row(f"mutant {k}: {mutant[:2000]!r}"),
+            tempfile.TemporaryDirectory(dir=tmp_path) as folder,
+            in_time(),
+            bounded(),
+            warnings.catch_warnings(),
+        ):
+            warnings.simplefilter("ignore", st.UnusualSize)
+            path = Path(folder) / name
+            path.write_bytes(mutant)
+            try:
+                read(path)
+            except refusals as error:
+                refused += 1
+                for line in str(error).splitlines():
+                    assert line.isprintable() and 10 < len(line) < 2000, line
+    assert refused > many // 4

@@ -1,0 +1,73 @@
+"""The first guess: attitudes that hidden torsos leave open, its time, and scales that are wrong."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import serpentail as st
+from serpentail.identification.placement import placements
+from serpentail.identification.start import motion_shown
+from tests.identification.flights import TORSO, flown, hidden, placed, start, tracks
+from tests.support import zoo
+from tests.support.rows import row
+
+TIMES = np.linspace(0, 0.15, 31)
+
+
+def turned_by(a, b):
+    """Angles (F,) in degrees between the attitudes of configurations."""
+    one, other = (Rotation.from_quat(each[:, [4, 5, 6, 3]]) for each in (a, b))
+    return np.degrees((one.inv() * other).magnitude())
+
+
+def test_the_torso_may_be_hidden_in_the_first_frames():
+    """60 flights of any attitude; all or some of the torso is hidden in frames 0 to 5."""
+    for seed in range(60):
+        model = zoo.model(("m1_n3", "m2_n2", "arcs2")[seed % 3])
+        x, rng = start(model, seed), np.random.default_rng([seed, 7])
+        x[3:7] = Rotation.random(random_state=seed).as_quat()
+        states = flown(model, TIMES, x, rtol=1e-6)
+        names = list(TORSO) if seed % 2 else rng.choice(list(TORSO), 2 + seed % 4 // 2, False)
+        data = tracks(model, TIMES, states, 5e-4, seed=seed, gaps=0.1)
+        data = hidden(data, names, slice(1 + seed % 6))
+        shown = motion_shown(model, placements(model, placed(model)), data)
+        with row(seed):
+            assert turned_by(shown, states).max() < 45
+            assert np.abs(shown[:, 7 : model.nq] - states[:, 7 : model.nq]).max() < 0.7
+
+
+@pytest.mark.filterwarnings("ignore::serpentail.errors.UnusualSize")
+def test_positions_in_a_wrong_unit_are_refused_before_a_fit():
+    model = zoo.model("m1_n3")
+    data = tracks(model, TIMES, flown(model, TIMES, start(model)), 2e-4)
+    tail = {name: each for name, each in placed(model).items() if name not in list(TORSO)[1:]}
+    for words, factor, unit, markers in (
+        (r"0\.00\d* times .* m read as mm: .*unit=\"m\"", 1, "mm", placed(model)),
+        (r"(99\d|1000)\S* times .* mm read as m: .*unit=\"mm\"", 1e3, "m", placed(model)),
+        (r"9\.\d* times .* mm read as cm: .*unit=\"mm\"", 1e3, "cm", placed(model)),
+        (r"0\.039\d* times .* check the unit 'mm'", 1 / 0.0254, "mm", placed(model)),
+        (r"0\.39\d* times .* check the unit 'cm'", 1 / 0.0254, "cm", placed(model)),
+        (r"9\d\d\S* times .* mm read as m", 1e3, "m", tail),
+    ):
+        given = st.marker_tracks(TIMES, factor * data.positions, data.names, unit=unit)
+        with row(words), pytest.raises(st.IdentificationError, match=words):
+            st.identify(model, given, markers, ["tail_mass"])
+        with row(words), pytest.raises(st.IdentificationError, match=words):
+            st.joint_torques(model, given, markers, cutoff=20)
+    # a place that is estimated does not count
+    rough = {name: st.Marker(torso=(0, 1e-3, 0)) for name in list(TORSO)[:2]}
+    names = [f"marker:{name}" for name in rough]
+    assert st.identify(model, data, placed(model) | rough, names).success
+
+
+def test_masses_and_their_intervals_are_never_negative():
+    """Noise drives one of them to its bound; the search did not converge there."""
+    model = zoo.model("m1_n3")
+    for seed in (1, 2):
+        states = flown(model, TIMES, start(model, seed), rtol=1e-8)
+        data = tracks(model, TIMES, states, 5e-4, seed=seed)
+        found = st.identify(model, data, placed(model), ["tail_mass"])
+        mass = found["tail_mass"]
+        assert found.success and mass.at_bound == (seed == 1)
+        assert 0 < mass.value < mass.high
+        assert 0 <= mass.low < model.parameters["tail_mass"] < mass.high
