@@ -6,8 +6,10 @@ from itertools import combinations
 
 import numpy as np
 
+from serpentail_scene.layout import TAIL_Q
+
+from ..attitude import REST
 from ..errors import DoubtfulMarkers, IdentificationError
-from ..model.layout import REST, TAIL_Q
 from ..model.model import Model
 from .placement import Placements
 from .points import world_points

@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from serpentail_scene.layout import REST
+
 from ..checks import number, numbers, refusal
 from ..errors import IdentificationError
-from ..model.layout import REST
 from ..model.model import Model
 
 TORSO = -1  # the piece of a marker on the torso

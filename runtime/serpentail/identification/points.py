@@ -11,9 +11,10 @@ from functools import partial
 
 import numpy as np
 
-from ..attitude import Entries, from_angles, product, rotation_matrix
+from serpentail_scene.layout import OMEGA, PER_SEGMENT, QUATERNION, TAIL_Q, TAIL_V
+
+from ..attitude import REST, Entries, from_angles, product, rotation_matrix
 from ..model.kernel import Kernel
-from ..model.layout import OMEGA, PER_SEGMENT, QUATERNION, REST, TAIL_Q, TAIL_V
 from ..model.model import Model
 from ..model.polar import polar_to_bend
 from .placement import TORSO, Placements

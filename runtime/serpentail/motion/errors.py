@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from serpentail_scene.layout import POSITION
+
 from ..errors import SimulationError
-from ..model.layout import POSITION
 from ..model.model import Model
 from .body import semi_axes
 from .derived import AGAIN
