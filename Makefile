@@ -85,7 +85,7 @@ ENVIRONMENT := $(PYTHON) -m venv $(VENV)
 INSTALL := $(PY) -m pip install --quiet --disable-pip-version-check
 endif
 # a page that could not be made is tried again by the next `make setup` or `make demo`
-TELL_PAGE := if test -f runtime/serpentail/viewer/page.html; then touch $(PAGED); else \
+TELL_PAGE := if test -f runtime/serpentail/show/page/page.html; then touch $(PAGED); else \
              echo "no page of runs, which needs Node.js 18 and npm: $$(cat .build/page_missing 2>&1)"; fi
 AGAIN := $(if $(wildcard $(READY)),$(if $(wildcard $(PAGED)),,$(PAGED)))
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-PAGE = "runtime/serpentail/viewer/page.html"
+PAGE = "runtime/serpentail/show/page/page.html"
 MISSING = ".build/page_missing"  # the reason, for the Makefile: installers hide what hooks tell
 EXAMPLES = "serpentail/examples"
 LEAST_NODE = 18

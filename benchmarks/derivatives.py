@@ -14,7 +14,7 @@ import numpy as np
 
 import serpentail as st
 from serpentail.building.generator import generate
-from serpentail.model.compiler import compile_library
+from serpentail.compiling.compiler import compile_library
 from serpentail_scene.signatures.table import DERIVATIVES
 
 from .comparison import compared

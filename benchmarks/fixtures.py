@@ -11,9 +11,9 @@ import serpentail as st
 from benchmarks.peers.build import CACHE, build_library
 from benchmarks.peers.compilers import Compiler, compilers
 from benchmarks.peers.timing import Closure
-from serpentail.model.compiler import compile_library
+from serpentail.compiling.compiler import compile_library
+from serpentail.compiling.toolchain import PROFILES
 from serpentail.model.kernel import aligned
-from serpentail.model.toolchain import PROFILES
 
 ADAPTER = """
 #include "{prefix}.h"

@@ -12,9 +12,9 @@ import serpentail as st
 from benchmarks.derivatives import generated
 from benchmarks.fixtures import ADAPTER, offsets, sizes
 from benchmarks.peers.timing import Closure, States, random_states, time_rounds
-from serpentail.model.compiler import compile_library
+from serpentail.basics.progress import Stage
+from serpentail.compiling.compiler import compile_library
 from serpentail.model.kernel import aligned
-from serpentail.stages import Stage
 
 FUNCTIONS = (
     "mass_matrix",

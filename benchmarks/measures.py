@@ -41,8 +41,8 @@ from benchmarks.peers import mujoco_casadi as more_peers
 from benchmarks.peers import soromox as continuum_peer
 from benchmarks.report import written
 from examples.studies.parts import digest
-from serpentail.files import replacing
-from serpentail.stages import Stage
+from serpentail.basics.files import replacing
+from serpentail.basics.progress import Stage
 
 ROOT = Path(__file__).resolve().parent.parent
 SOURCES = ("codegen", "runtime", "benchmarks", "examples/righting.py")
@@ -185,7 +185,7 @@ def drawn(report: dict, output: Path) -> list[Path]:
 
 def machine(there: list[processors.Processor]) -> dict:
     """Return the processor, what stands for which, and the compilers."""
-    from serpentail.model.compiler import describe_compiler
+    from serpentail.compiling.compiler import describe_compiler
 
     columns = [f"{p.name} as {p.level}" if p.level else p.name for p in there]
     return {

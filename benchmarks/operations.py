@@ -17,7 +17,7 @@ from serpentail_codegen.ir.cost import CountingRun
 from serpentail_codegen.ir.interpret import unroll
 from serpentail_codegen.ir.program import Program
 from serpentail_codegen.ir.tape import operation_count
-from serpentail_codegen.passes.directions import directions_in_turn, has_directions
+from serpentail_codegen.passes.narrow_directions import directions_in_turn, has_directions
 from serpentail_codegen.scene.parse import scene_for
 from serpentail_codegen.targets.c.batch import batches
 

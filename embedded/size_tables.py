@@ -15,7 +15,7 @@ from embedded.image import Image, build
 from embedded.misra import summary
 from embedded.results import blocks, run
 from embedded.stack import deepest
-from serpentail.stages import Stage
+from serpentail.basics.progress import Stage
 from serpentail_codegen.pipeline import generate
 from serpentail_codegen.scene.parse import scene_for
 

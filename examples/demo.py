@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import serpentail as st
-from serpentail.files import refuse_unusable
+from serpentail.basics.files import refuse_unusable
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENES = ("kangaroo_rat_m1_n3", "kangaroo_rat_m3_n4")
@@ -139,7 +139,7 @@ def kick(folder: Path) -> None:
 
 def righting(folder: Path) -> None:
     """Plan how the tail rights the tumbling rat, and compare with a tail that only damps."""
-    from serpentail.attitude import tilt_deg
+    from serpentail.basics.attitude import tilt_deg
     from serpentail.scenes.plan import planned
 
     print("righting_m1_n3")

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import serpentail as st
-from serpentail.files import refuse_unusable
+from serpentail.basics.files import refuse_unusable
 
 ROOT = Path(__file__).resolve().parent.parent
 GOES_ON = "the same command goes on from here"

@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from queue import Queue
 
 from examples import front
-from serpentail.stages import Stage
+from serpentail.basics.progress import Stage
 
 from . import processes, tree
 from .judge import NotLoaded, Tree
@@ -24,7 +24,7 @@ WANTED = 95.0  # percent of the mutants that tests should notice
 CONTROLS = {
     "codegen/serpentail_codegen/ir/tape.py": b"\nraise RuntimeError('control')\n",
     "codegen/serpentail_codegen/targets/c/templates/math/ldl.c.jinja": b"{{ control }}",
-    "runtime/serpentail/attitude.py": b"\nraise RuntimeError('control')\n",
+    "runtime/serpentail/basics/attitude.py": b"\nraise RuntimeError('control')\n",
 }
 
 

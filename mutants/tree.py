@@ -10,7 +10,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 PLACE = ROOT / ".build" / "mutants"
 BASE = PLACE / "base"  # the checkout as it was when the run began
-BUILT = (Path("runtime/serpentail/viewer/page.html"),)  # git ignores it, and tests need it
+BUILT = (Path("runtime/serpentail/show/page/page.html"),)  # git ignores it, and tests need it
 LONGEST_TEST = 120  # s that one test may take
 JUDGED_BY = ("codegen", "runtime", "tests", "stress", "scenes", "pyproject.toml")
 

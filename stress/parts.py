@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 
-from serpentail.stages import Stage
+from serpentail.basics.progress import Stage
 from stress import (
     call_fuzz,
     drops,

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import serpentail as st
-from serpentail.model.toolchain import examine, run_command
+from serpentail.compiling.toolchain import examine, run_command
 from stress.figures import Figure
 from tests.references.exact_chain import ExactChain
 from tests.references.exact_continuum import ExactContinuum

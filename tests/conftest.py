@@ -7,7 +7,7 @@ from importlib.util import find_spec
 
 import pytest
 
-from serpentail.model.calls import extension
+from serpentail.model.fast_call import extension
 from tests.support.models import choose_compiler
 
 # of extras that `make test` does not install

@@ -13,7 +13,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import TypeVar
 
-from serpentail.model.commands import run_all
+from serpentail.compiling.commands import run_all
 
 from .compilers import Compiler, PeerUnavailable, compilers
 

@@ -108,7 +108,7 @@ def trials(count: int, case: str, size: tuple[int, int | None], folder: Path) ->
     """Return coverage, spread and time of a number of trials, resuming from those that are
     stored.
     """
-    from serpentail.stages import Stage
+    from serpentail.basics.progress import Stage
 
     model, markers = scene(*size)
     names = KNOWN if case == "known" else UNKNOWN

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from serpentail.pictures.style import HEAD, INK, QUIET, TAIL, drawn
+from serpentail.show.pictures.style import HEAD, INK, QUIET, TAIL, drawn
 
 if TYPE_CHECKING:
     import numpy as np

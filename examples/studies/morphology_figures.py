@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from serpentail.pictures.style import drawn
+from serpentail.show.pictures.style import drawn
 
 COLORS = {1: "#0072b2", 2: "#d55e00", 3: "#009e73"}  # by segments
 AXES = {

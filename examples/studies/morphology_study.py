@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 import serpentail as st
 from examples import righting
 from examples.studies.morphology_figures import draw
-from serpentail.sweeps.sweep import Sweep
+from serpentail.bridges.sweeps.sweep import Sweep
 
 LINKS = 6  # of every tail
 SEGMENTS = (1, 2, 3)

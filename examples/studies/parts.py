@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 import serpentail as st
+from serpentail.bridges.sweeps.sweep import posed
 from serpentail.motion.trajectory import ARRAYS
-from serpentail.sweeps.sweep import posed
 
 Result = dict | list
 

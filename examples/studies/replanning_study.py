@@ -15,7 +15,7 @@ import serpentail as st
 from examples.front import ROOT
 from examples.righting import FUNCTIONS, TORQUE, tumbling
 from examples.studies.parts import Part, digest, made
-from serpentail.attitude import product, tilt_deg
+from serpentail.basics.attitude import product, tilt_deg
 
 RATE = 100.0  # Hz, of the ticks
 SOURCES = ("codegen", "runtime")

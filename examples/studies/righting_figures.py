@@ -9,9 +9,9 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 import serpentail as st
 from examples.studies.righting_kinds import TRUE, is_true
-from serpentail.attitude import angle_deg, tilt_deg
-from serpentail.pictures.panels import SINGULAR
-from serpentail.pictures.style import drawn
+from serpentail.basics.attitude import angle_deg, tilt_deg
+from serpentail.show.pictures.panels import SINGULAR
+from serpentail.show.pictures.style import drawn
 
 BLUE = "#0072b2"
 LOOKS = {  # a band, and the curve that may lie on it

@@ -16,11 +16,11 @@ from hypothesis import given
 from hypothesis import strategies as some
 
 import serpentail as st
-from serpentail import cli
 from serpentail.building import build as building
 from serpentail.building.fewer_contacts import FUNCTIONS, NEEDED, with_contacts
 from serpentail.building.options import Parameters, SceneKeys
 from serpentail.building.scene_text import scene_text
+from serpentail.cli.cli import cli
 from serpentail_codegen.scene.parameters import PARAMETERS
 from serpentail_codegen.scene.parse import load_scene, parse_scene
 from serpentail_codegen.scene.passive import PASSIVE

@@ -14,7 +14,7 @@ from numpy.testing import assert_array_equal as equal
 from scipy.io import netcdf_file
 
 import serpentail as st
-from serpentail.files import without_quote, write_csv
+from serpentail.basics.files import without_quote, write_csv
 from tests.motion.conftest import motion
 from tests.support import zoo
 

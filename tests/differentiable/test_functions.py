@@ -270,7 +270,7 @@ def test_models_and_states_of_jax(jax, model):
 
 
 def test_without_a_compiler_of_cpp_that_is_said(jax, monkeypatch):
-    from serpentail.differentiable import jax_calls
+    from serpentail.bridges.differentiable import jax_calls
 
     def failing(*_, **__):
         raise st.CompileFailed("cc1plus: not found")

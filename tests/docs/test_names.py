@@ -8,8 +8,9 @@ import re
 import shlex
 from pathlib import Path
 
+from serpentail.cli.cli.cli import ROOMS, arguments_of
+
 import serpentail as st
-from serpentail.cli import ROOMS, arguments_of
 from serpentail.model.model import Model
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.scene.parameters import PARAMETERS

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import serpentail as st
+from serpentail.bridges.exporting.export import SUFFIXES
 from serpentail.building.examples import example_paths, tables_of_scene
-from serpentail.exporting.export import SUFFIXES
 from tests.support.rows import row
 
 from .test_chains import mujoco, pin, unbalanced

@@ -17,10 +17,9 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail import cli
-from serpentail.commands import models
-from serpentail.exporting import mjcf
-from serpentail.exporting.fmu import NATIVE
+from serpentail.bridges.exporting import mjcf
+from serpentail.bridges.exporting.fmu import NATIVE
+from serpentail.cli.cli import cli, models
 from tests.support import zoo
 from tests.support.models import model_folder
 from tests.support.rows import row

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from serpentail import StateError
-from serpentail.attitude import quaternion_rate
+from serpentail.basics.attitude import quaternion_rate
 from serpentail_codegen.ir.interpret import Run
 from tests.references.metrics import block_error, equilibrated_condition
 from tests.support import zoo

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 import serpentail as st
+from serpentail_codegen.functions.differentiable import FUNCTIONS
 from serpentail_codegen.functions.fixed_base import FUNCTIONS as BASED
 from serpentail_codegen.functions.function import assemble
-from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.tail import Tail
-from serpentail_codegen.scene.shape import Shape
+from serpentail_codegen.scene.variant import Shape
 from serpentail_codegen.targets.c.straight import straight_line
 from serpentail_scene.signatures.table import FIXED
 from tests.support import zoo

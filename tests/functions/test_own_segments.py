@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.containers.contents import contents
+from serpentail.bridges.containers.contents import contents
+from serpentail.show.page.shape import shape
 from serpentail.verification.report import laws
-from serpentail.viewer.shape import shape
+from serpentail_codegen.functions.differentiable import FUNCTIONS
 from serpentail_codegen.functions.draft import Draft
 from serpentail_codegen.functions.function import assemble
-from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.sweeps.pieces import each_segment, mechanism
 from serpentail_codegen.functions.tail import Tail
-from serpentail_codegen.scene.shape import Run, Shape
+from serpentail_codegen.scene.variant import Run, Shape
 from tests.functions.test_columns import arguments, assert_same, outputs
 from tests.references.metrics import block_error, force_error, mass_matrix_error
 from tests.support import zoo

@@ -10,8 +10,8 @@ import pytest
 import sympy
 
 import serpentail as st
+from serpentail_codegen.functions.differentiable import FUNCTIONS
 from serpentail_codegen.functions.function import assemble
-from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.mechanics import polar_arc

@@ -16,14 +16,14 @@ import ezc3d  # noqa
 import pytest
 
 import serpentail as st
+from serpentail.bridges.sweeps.result import Sweep
+from serpentail.bridges.sweeps.scene import arguments_of
+from serpentail.bridges.sweeps.shards import Row, Shard
+from serpentail.bridges.sweeps.sweep import posed
 from serpentail.identification import c3d, c3d_child
 from serpentail.scenes.file import read_scene, subtable
 from serpentail.scenes.identify import identify_arguments
 from serpentail.scenes.plan import plan_arguments
-from serpentail.sweeps.result import Sweep
-from serpentail.sweeps.scene import arguments_of
-from serpentail.sweeps.shards import Row, Shard
-from serpentail.sweeps.sweep import posed
 from serpentail_codegen.scene.parse import load_scene
 from serpentail_codegen.scene.problems import SceneError
 from tests.identification.test_c3d import c3d as c3d_of

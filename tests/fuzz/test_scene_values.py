@@ -7,12 +7,12 @@ import warnings
 import pytest
 
 import serpentail as st
+from serpentail.bridges.sweeps.axes import axes_of
+from serpentail.bridges.sweeps.scene import arguments_of
 from serpentail.scenes import identify_keys, phase_keys, plan_keys, simulate_keys, sweep_keys
 from serpentail.scenes.identify import identify_arguments
 from serpentail.scenes.plan import plan_arguments
 from serpentail.scenes.simulate import scenario_of
-from serpentail.sweeps.axes import axes_of
-from serpentail.sweeps.scene import arguments_of
 from serpentail_codegen.scene.parse import parse_scene
 from serpentail_codegen.scene.problems import SceneError
 from serpentail_codegen.scene.scene import KEYS, NAMES
@@ -86,7 +86,7 @@ def in_phases(phases):
 def swept(monkeypatch):
     def read(table):
         monkeypatch.setattr(
-            "serpentail.sweeps.scene.read_scene", lambda *_: ({"sweep": table}, SCENES)
+            "serpentail.bridges.sweeps.scene.read_scene", lambda *_: ({"sweep": table}, SCENES)
         )
         found = arguments_of("x")
         axes_of(found["over"], found.get("points"), found.get("seed", 0))

@@ -130,7 +130,7 @@ def test_why_there_is_no_page_is_told_in_a_line_and_it_is_tried_again(tmp_path):
     pytest.importorskip("hatchling")
     for name in ("Makefile", "pyproject.toml", "hatch_build.py"):
         shutil.copy2(ROOT / name, tmp_path)
-    for name in ("viewer", "runtime/serpentail/viewer", "bin"):
+    for name in ("viewer", "runtime/serpentail/show/page", "bin"):
         (tmp_path / name).mkdir(parents=True)
     stand_in(tmp_path)
     stamps = {name: tmp_path / ".venv" / f".{name}" for name in ("draws", "paged", "ready")}
@@ -156,6 +156,6 @@ def test_why_there_is_no_page_is_told_in_a_line_and_it_is_tried_again(tmp_path):
         assert stamps["ready"].exists() and not stamps["paged"].exists()
     program("npm", "exit 0")
     assert told() == "" and stamps["paged"].exists()
-    page = tmp_path / "runtime/serpentail/viewer/page.html"
+    page = tmp_path / "runtime/serpentail/show/page/page.html"
     page.unlink()
     assert told() == "" and not page.exists()  # what was made is not made again

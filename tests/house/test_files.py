@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.checks import (
+from serpentail.basics.checks import (
     did_you_mean,
     finite_array,
     number,
@@ -31,12 +31,8 @@ from serpentail.checks import (
     shown,
     whole_number,
 )
-from serpentail.errors import PlanningError
-from serpentail.files import (
-    refuse_unusable,
-    refuse_unwritable,
-    replacing,
-)
+from serpentail.basics.errors import PlanningError
+from serpentail.basics.files import refuse_unusable, refuse_unwritable, replacing
 from tests.support.drawn_flight import flight
 from tests.support.file_faults import age, before_calls, killed_at
 from tests.support.rows import row
@@ -228,7 +224,7 @@ def test_parts_of_the_dead_go_after_a_minute_and_those_in_use_stay(tmp_path):
     assert listed(tmp_path) == sorted(
         {*ages, "run"} - {".b.csv.89abcdef.part", ".held.00000000.part"}
     )
-    with mock.patch("serpentail.files.fcntl", None):  # as on Windows
+    with mock.patch("serpentail.basics.files.fcntl", None):  # as on Windows
         age(tmp_path)
         put(tmp_path / "run", b"newer")
     assert (tmp_path / "run").read_bytes() == b"newer"

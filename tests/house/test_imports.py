@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 import serpentail as st
-from serpentail import cli
 from serpentail.building import build as building
+from serpentail.cli.cli import cli
 from serpentail.scenes.plan import planned
 from serpentail.verification import report
 from tests.support import zoo
@@ -23,7 +23,7 @@ from tests.support.rows import row
 
 ROOT = Path(__file__).parents[2]
 HEAVY = ["casadi", "jinja2", "matplotlib", "mpmath", "numpy", "scipy", "serpentail_codegen"]
-HEAVY += ["serpentail.viewer", "sympy"]
+HEAVY += ["serpentail.show.page", "sympy"]
 FLIGHT = """
 import sys, serpentail as st
 model = st.load(sys.argv[1])
@@ -48,8 +48,8 @@ def test_heavy_packages_are_loaded_by_those_who_use_them():
     assert loaded("import serpentail") == set()
     assert loaded(generator) == {"serpentail_codegen"}
     assert loaded(FLIGHT, zoo.folder("m1_n1")) == {"numpy"}
-    later = "import serpentail.cli, serpentail.scenes.simulate, serpentail.planning.result.plan"
-    assert "serpentail.viewer" not in loaded(later)
+    later = "import serpentail.cli.cli, serpentail.scenes.simulate, serpentail.planning.result.plan"
+    assert "serpentail.show.page" not in loaded(later)
     # instead of its time, which hangs on the machine
     few = "import sys, contextlib, importlib, typing; old = {*sys.modules}; import serpentail; "
     assert loaded(few + "assert {*sys.modules} - old == {'serpentail'}") == set()
@@ -79,11 +79,11 @@ HOMES = {  # where alone a library of an extra may be imported, behind the room'
     "casadi": ("model/casadi.py", "model/nodes/", "planning/"),
     "matplotlib": ("pictures/",),
     "PIL": ("pictures/",),
-    "imageio_ffmpeg": ("pictures/encode.py",),
+    "imageio_ffmpeg": ("show/pictures/encode.py",),
     "ezc3d": ("identification/c3d_child.py",),
-    "gymnasium": ("learning/environments.py",),
-    "jax": ("differentiable/jax_calls.py", "differentiable/jax_functions.py"),
-    "torch": ("differentiable/torch_functions.py",),
+    "gymnasium": ("bridges/learning/environments.py",),
+    "jax": ("bridges/differentiable/jax_calls.py", "bridges/differentiable/jax_functions.py"),
+    "torch": ("bridges/differentiable/torch_functions.py",),
 }
 
 

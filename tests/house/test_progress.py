@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.stages import Stage, Told
+from serpentail.basics.progress import Stage, Told
 from tests.support import zoo
 from tests.support.rows import row
 

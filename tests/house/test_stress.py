@@ -18,8 +18,8 @@ from filelock import FileLock
 
 import serpentail as st
 from examples.studies.parts import Part, made
-from serpentail.model.sizes import UNLIKE as UNLIKE_FROM
-from serpentail.model.sizes import disparity
+from serpentail.model.plausible_sizes import UNLIKE as UNLIKE_FROM
+from serpentail.model.plausible_sizes import disparity
 from stress import drops, scene_fuzz
 from stress.subjects import Subject, changed, exact_of, state
 from tests.references.metrics import mass_matrix_error
@@ -62,7 +62,7 @@ UNLIKE = {
 }
 
 
-@pytest.mark.filterwarnings("ignore::serpentail.errors.UnusualSize")
+@pytest.mark.filterwarnings("ignore::serpentail.basics.errors.UnusualSize")
 def test_bodies_of_unlike_size_are_told():
     lying = zoo.model("ground_arcs")
     for name, change in UNLIKE.items():
@@ -92,7 +92,7 @@ def test_the_warning_is_true():
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::serpentail.errors.UnusualSize")
+@pytest.mark.filterwarnings("ignore::serpentail.basics.errors.UnusualSize")
 @pytest.mark.parametrize("name", ["feet_tail", "ground_arcs"])
 def test_bodies_without_the_warning_keep_their_digits(name):
     """Random bodies as unlike as may be without it."""

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import serpentail as st
-from serpentail.identification import stages
+from serpentail.identification import radau_steps as stages
 from serpentail.identification import start as start_room
 from serpentail.identification.inverse import smoothed
 from serpentail.identification.placement import placements

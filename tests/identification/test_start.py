@@ -36,7 +36,7 @@ def test_the_torso_may_be_hidden_in_the_first_frames():
             assert np.abs(shown[:, 7 : model.nq] - states[:, 7 : model.nq]).max() < 0.7
 
 
-@pytest.mark.filterwarnings("ignore::serpentail.errors.UnusualSize")
+@pytest.mark.filterwarnings("ignore::serpentail.basics.errors.UnusualSize")
 def test_positions_in_a_wrong_unit_are_refused_before_a_fit():
     model = zoo.model("m1_n3")
     data = tracks(model, TIMES, flown(model, TIMES, start(model)), 2e-4)

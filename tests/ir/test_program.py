@@ -9,8 +9,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from serpentail_codegen.functions.differentiable import FUNCTIONS
 from serpentail_codegen.functions.function import assemble
-from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.builder import Builder, narrowed
 from serpentail_codegen.ir.interpret import Run, unroll

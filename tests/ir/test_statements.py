@@ -11,8 +11,8 @@ import pytest
 
 from serpentail_codegen.autodiff.forward import tangent_program
 from serpentail_codegen.autodiff.reverse import adjoint_program
+from serpentail_codegen.functions.differentiable import FUNCTIONS
 from serpentail_codegen.functions.function import assemble
-from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir import program as ir
 from serpentail_codegen.ir.builder import Builder

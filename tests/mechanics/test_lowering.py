@@ -9,8 +9,8 @@ import pytest
 import sympy
 from sympy import Matrix, Rational
 
+from serpentail_codegen.functions.differentiable import FUNCTIONS
 from serpentail_codegen.functions.function import assemble
-from serpentail_codegen.functions.plain import FUNCTIONS
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.builder import Builder
 from serpentail_codegen.ir.cost import executed

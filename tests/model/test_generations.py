@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import serpentail as st
+from serpentail.compiling.safe_files import Held
 from serpentail.model import manifest
-from serpentail.model.reading import Held
 from serpentail.simulation import parallel_runs
 from serpentail_codegen.targets.write import write_folder
 from tests.support import zoo

@@ -231,7 +231,7 @@ USUAL = (
 )
 
 
-@pytest.mark.filterwarnings("ignore::serpentail.errors.UnlikeBodies")
+@pytest.mark.filterwarnings("ignore::serpentail.basics.errors.UnlikeBodies")
 def test_what_no_animal_has_is_told_to_who_gives_it_and_the_rest_is_not():
     model = zoo.model("bare")
     for change, words in STRANGE:

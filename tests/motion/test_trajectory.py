@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from serpentail.attitude import pitch_roll_yaw, product, quaternion_rate, rotation_matrix
+from serpentail.basics.attitude import pitch_roll_yaw, product, quaternion_rate, rotation_matrix
 from serpentail.motion.trajectory import Trajectory
 from tests.support.rows import row
 

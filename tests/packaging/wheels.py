@@ -14,7 +14,7 @@ from pathlib import Path
 from examples import front
 
 ROOT = Path(__file__).parents[2]
-PAGE = "serpentail/viewer/page.html"
+PAGE = "serpentail/show/page/page.html"
 PARTS = {  # where the sources of a wheel's folders are, and which files of them it has
     "serpentail_codegen": (ROOT / "codegen" / "serpentail_codegen", ("*.py", "*.jinja", "*.typed")),
     "serpentail": (ROOT / "runtime" / "serpentail", ("*.py", "*.[ch]", "*.cc", "*.typed")),

@@ -18,10 +18,10 @@ from serpentail_codegen.ir.program import Apply, Array, Fill, Index, Loop, Progr
 from serpentail_codegen.ir.step import Step
 from serpentail_codegen.ir.tape import Tape, live_nodes, operation_count
 from serpentail_codegen.passes import schedule
-from serpentail_codegen.passes.directions import directions_in_turn
-from serpentail_codegen.passes.fused import fit, fused, joined
-from serpentail_codegen.passes.still import without_still
-from serpentail_codegen.passes.unread import without_unread_fills
+from serpentail_codegen.passes.dead_fills import without_unread_fills
+from serpentail_codegen.passes.fuse_steps import fit, fused, joined
+from serpentail_codegen.passes.narrow_directions import directions_in_turn
+from serpentail_codegen.passes.zero_tangents import without_still
 from tests.support.rows import row
 
 ZERO, ONE, TWO = map(ir.as_index, range(3))

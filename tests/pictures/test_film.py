@@ -15,12 +15,12 @@ from PIL import Image, ImageSequence
 from scipy.spatial.transform import Rotation
 
 import serpentail as st
-from serpentail.pictures import encode
-from serpentail.pictures.animal import Pen, above_ground, hull
-from serpentail.pictures.filmstrip import strip_of
-from serpentail.pictures.frames import frames, silhouette
-from serpentail.pictures.movie import even, pictures, speed_words
-from serpentail.pictures.views import NAMED, SIDE, TOP, looking, views_of
+from serpentail.show.pictures import encode
+from serpentail.show.pictures.animal import Pen, above_ground, hull
+from serpentail.show.pictures.filmstrip import strip_of
+from serpentail.show.pictures.frames import frames, silhouette
+from serpentail.show.pictures.movie import even, pictures, speed_words
+from serpentail.show.pictures.views import NAMED, SIDE, TOP, looking, views_of
 from tests.support.drawn_flight import SEMI_AXES, flight
 from tests.support.rows import row
 
@@ -80,7 +80,7 @@ def test_a_film_is_slow_motion_of_four_seconds_tells_its_speed_and_ends_in_time(
     told = []
     moving = sys.modules[st.film.__module__].MOVING
     monkeypatch.setitem(moving, ".gif", lambda _, frames: told.append(frames))
-    monkeypatch.setattr("serpentail.pictures.film.pictures", lambda strip, slow: (strip, slow))
+    monkeypatch.setattr("serpentail.show.pictures.film.pictures", lambda strip, slow: (strip, slow))
     flight().film(tmp_path / "a.gif")
     (strip, slowness), *_ = told
     times = [frame.time for frame in strip.films[0]]
@@ -114,7 +114,7 @@ def test_a_film_on_paper_is_the_filmstrip_and_in_html_the_page(tmp_path, monkeyp
         flight().filmstrip(strip, views=("top",))
         assert film.read_bytes() == strip.read_bytes(), suffix
     template = tmp_path / "page"
-    monkeypatch.setattr("serpentail.viewer.view.PAGE", template)
+    monkeypatch.setattr("serpentail.show.page.view.PAGE", template)
     with pytest.raises(st.ViewError, match="not built"):
         flight().film(tmp_path / "film.html")
     template.write_text("<title><!--TITLE--></title>/*DATA*/")

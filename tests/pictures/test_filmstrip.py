@@ -10,12 +10,12 @@ from matplotlib.colors import to_rgb
 from PIL import Image
 
 import serpentail as st
-from serpentail.pictures.animal import PALE, SHADOW
-from serpentail.pictures.filmstrip import strip_of
-from serpentail.pictures.frames import moments, way
-from serpentail.pictures.page import drawn_points
-from serpentail.pictures.style import STYLE, TORSO
-from serpentail.pictures.views import NAMED, SIDE, views_of
+from serpentail.show.pictures.animal import PALE, SHADOW
+from serpentail.show.pictures.filmstrip import strip_of
+from serpentail.show.pictures.frames import moments, way
+from serpentail.show.pictures.page import drawn_points
+from serpentail.show.pictures.style import STYLE, TORSO
+from serpentail.show.pictures.views import NAMED, SIDE, views_of
 from tests.support.drawn_flight import SPEEDS, flight
 from tests.support.rows import row
 

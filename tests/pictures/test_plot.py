@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 
 import serpentail as st
-from serpentail.attitude import rotation_matrix
-from serpentail.pictures.panels import PANELS, attitude
-from serpentail.pictures.style import STYLE
+from serpentail.basics.attitude import rotation_matrix
+from serpentail.show.pictures.panels import PANELS, attitude
+from serpentail.show.pictures.style import STYLE
 from tests.support.drawn_flight import flight
 from tests.support.rows import row
 
@@ -165,8 +165,8 @@ def test_a_figure_keeps_its_look_until_it_is_saved(tmp_path):
 
 def test_drawing_leaves_pyplot_alone_and_importing_leaves_matplotlib_alone(tmp_path):
     code = (
-        "import sys, serpentail.pictures.film, serpentail.pictures.filmstrip, "
-        "serpentail.pictures.plot, serpentail.motion.trajectory\n"
+        "import sys, serpentail.show.pictures.film, serpentail.show.pictures.filmstrip, "
+        "serpentail.show.pictures.plot, serpentail.motion.trajectory\n"
         "assert not {'matplotlib', 'scipy', 'PIL'} & set(sys.modules)\n"
         "from tests.support.drawn_flight import flight\n"
         "folder = sys.argv[1]\n"

@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail import cli
-from serpentail.attitude import from_angles
+from serpentail.basics.attitude import from_angles
+from serpentail.cli.cli import cli
 from serpentail.planning import rounds, ways
 from serpentail.planning.condensed import fatrop
 from serpentail.planning.nlp import interrupt, solver, transcription

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.attitude import angle_deg, pitch_roll_yaw
+from serpentail.basics.attitude import angle_deg, pitch_roll_yaw
 from serpentail.planning.design import checked_design
 from serpentail.planning.nlp.body import Body
 from serpentail.planning.nlp.equations import equations_of_motion

@@ -10,7 +10,7 @@ import pytest
 
 import serpentail as st
 from examples import righting
-from serpentail.attitude import tilt_deg
+from serpentail.basics.attitude import tilt_deg
 from serpentail.planning.condensed import fatrop
 from serpentail.planning.condensed.stages import stages_of
 from serpentail.planning.found import start_blocks

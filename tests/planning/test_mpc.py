@@ -6,8 +6,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import lsq_linear
 
 import serpentail as st
-from serpentail.attitude import quaternion_rate
-from serpentail.planning.predictive.kernel import kernel
+from serpentail.basics.attitude import quaternion_rate
+from serpentail.mpc.kernel import kernel
 from serpentail.planning.result.truth import planned_torques
 from tests.support import zoo
 from tests.support.predictive import TORQUE, Reference, correction_of, plan_of

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.attitude import angle_deg, from_angles, rotation_matrix
+from serpentail.basics.attitude import angle_deg, from_angles, rotation_matrix
 from serpentail.planning.momentum import refuse_impossible
 from serpentail.planning.nlp.coordinates import Attitude
 from serpentail.planning.nlp.node import PARAMETERS, _point, variables_of

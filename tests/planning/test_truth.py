@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import serpentail as st
-from serpentail.attitude import angle_deg
+from serpentail.basics.attitude import angle_deg
 from serpentail.planning.nlp.coordinates import attitude
 from serpentail.planning.result import report as result_report
 from serpentail.planning.result.full_state import full_state

@@ -73,7 +73,7 @@ def test_what_takes_long_ends_and_keeps_what_there_is(child, threads):
 
 
 COMMAND = f"""{HEAR}
-from serpentail.cli import main
+from serpentail.cli.cli import main
 print("ready", file=sys.stderr, flush=True)
 sys.exit(main(sys.argv[1:]))
 """
@@ -125,11 +125,16 @@ class Stop:
             os.kill(os.getpid(), signal.SIGINT)
 import serpentail  # by itself it imports what Python has imported already
 sys.meta_path.insert(0, Stop)
-from serpentail.cli import main
+from serpentail.cli.cli import main
 sys.exit(main(["simulate", "kick"]))
 """
-PARTS = ("argparse", "serpentail.errors", "serpentail.stages", "serpentail.commands.arguments")
-PARTS += ("serpentail.commands.motions", "serpentail.scenes.simulate", "numpy")
+PARTS = (
+    "argparse",
+    "serpentail.basics.errors",
+    "serpentail.basics.progress",
+    "serpentail.cli.arguments",
+)
+PARTS += ("serpentail.cli.motions", "serpentail.scenes.simulate", "numpy")
 
 
 def test_a_command_ends_in_a_line_at_most_while_it_imports(child):

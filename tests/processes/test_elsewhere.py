@@ -11,7 +11,8 @@ import sys
 import pytest
 
 import serpentail as st
-from serpentail.model import cores, workers
+from serpentail.compiling import cores
+from serpentail.compiling import threads as workers
 from tests.support import zoo
 from tests.support.rows import row
 
@@ -156,9 +157,9 @@ import json, os, sys, time
 from pathlib import Path
 import serpentail as st
 from serpentail.model import toolchain
-from serpentail.model.bound import contents, empty
-from serpentail.model.cache import cache_folder
-from serpentail.model.commands import run_all
+from serpentail.compiling.cache_limit import contents, empty
+from serpentail.compiling.cache import cache_folder
+from serpentail.compiling.commands import run_all
 told = {}
 
 def stop():

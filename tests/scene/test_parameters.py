@@ -14,7 +14,7 @@ from serpentail_codegen.scene.parse import parse_scene
 from serpentail_codegen.scene.passive import PASSIVE, PASSIVE_NAMES
 from serpentail_codegen.scene.resolve import resolve_parameters
 from serpentail_codegen.scene.scene import GROUPS
-from serpentail_codegen.scene.shape import EQUAL
+from serpentail_codegen.scene.variant import EQUAL
 from tests.support.rows import row
 from tests.support.scenes import VALID
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from serpentail.errors import ModelError
+from serpentail.basics.errors import ModelError
 from serpentail.scenes.file import read_scene
 from serpentail_codegen.scene.parse import load_scene, scene_for
 from serpentail_codegen.scene.problems import Problem, SceneError

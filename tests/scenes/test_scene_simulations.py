@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.pictures.skeleton import leg_joints
 from serpentail.scenes.plan import plan_arguments
+from serpentail.show.pictures.skeleton import leg_joints
 from serpentail_codegen.scene.parse import load_scene
 from tests.support import zoo
 from tests.support.models import folder_of

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail import cli
-from serpentail.checks import Refusals
+from serpentail.basics.checks import Refusals
+from serpentail.cli.cli import cli
 from serpentail.planning.problem import SETTINGS as PROBLEM_SETTINGS
 from serpentail.planning.settings import PlanSettings
 from serpentail.scenes.keys import read
@@ -187,7 +187,7 @@ def test_a_slip_of_units_is_told():
     assert read(wide, PLAN, "plan", Refusals(ValueError)) == wide
 
 
-@pytest.mark.filterwarnings("always::serpentail.errors.UnusualSize")
+@pytest.mark.filterwarnings("always::serpentail.basics.errors.UnusualSize")
 def test_a_scene_in_grams_millimetres_and_degrees_is_told(scene, capsys):
     """Each slip is one line on stderr, and the report is as always."""
     given = ["--set", "torso_mass=105.7", "--set", "hip=[22.5, -18, 11.25]"]

@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as some
 
 import serpentail as st
-from serpentail import cli
+from serpentail.cli.cli import cli
 from serpentail.planning.nlp.rules import collocation_rule
 from serpentail.scenes import plan_keys, simulate_keys
 from serpentail.scenes.plan import plan_arguments
@@ -211,7 +211,9 @@ def anything(table, keys):
     return some.builds(changed, some.just(table), some.sampled_from(places(table, keys)), VALUES)
 
 
-@pytest.mark.filterwarnings("ignore::RuntimeWarning", "ignore::serpentail.errors.UnusualSize")
+@pytest.mark.filterwarnings(
+    "ignore::RuntimeWarning", "ignore::serpentail.basics.errors.UnusualSize"
+)
 @settings(
     max_examples=150, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck)
 )

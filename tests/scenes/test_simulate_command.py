@@ -10,7 +10,7 @@ import pytest
 from scipy.io import netcdf_file
 
 import serpentail as st
-from serpentail import cli
+from serpentail.cli.cli import cli
 from tests.support import zoo
 from tests.support.rows import row
 from tests.support.told import besides_progress
@@ -102,7 +102,7 @@ def test_a_failed_picture_loses_nothing(simulate, monkeypatch):
     def fails(*_, **__):
         raise RuntimeError("no fonts\non this machine")
 
-    monkeypatch.setattr("serpentail.pictures.film.filmstrip", fails)
+    monkeypatch.setattr("serpentail.show.pictures.film.filmstrip", fails)
     status, out, err = simulate("--film", "a.png", "--save", "new/a.npz", "--json", "-")
     assert status == 1 and json.loads(out)["upright_end"]
     assert re.fullmatch("--film a.png: .*no fonts on this machine\n", err)
@@ -127,7 +127,7 @@ def test_a_plan_is_told_before_it_is_saved(scene, capsys, monkeypatch):
 
 
 def test_a_reader_that_stops_is_no_error(scene, tmp_path):
-    command = f"{sys.executable} -m serpentail.cli simulate {scene()}"
+    command = f"{sys.executable} -m serpentail.cli.cli simulate {scene()}"
     command += f" --folder {zoo.folder('feet_tail')} --save a.npz | true; echo end"
     done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
     assert (done.stdout, done.stderr) == ("end\n", "") and (tmp_path / "a.npz").is_file()

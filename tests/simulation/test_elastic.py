@@ -252,7 +252,7 @@ def clamped(model, stiffness):
     return np.sqrt(squares) / first
 
 
-@pytest.mark.filterwarnings("ignore::serpentail.errors.UnusualSize")
+@pytest.mark.filterwarnings("ignore::serpentail.basics.errors.UnusualSize")
 def test_arcs_converge_to_the_euler_bernoulli_cantilever():
     """Arcs of stiffness EI / L_arc; a single one has sqrt(20 EI / (rho L^4)), and the error falls
     as the square of their number.

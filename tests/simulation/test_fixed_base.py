@@ -5,9 +5,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import serpentail as st
-from serpentail.containers.contents import contents
+from serpentail.bridges.containers.contents import contents
 from serpentail.motion.summary import summary
-from serpentail.pictures.frames import frames
+from serpentail.show.pictures.frames import frames
 from tests.references.parameters import TABLE_1
 from tests.support import zoo
 from tests.support.rows import row

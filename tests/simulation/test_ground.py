@@ -235,8 +235,8 @@ def slide(friction, heading):
     return st.simulate(model, q, v, t_span=0.6, **how)
 
 
-@pytest.mark.filterwarnings("ignore::serpentail.errors.UnusualSize")
-@pytest.mark.filterwarnings("ignore::serpentail.errors.UnlikeBodies")
+@pytest.mark.filterwarnings("ignore::serpentail.basics.errors.UnusualSize")
+@pytest.mark.filterwarnings("ignore::serpentail.basics.errors.UnlikeBodies")
 def test_sliders_stop_where_coulomb_says():
     """At any heading; a box is stronger on diagonals, smooth laws creep, the paper's pulls back."""
     for heading in np.radians([0, 30, 45, 117, 200, 315]):

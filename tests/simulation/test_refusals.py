@@ -261,7 +261,7 @@ def test_wrong_parameters_are_named_with_their_run():
     same(st.simulate(baked, q, v, t_span=0.01, parameters={}), alone(baked, q, v, t_span=0.01))
 
 
-@pytest.mark.filterwarnings("ignore::serpentail.errors.UnusualSize")
+@pytest.mark.filterwarnings("ignore::serpentail.basics.errors.UnusualSize")
 def test_bodies_of_unlike_size_in_one_run_are_warned_of_where_it_is_called():
     own, how = {"tail_length": [0.2, 200.0, 0.2, 0.2]}, {"t_span": 1e-3, "step": 1e-3}
     with pytest.warns(st.UnlikeBodies, match=r"factor of 3\.9e\+06") as caught:

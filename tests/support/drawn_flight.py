@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from serpentail.attitude import rotation_matrix
+from serpentail.basics.attitude import rotation_matrix
 from serpentail.motion.trajectory import Trajectory
 from serpentail_scene.layout import Layout
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from embedded.boards import ToolchainMissing
-from serpentail.viewer import view
+from serpentail.show.page import view
 
 
 def need_page() -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 import serpentail as st
-from serpentail.planning.predictive import task as weights
+from serpentail.mpc import task as weights
 from tests.support.tumbling import DURATION, rat, start
 
 TORQUE = 0.02  # N m

@@ -5,8 +5,8 @@ import heapq
 import numpy as np
 import pytest
 
-from serpentail.sweeps.blocks import Gate, Pace
-from serpentail.sweeps.driver import AHEAD
+from serpentail.bridges.sweeps.blocks import Gate, Pace
+from serpentail.bridges.sweeps.driver import AHEAD
 from tests.support.rows import row
 
 SCHEDULER = 220  # tasks/s that one scheduler of Dask bears

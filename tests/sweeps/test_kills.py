@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.sweeps.shards import Row, Shard
-from serpentail.sweeps.store import Store
+from serpentail.bridges.sweeps.shards import Row, Shard
+from serpentail.bridges.sweeps.store import Store
 from tests.support import swept
 from tests.support.rows import row
 

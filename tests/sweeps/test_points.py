@@ -8,8 +8,8 @@ import pytest
 from scipy.stats import kstest
 
 import serpentail as st
-from serpentail.sweeps.axes import axes_of
-from serpentail.sweeps.draws import permuted
+from serpentail.bridges.sweeps.axes import axes_of
+from serpentail.bridges.sweeps.draws import permuted
 from tests.support.rows import row as named
 
 

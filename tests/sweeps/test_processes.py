@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 import serpentail as st
-from serpentail.sweeps import supervision
-from serpentail.sweeps.result import Status
+from serpentail.bridges.sweeps import supervision
+from serpentail.bridges.sweeps.result import Status
 from tests.support import swept
 
 ROOT = Path(__file__).parents[2]

@@ -15,7 +15,7 @@ import xarray
 from jsonschema import Draft7Validator
 
 import serpentail as st
-from serpentail import cli
+from serpentail.cli.cli import cli
 from tests.identification.flights import flown, placed, scene, seen, start
 from tests.support import zoo
 from tests.support.rows import row as named
@@ -151,7 +151,7 @@ def test_what_cannot_be_is_told_before_anything_runs(study, capsys, monkeypatch)
     for row in (1, -1, True, 0.0):
         with pytest.raises(st.SweepError, match=f"row {row}: there are 1, 0 to 0"):
             found.motion(row)
-    monkeypatch.setattr("serpentail.sweeps.groups.built", lambda *_: pytest.fail("a model"))
+    monkeypatch.setattr("serpentail.bridges.sweeps.groups.built", lambda *_: pytest.fail("a model"))
     with pytest.raises(st.SweepError, match="did you mean 'tail_length'"):
         st.sweep(study, {"tail_lenght": st.grid([0.1])})
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.sweeps import driver, supervision
-from serpentail.sweeps.executors import Place
-from serpentail.sweeps.result import Status
-from serpentail.sweeps.shards import Row, Shard
-from serpentail.sweeps.sweep import posed
+from serpentail.bridges.sweeps import driver, supervision
+from serpentail.bridges.sweeps.executors import Place
+from serpentail.bridges.sweeps.result import Status
+from serpentail.bridges.sweeps.shards import Row, Shard
+from serpentail.bridges.sweeps.sweep import posed
 from tests.support import swept, zoo
 from tests.support.rows import row as named
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.pictures.frames import body_of
-from serpentail.viewer.packing import packed
-from serpentail.viewer.shape import shape
-from serpentail.watching.poses import animal
+from serpentail.show.live.poses import animal
+from serpentail.show.page.packing import packed
+from serpentail.show.page.shape import shape
+from serpentail.show.pictures.frames import body_of
 from tests.motion.conftest import at_height, scene_of, told
 from tests.support import page, zoo
 from tests.support.page import data_of

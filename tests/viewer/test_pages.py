@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail import cli
-from serpentail.viewer import view as viewer
+from serpentail.cli.cli import cli
+from serpentail.show.page import view as viewer
 from serpentail_codegen.scene.parse import load_scene
 from tests.support import zoo
 from tests.support.models import folder_of

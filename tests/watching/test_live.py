@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import serpentail as st
-from serpentail.watching.poses import rods
+from serpentail.show.live.poses import rods
 from tests.support import zoo
 
 LEGS = st.Legs.fixed(3.6, -0.3)

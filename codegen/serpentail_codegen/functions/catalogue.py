@@ -7,9 +7,9 @@ from serpentail_scene.signatures.table import SIGNATURES
 from . import contact, fixed_base, pfl
 from .airborne import curvature as airborne
 from .derivatives import by_parameters, hessian, jacobians
+from .differentiable import FUNCTIONS
 from .function import Function, signed
 from .implicit import functions as implicit
-from .plain import FUNCTIONS
 from .tail import Tail
 
 _FOUND = FUNCTIONS | signed(

@@ -14,7 +14,7 @@ from ..ir.step import Step, specialised
 from ..ir.tape import Number
 from ..mechanics.lower import declared_shapes, derive
 from ..scene.parameters import Parameter
-from ..scene.shape import Stretch
+from ..scene.variant import Stretch
 from .scope import Instead, Scope, Vectors
 from .tail import Tail
 

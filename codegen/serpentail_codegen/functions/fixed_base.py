@@ -9,7 +9,7 @@ from functools import partial
 
 from ..autodiff.forward import tangent_program
 from ..ir.program import Array, Index, Ref, padded
-from ..mechanics import resting
+from ..mechanics import fixed_base as resting
 from .derivatives.by_parameters import parameter_tangents, spread_parameters
 from .draft import Draft
 from .fixed_base_values import ASSEMBLIES, whole_state, whole_v

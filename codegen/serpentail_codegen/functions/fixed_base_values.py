@@ -3,7 +3,7 @@
 from serpentail_scene.layout import POSITION, QUATERNION, TORSO_NQ, TORSO_NV
 
 from ..ir.program import Array
-from ..mechanics import resting
+from ..mechanics import fixed_base as resting
 from .draft import Draft
 from .layout import block
 from .passive import add_elastic_energy

@@ -9,7 +9,7 @@ from ..ir.program import Array, Ref, padded
 from ..scene.parameters import Parameter
 from ..scene.resolve import parameters_of
 from ..scene.scene import Scene
-from ..scene.shape import EQUAL, Run, Shape, Stretch, runs_of, stretches_of
+from ..scene.variant import EQUAL, Run, Shape, Stretch, runs_of, stretches_of
 from .layout import LOAD
 
 SPRING = 18  # numbers of a point's linearised contact

@@ -34,7 +34,6 @@ from .checks import (
     tail_pieces,
     unknown_keys,
 )
-from .described import tail_described
 from .parameters import PARAMETERS
 from .passive import parts_of
 from .problems import Problem, SceneError
@@ -51,7 +50,8 @@ from .scene import (
     foreign_to,
 )
 from .segments import are_tables, tell_values
-from .shape import EQUAL
+from .tail_tables import tail_described
+from .variant import EQUAL
 
 
 def load_scene(path: str | Path) -> Scene:

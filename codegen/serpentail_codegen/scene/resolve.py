@@ -21,7 +21,7 @@ from .problems import Problem, SceneError
 from .scene import NAMES, foreign_to
 from .segment_tables import flattened
 from .segments import RADIUS
-from .shape import EQUAL, Shape
+from .variant import EQUAL, Shape
 
 HAS_NOT = {  # why a tail or a base has no such parameters
     "equal": "each piece of this tail has a value of its own",

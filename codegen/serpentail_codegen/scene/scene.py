@@ -10,7 +10,7 @@ from serpentail_scene.signatures.table import DEFAULT
 
 from .parameters import ANY, PARAMETERS, Parameters, Rule
 from .passive import PASSIVE_NAMES, parts_of
-from .shape import EQUAL, Shape
+from .variant import EQUAL, Shape
 
 KINDS = ("articulated", "continuum", "mixed")
 GROUPS = ("feet", "tail", "torso")  # of contact points, in their order

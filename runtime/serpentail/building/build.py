@@ -7,8 +7,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, Unpack
 
-from ..errors import ModelError
-from ..model.cache import (
+from ..basics.errors import ModelError
+from ..compiling.cache import (
     BUILDS,
     MODELS,
     cache_folder,
@@ -19,12 +19,12 @@ from ..model.cache import (
     unwritable,
     workshop,
 )
+from ..compiling.locks import alone
+from ..compiling.safe_files import regular_bytes
 from ..model.load import model_from
-from ..model.locks import alone
 from ..model.manifest import CheckedFolder, read_folder
 from ..model.model import Model
 from ..model.parameters import merged
-from ..model.reading import regular_bytes
 from ..model.snapshot import restored, snapshot
 from .examples import tables_of_scene
 from .fewer_contacts import with_contacts

@@ -6,8 +6,8 @@ from typing import Any
 
 from serpentail_scene.source import tables_of
 
-from ..checks import did_you_mean, shown
-from ..errors import SerpentailError
+from ..basics.checks import did_you_mean, shown
+from ..basics.errors import SerpentailError
 
 PACKAGE = Path(__file__).parents[1] / "examples"  # of a wheel
 CHECKOUT = Path(__file__).parents[3] / "scenes"

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from serpentail_scene.digest import GENERATOR, generator_digest
 
-from ..errors import ModelError
-from ..model.commands import run_all
-from ..stages import Stage
+from ..basics.errors import ModelError
+from ..basics.progress import Stage
+from ..compiling.commands import run_all
 
 REMEDY = "pip install serpentail, or generate where it is and give the folder to st.load"
 

@@ -2,8 +2,8 @@
 
 from collections.abc import Collection
 
-from ..checks import shown
-from ..errors import SerpentailError
+from ..basics.checks import shown
+from ..basics.errors import SerpentailError
 from .scene_text import literal
 
 LINKS, SAMPLES = 3, 5  # in each segment, unless something else is asked for

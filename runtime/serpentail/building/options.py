@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, TypedDict
 
-from ..checks import did_you_mean, shown
-from ..errors import ModelError
+from ..basics.checks import did_you_mean, shown
+from ..basics.errors import ModelError
 
 Three = Sequence[float]
 OneOrEach = float | Sequence[float]  # of all tail coordinates, or of each

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import shown
-from ..errors import ModelError
+from ..basics.checks import shown
+from ..basics.errors import ModelError
 
 
 def scene_text(tables: Mapping[str, Any]) -> str:

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ..checks import one_line
-from ..errors import IdentificationError
-from ..extras import needed
-from ..model.commands import inherited
+from ..basics.checks import one_line
+from ..basics.errors import IdentificationError
+from ..basics.extras import needed
+from ..compiling.commands import inherited
 
 CHILD = Path(__file__).with_name("c3d_child.py")
 MEMORY = (2**30, 64)  # bytes that a read may use: at least, and for each byte of the file

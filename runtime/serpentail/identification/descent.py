@@ -4,7 +4,7 @@ import numpy as np
 
 from . import trial as trials
 from .point import Point, integrated, prior_rows
-from .stages import moved
+from .radau_steps import moved
 from .trial import Iterate, Linear, Trial
 from .unknowns import Unknowns
 

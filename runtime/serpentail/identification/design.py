@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..checks import finite_array, number, refusal
-from ..errors import IdentificationError
+from ..basics.checks import finite_array, number, refusal
+from ..basics.errors import IdentificationError
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
 from .certainty import Combination, certainty

@@ -8,12 +8,12 @@ from typing import Any, TypedDict, Unpack
 
 import numpy as np
 
-from ..checks import number, refusal
-from ..errors import IdentificationError, ModelError
+from ..basics.checks import number, refusal
+from ..basics.errors import IdentificationError, ModelError
+from ..basics.progress import Stage
 from ..model.model import Model
-from ..stages import Stage
 from . import trial as trials
-from .doubts import refuse_scale, refuse_too_few, tell_of_swaps
+from .marker_swaps import refuse_scale, refuse_too_few, tell_of_swaps
 from .outcome import told
 from .placement import Marker, Placements, placements
 from .point import Point

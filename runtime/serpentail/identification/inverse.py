@@ -13,14 +13,14 @@ from scipy.linalg import solveh_banded
 
 from serpentail_scene.layout import QUATERNION
 
-from ..attitude import sign_continuous
-from ..checks import number
-from ..errors import IdentificationError
+from ..basics.attitude import sign_continuous
+from ..basics.checks import number
+from ..basics.errors import IdentificationError
 from ..model.model import Model
 from ..model.state_space import product_matrix
 from ..motion.trajectory import Trajectory
-from .doubts import refuse_scale, refuse_too_few, tell_of_residuals
 from .identify import refuse_unlike
+from .marker_swaps import refuse_scale, refuse_too_few, tell_of_residuals
 from .placement import Marker, placements
 from .points import world_points
 from .result import trajectory_of

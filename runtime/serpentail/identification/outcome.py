@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..errors import IdentificationError
+from ..basics.errors import IdentificationError
 from ..model.model import Model
 from . import trial as trials
 from .certainty import (
@@ -17,8 +17,8 @@ from .certainty import (
     relative_covariance,
     spread_of_noise,
 )
-from .doubts import tell_of_residuals
 from .estimates import Estimate, EstimatedTorques, IdentifiedTrial
+from .marker_swaps import tell_of_residuals
 from .missing import torques_missing
 from .placement import Placements
 from .result import Identification, trajectory_of

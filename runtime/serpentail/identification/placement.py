@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from serpentail_scene.layout import REST
-
-from ..checks import number, numbers, refusal
-from ..errors import IdentificationError
+from ..basics.attitude import REST
+from ..basics.checks import number, numbers, refusal
+from ..basics.errors import IdentificationError
 from ..model.model import Model
 
 TORSO = -1  # the piece of a marker on the torso

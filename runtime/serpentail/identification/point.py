@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import ModelError
+from ..basics.errors import ModelError
 from . import trial as trials
 from .trial import Iterate, Trial
 from .unknowns import Unknowns

@@ -13,7 +13,7 @@ import numpy as np
 
 from serpentail_scene.layout import OMEGA, PER_SEGMENT, QUATERNION, TAIL_Q, TAIL_V
 
-from ..attitude import REST, Entries, from_angles, product, rotation_matrix
+from ..basics.attitude import REST, Entries, from_angles, product, rotation_matrix
 from ..model.kernel import Kernel
 from ..model.model import Model
 from ..model.polar import polar_to_bend

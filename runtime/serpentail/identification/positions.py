@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array
-from ..errors import IdentificationError
+from ..basics.checks import finite_array
+from ..basics.errors import IdentificationError
 from ..model.model import Model
 from .placement import Marker, placements
 from .points import world_points

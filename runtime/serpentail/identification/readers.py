@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import IdentificationError
-from ..files import without_quote
+from ..basics.errors import IdentificationError
+from ..basics.files import without_quote
 from .c3d import read_c3d
 from .tracks import MarkerTracks, checked_tracks, checked_unit
 

@@ -3,8 +3,8 @@
 import numpy as np
 
 from ..model.model import Model
-from . import stages as radau
-from .stages import difference
+from . import radau_steps as radau
+from .radau_steps import difference
 from .trial import Iterate, Trial
 
 SHARE = 0.05  # allowed error of all intervals together, relative to the noise

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import IdentificationError
+from ..basics.errors import IdentificationError
 from ..model.model import Model
 from ..motion.origin import origin
 from ..motion.table import as_text
@@ -144,7 +144,7 @@ class Identification:
         ExtraMissing
             Matplotlib is not installed.
         """
-        from ..pictures.residuals import residual_figure
+        from ..show.pictures.residuals import residual_figure
 
         chosen = self._trial(trial)
         bands = chosen.torques
@@ -173,7 +173,7 @@ class Identification:
         ViewError, ModelError
             As of ``serpentail.view``.
         """
-        from ..viewer.view import view
+        from ..show.page.view import view
 
         names = None
         if len(self.trials) > 1:

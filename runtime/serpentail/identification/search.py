@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from ..basics.progress import Stage
 from ..model.model import Model
-from ..stages import Stage
 from . import trial as trials
 from .certainty import spread_of_noise
 from .point import Point

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from ..errors import IdentificationError
-from ..stages import Stage
+from ..basics.errors import IdentificationError
+from ..basics.progress import Stage
 from . import trial as trials
 from .descent import search, to_pin
 from .point import Point, integrated, prior_rows

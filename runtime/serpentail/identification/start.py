@@ -4,11 +4,11 @@ import numpy as np
 
 from serpentail_scene.layout import PER_SEGMENT, QUATERNION, TAIL_Q, TORSO_Q
 
-from ..attitude import sign_continuous
+from ..basics.attitude import sign_continuous
 from ..model.model import Model
 from .placement import Placements
 from .points import marker_points, world_points
-from .stages import difference, moved
+from .radau_steps import difference, moved
 from .tracks import MarkerTracks
 
 ITERATIONS = 25

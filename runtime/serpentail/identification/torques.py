@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import finite_array, measured, number, refusal
-from ..errors import IdentificationError
+from ..basics.checks import finite_array, measured, number, refusal
+from ..basics.errors import IdentificationError
 from ..motion.trajectory import Trajectory
 
 PER_TIME = 8  # knots in each correlation time

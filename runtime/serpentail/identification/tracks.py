@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 
 from serpentail_scene.units import MEASURES, plain
 
-from ..checks import finite_array, needed, one_of, real_array, refusal, shown
-from ..errors import IdentificationError, UnusualSize
-from ..magnitudes import LARGEST
+from ..basics.checks import finite_array, needed, one_of, real_array, refusal, shown
+from ..basics.errors import IdentificationError, UnusualSize
+from ..basics.plausible_values import LARGEST
 from ..motion.account import framed
 
 UNITS: dict[str, Fraction] = MEASURES["m"][1]

@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import IdentificationError
+from ..basics.errors import IdentificationError
 from ..model.model import Model
-from . import stages as radau
+from . import radau_steps as radau
 from .placement import Placements
 from .points import STEP, marker_points, offset_axes, world_points
 from .torques import Known, TorquePrior, knots_of, prior_rows

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import did_you_mean, needed, number, refusal
-from ..errors import IdentificationError, UnlikeBodies, UnusualSize
+from ..basics.checks import did_you_mean, needed, number, refusal
+from ..basics.errors import IdentificationError, UnlikeBodies, UnusualSize
 from ..model.model import Model
 from ..model.parameters import ellipsoid, flat, independent
 from .placement import Placements

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import IdentificationError
-from ..files import replacing, write_csv
+from ..basics.errors import IdentificationError
+from ..basics.files import replacing, write_csv
 from .tracks import MarkerTracks
 
 

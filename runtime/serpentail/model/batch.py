@@ -9,12 +9,12 @@ from collections.abc import Callable
 from typing import Any
 from weakref import WeakSet
 
-from ..errors import ModelError
-from .compiler import opened
-from .kept import kept
+from ..basics.errors import ModelError
+from ..compiling.compiler import opened
+from ..compiling.threads import after_fork
+from .lazy import kept
 from .manifest import CheckedFolder, remedy
 from .snapshot import library_in_cache, model_library
-from .workers import after_fork
 
 MIN_BATCH = 1000  # states: from here on a batch pays for compiling
 # sources of a model that are compiled when they are needed

@@ -8,10 +8,10 @@ import casadi
 
 from serpentail_scene.layout import OMEGA, QUATERNION, TAIL_V, VELOCITY
 
-from ..checks import one_of, whole_number
-from ..errors import ModelError
-from .cores import threads
-from .kept import kept
+from ..basics.checks import one_of, whole_number
+from ..basics.errors import ModelError
+from ..compiling.cores import threads
+from .lazy import kept
 from .nodes.function import MOST_NODES, RESULTS, nodes_function
 from .parameters import flat, flat_names
 from .state_space import RATE

@@ -6,7 +6,7 @@ import numpy as np
 
 from serpentail_scene.units import in_unit
 
-from ..errors import UnusualSize
+from ..basics.errors import UnusualSize
 from .parameters import Values
 
 MOST = 0.02  # of the moment of inertia about the mount that even arcs may be off without a warning

@@ -13,12 +13,12 @@ from numpy.typing import ArrayLike, DTypeLike
 
 from serpentail_scene.layout import PER_SEGMENT, QUATERNION
 
-from ..checks import real_array, refuse_not_finite
-from ..errors import StateError
+from ..basics.checks import real_array, refuse_not_finite
+from ..basics.errors import StateError
+from ..compiling.threads import shared
 from .batch import BatchLibrary, RecordFunction
-from .calls import Call, call_of, declined, waiting
+from .fast_call import Call, call_of, declined, waiting
 from .library import NOT_POSITIVE_DEFINITE, OUT_OF_RANGE
-from .workers import shared
 
 MOST_ARRAYS = 10
 QUATERNIONS = {"q": QUATERNION, "x": slice(0, 4)}  # where they are, by the first argument's name

@@ -2,9 +2,9 @@
 
 import ctypes
 
-from ..errors import ModelError
+from ..basics.errors import ModelError
+from ..compiling.compiler import opened
 from .batch import LAZY_SOURCES
-from .compiler import opened
 from .manifest import CheckedFolder, remedy
 from .snapshot import model_library
 

@@ -6,16 +6,16 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import ModelError
+from ..basics.errors import ModelError
+from ..compiling.cores import checked_threads
 from .batch import BatchLibrary
-from .cores import checked_threads
 from .even_arcs import warn_of_even_arcs
 from .library import open_library
 from .manifest import CheckedFolder, read_folder
 from .methods.evaluated import without_c
 from .model import Model
 from .parameters import resolve
-from .sizes import warn_of_sizes
+from .plausible_sizes import warn_of_sizes
 
 
 def load(

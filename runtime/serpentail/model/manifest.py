@@ -9,9 +9,9 @@ from pathlib import Path, PurePosixPath
 from types import ModuleType
 
 from .. import __version__
-from ..errors import ModelError
-from .kept import kept
-from .reading import Held, held
+from ..basics.errors import ModelError
+from ..compiling.safe_files import Held, held
+from .lazy import kept
 
 FORMAT = 2
 KEYS = [

@@ -13,13 +13,13 @@ from numpy.typing import ArrayLike
 
 from serpentail_scene.layout import Layout
 
-from ..errors import SerpentailError
-from ..extras import needed
+from ..basics.errors import SerpentailError
+from ..basics.extras import needed
+from ..compiling.cache import cache_folder
 from .batch import BatchLibrary
-from .cache import cache_folder
 from .functions import Functions
-from .kept import kept
 from .kernel import Kernel
+from .lazy import kept
 from .manifest import CheckedFolder
 from .methods.steps import StepMethods
 from .parameters import (
@@ -31,7 +31,7 @@ from .parameters import (
     real_type,
     resolve,
 )
-from .sizes import warn_of_sizes
+from .plausible_sizes import warn_of_sizes
 from .snapshot import restored, snapshot
 from .tail import links_of, words_of
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from serpentail_scene.units import in_unit
 
-from ..checks import did_you_mean, numbers_in, one_line, shown
-from ..errors import ModelError
+from ..basics.checks import did_you_mean, numbers_in, one_line, shown
+from ..basics.errors import ModelError
 
 Value = float | tuple[float, ...]
 Values = Mapping[str, Any]  # name -> number or numbers, SI; of many runs (k,) or (k, size)

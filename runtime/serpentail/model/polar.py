@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..checks import finite_array
-from ..errors import StateError
+from ..basics.checks import finite_array
+from ..basics.errors import StateError
 
 Array = NDArray[np.float64]
 Four = tuple[Array, Array, Array, Array]

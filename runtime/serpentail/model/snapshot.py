@@ -6,8 +6,8 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
-from ..errors import ModelError, SerpentailError
-from .cache import (
+from ..basics.errors import ModelError, SerpentailError
+from ..compiling.cache import (
     MODELS,
     cache_folder,
     mark_used,
@@ -16,9 +16,9 @@ from .cache import (
     unwritable,
     workshop,
 )
-from .compiler import library_of, noted, text_digest
+from ..compiling.compiler import library_of, noted, text_digest
+from ..compiling.safe_files import regular_bytes
 from .manifest import CheckedFolder, read_folder
-from .reading import regular_bytes
 
 
 def model_library(checked: CheckedFolder, sources: Sequence[str], profile: str) -> Path:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, VELOCITY, Layout
 
-from ..errors import StateError
+from ..basics.errors import StateError
 
 Array = NDArray[Any]
 RATE = 1.0  # 1/s: an error e of the norm decays as exp(-2 RATE t)

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
-from ..brief import cut
+from ..basics.short_repr import cut
 from ..model.model import Model
 
 if TYPE_CHECKING:

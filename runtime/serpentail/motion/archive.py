@@ -9,7 +9,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from ..files import replacing
+from ..basics.files import replacing
 from .contact import Contact
 
 SUFFIX = ".npz"

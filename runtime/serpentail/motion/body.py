@@ -4,7 +4,7 @@ import numpy as np
 
 from serpentail_scene.layout import POSITION
 
-from ..attitude import Array, pose_of
+from ..basics.attitude import Array, pose_of
 from ..model.model import Model
 from ..model.parameters import total_mass
 from ..model.polar import polar_to_bend

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..brief import brief
-from ..checks import shown
+from ..basics.checks import shown
+from ..basics.short_repr import brief
 
 Array = NDArray[np.float64]
 

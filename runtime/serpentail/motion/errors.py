@@ -12,7 +12,7 @@ import numpy as np
 
 from serpentail_scene.layout import POSITION
 
-from ..errors import SimulationError
+from ..basics.errors import SimulationError
 from ..model.model import Model
 from .body import semi_axes
 from .derived import AGAIN

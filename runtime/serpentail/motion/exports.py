@@ -33,7 +33,7 @@ class Exports:
         ExtraMissing
             xarray is not installed.
         """
-        from ..containers.labelled import dataset
+        from ..bridges.containers.labelled import dataset
 
         return dataset(self._contents())
 
@@ -51,7 +51,7 @@ class Exports:
         ExtraMissing
             pandas is not installed.
         """
-        from ..containers.tables import frame
+        from ..bridges.containers.tables import frame
 
         return frame(self._contents())
 
@@ -73,7 +73,7 @@ class Exports:
         NotWritten
             The file cannot be written.
         """
-        from ..containers.tables import write
+        from ..bridges.containers.tables import write
 
         return write(self._contents(), path)
 
@@ -97,12 +97,12 @@ class Exports:
         NotWritten
             The file cannot be written.
         """
-        from ..containers.labelled import write
+        from ..bridges.containers.labelled import write
 
         return write(self._contents(), path)
 
     def _contents(self) -> Any:
         """Return what it holds, with names and units."""
-        from ..containers.contents import contents
+        from ..bridges.containers.contents import contents
 
         return contents(self)  # type: ignore[arg-type]

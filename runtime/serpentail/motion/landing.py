@@ -9,7 +9,7 @@ import numpy as np
 
 from serpentail_scene.layout import QUATERNION, VELOCITY
 
-from ..attitude import Array, rotation_matrix
+from ..basics.attitude import Array, rotation_matrix
 from ..model.model import Model
 from .body import weight
 from .feet import feet_times, feet_touching

@@ -8,11 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..attitude import pitch_roll_yaw, tilt_deg
+from ..basics.attitude import pitch_roll_yaw, tilt_deg
 from ..model.model import Model
 from ..model.passive import stored_energy
 from .body import weight
-from .doubts import warnings_of
 from .forces import Peak, in_weights, peaks
 from .landing import (
     MAX_SPEED,
@@ -28,6 +27,7 @@ from .landing import (
     turned,
     upright,
 )
+from .plausibility import warnings_of
 from .slip import slip
 from .table import as_markdown
 from .trajectory import Trajectory

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, VELOCITY, Layout
 
-from ..attitude import Array, quaternion_rate, sign_continuous
+from ..basics.attitude import Array, quaternion_rate, sign_continuous
 
 
 def inside(times: Array, span: Array) -> Array:

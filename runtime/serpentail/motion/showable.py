@@ -33,13 +33,13 @@ class Showable:
         ViewError, ModelError
             As of ``serpentail.view``.
         """
-        from ..viewer.view import view
+        from ..show.page.view import view
 
         return view(cast("Trajectory", self), path, model=model)
 
     def _repr_html_(self) -> str:
         """Text and page, for notebooks."""
-        from ..viewer.notebook import in_notebook
+        from ..show.page.notebook import in_notebook
 
         return in_notebook(self, lambda: [cast("Trajectory", self)])
 
@@ -63,7 +63,7 @@ class Showable:
         ViewError, ModelError, ExtraMissing
             As of ``serpentail.film``.
         """
-        from ..pictures.film import film
+        from ..show.pictures.film import film
 
         return film(cast("Trajectory", self), path, **options)
 
@@ -89,7 +89,7 @@ class Showable:
         ViewError, ModelError, ExtraMissing
             As of ``serpentail.filmstrip``.
         """
-        from ..pictures.filmstrip import filmstrip
+        from ..show.pictures.filmstrip import filmstrip
 
         return filmstrip(cast("Trajectory", self), path, **options)
 
@@ -115,6 +115,6 @@ class Showable:
         ViewError, ExtraMissing
             As of ``serpentail.plot``.
         """
-        from ..pictures.plot import plot
+        from ..show.pictures.plot import plot
 
         return plot(cast("Trajectory", self), *panels, **options)

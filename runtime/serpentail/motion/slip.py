@@ -4,7 +4,7 @@ import numpy as np
 
 from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, VELOCITY
 
-from ..attitude import Array, rotation_matrix
+from ..basics.attitude import Array, rotation_matrix
 from ..model.model import Model
 from .trajectory import Trajectory
 

@@ -13,18 +13,18 @@ from numpy.typing import ArrayLike
 
 from serpentail_scene.layout import QUATERNION, Layout
 
-from ..attitude import Array, pose_of
-from ..checks import needed
+from ..basics.attitude import Array, pose_of
+from ..basics.checks import needed
 from ..model.model import Model
 from . import archive
 from .account import account
 from .contact import Contact
 from .derived import Derived, Later, made, settled
-from .doubts import doubts, warnings_of
 from .exports import Exports
+from .plausibility import doubts, warnings_of
 from .resample import Interpolation, hermite_q, inside, monotone, smooth
 from .showable import Showable
-from .soundness import check_time, check_unit, json_text, layout_of, real, shapes
+from .validation import check_time, check_unit, json_text, layout_of, real, shapes
 
 
 @dataclass(frozen=True, eq=False)

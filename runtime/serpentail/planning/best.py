@@ -3,9 +3,9 @@
 from collections.abc import Callable
 from dataclasses import replace
 
+from ..basics.progress import Stage
 from ..model.model import Model
 from ..simulation.simulate import read_clocks
-from ..stages import Stage
 from .momentum import refuse_impossible
 from .nlp.equations import equations_of_motion
 from .nlp.fork_gate import forks_wait

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import refusal, shown
-from ..errors import ModelError, PlanningError
+from ..basics.checks import refusal, shown
+from ..basics.errors import ModelError, PlanningError
 from ..model.model import Model
 from ..model.parameters import checked_value
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from serpentail_scene.layout import POSITION, VELOCITY
 
-from ..errors import SimulationError
+from ..basics.errors import SimulationError
 from ..model.model import Model
 from ..model.parameters import total_mass
 from ..motion.trajectory import Trajectory

@@ -7,9 +7,9 @@ import numpy as np
 
 from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, VELOCITY
 
-from ..attitude import from_angles, pitch_roll_yaw
-from ..checks import none_of, numbers, refusal
-from ..errors import PlanningError
+from ..basics.attitude import from_angles, pitch_roll_yaw
+from ..basics.checks import none_of, numbers, refusal
+from ..basics.errors import PlanningError
 from ..model.model import Model
 from ..model.passive import behind_stops
 from .goal import Bounds

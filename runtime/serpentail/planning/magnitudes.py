@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import measured, number, numbers, shown
-from ..errors import PlanningError, UnusualSize
-from ..magnitudes import warn_of_unusual
+from ..basics.checks import measured, number, numbers, shown
+from ..basics.errors import PlanningError, UnusualSize
+from ..basics.plausible_values import warn_of_unusual
 from ..model.model import Model
 from ..model.parameters import total_mass
 from .goal import Bounds

@@ -9,8 +9,8 @@ import numpy as np
 
 from serpentail_scene.layout import OMEGA, VELOCITY
 
-from ..attitude import rotation_matrix
-from ..errors import PlanningError
+from ..basics.attitude import rotation_matrix
+from ..basics.errors import PlanningError
 from ..model.model import Model
 from .nlp.coordinates import IDENTITY_POSE
 from .problem import PlanningProblem

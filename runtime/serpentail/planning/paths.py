@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import number, numbers_in, refusal, shown
-from ..errors import PlanningError
+from ..basics.checks import number, numbers_in, refusal, shown
+from ..basics.errors import PlanningError
 from ..model.model import Model
 from .nlp.point import any_legs, body_heights
 

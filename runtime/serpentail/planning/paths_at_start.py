@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import PlanningError
+from ..basics.errors import PlanningError
 from ..model.model import Model
 from .design import Design
 from .found import start_blocks

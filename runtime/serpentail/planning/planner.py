@@ -4,9 +4,9 @@ from collections.abc import Callable, Mapping, Sequence
 from inspect import Parameter, signature
 from typing import Any, Never
 
-from .. import extras
-from ..checks import Refusals, needed, none_of
-from ..errors import PlanningError
+from ..basics import extras
+from ..basics.checks import Refusals, needed, none_of
+from ..basics.errors import PlanningError
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
 from ..simulation.schedules import Legs

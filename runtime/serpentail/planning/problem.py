@@ -9,9 +9,9 @@ import numpy as np
 
 from serpentail_scene.layout import QUATERNION, TAIL_Q, TAIL_V
 
-from ..brief import brief
-from ..checks import Refusals, number, numbers_in, one_of, refusal, refuse_not_finite, shown
-from ..errors import PlanningError
+from ..basics.checks import Refusals, number, numbers_in, one_of, refusal, refuse_not_finite, shown
+from ..basics.errors import PlanningError
+from ..basics.short_repr import brief
 from ..model.model import Model
 from ..model.passive import behind_stops
 from ..simulation.schedules import Legs

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import Refusals, needed, number, one_of, shown, whole_number
-from ..errors import PlanningError
+from ..basics.checks import Refusals, needed, number, one_of, shown, whole_number
+from ..basics.errors import PlanningError
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
 from .magnitudes import HUGE

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import PlanningError
+from ..basics.errors import PlanningError
 from .condensed.fatrop import engine_of, solve_stages
 from .condensed.node import lacking
 from .condensed.stages import Stages, stages_of

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..checks import number, one_of, shown
-from ..errors import SimulationError
+from ..basics.checks import number, one_of, shown
+from ..basics.errors import SimulationError
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
 from ..simulation.controllers import Controller, Damping, Phases, TorqueTable

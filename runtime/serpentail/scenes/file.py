@@ -7,10 +7,10 @@ from typing import Any
 
 from serpentail_scene.units import in_unit
 
+from ..basics.checks import refusal, shown
+from ..basics.errors import ModelError, SerpentailError
 from ..building.build import built
 from ..building.examples import tables_of_scene
-from ..checks import refusal, shown
-from ..errors import ModelError, SerpentailError
 from ..model.load import load, model_from
 from ..model.manifest import read_manifest
 from ..model.model import Model

@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..checks import Refusals, needed
-from ..errors import IdentificationError
+from ..basics.checks import Refusals, needed
+from ..basics.errors import IdentificationError
 from ..identification.identify import identify
 from ..identification.placement import Marker
 from ..identification.readers import read_markers

@@ -10,8 +10,8 @@ from typing import Any
 
 from serpentail_scene.units import dimensions, in_unit
 
-from ..checks import Refusals, needed, none_of, shown
-from ..magnitudes import warn_of_unusual
+from ..basics.checks import Refusals, needed, none_of, shown
+from ..basics.plausible_values import warn_of_unusual
 
 
 @dataclass(frozen=True)

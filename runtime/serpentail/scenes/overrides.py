@@ -6,8 +6,8 @@ from typing import Any
 
 from serpentail_scene.source import tables_in
 
-from ..checks import one_line, shown
-from ..errors import SimulationError
+from ..basics.checks import one_line, shown
+from ..basics.errors import SimulationError
 
 DEEPEST = 8  # names in a path
 PLACE = re.compile("[0-9]{1,9}")  # in an array

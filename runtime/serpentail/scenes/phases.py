@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..checks import Refusals, needed, shown
-from ..errors import SimulationError
+from ..basics.checks import Refusals, needed, shown
+from ..basics.errors import SimulationError
 from ..model.model import Model
 from ..sequence.phase import Phase, Tracking
 from ..simulation.controllers import Controller

@@ -6,9 +6,9 @@ from typing import Any
 
 from serpentail_scene.units import in_unit
 
-from .. import extras
-from ..checks import Refusals, needed, refusal, shown
-from ..errors import PlanningError
+from ..basics import extras
+from ..basics.checks import Refusals, needed, refusal, shown
+from ..basics.errors import PlanningError
 from ..model.model import Model
 from ..planning.goal import Bounds, Goal
 from ..planning.planner import plan

@@ -7,9 +7,9 @@ from typing import Any, overload
 
 import numpy as np
 
-from ..brief import brief
-from ..checks import Refusals, did_you_mean, none_of, number, shown
-from ..errors import SimulationError
+from ..basics.checks import Refusals, did_you_mean, none_of, number, shown
+from ..basics.errors import SimulationError
+from ..basics.short_repr import brief
 from ..model.model import Model
 from ..motion.summary import Summary, summary
 from ..motion.trajectory import Trajectory

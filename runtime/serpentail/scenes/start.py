@@ -7,8 +7,8 @@ import numpy as np
 
 from serpentail_scene.layout import OMEGA, VELOCITY
 
-from ..checks import finite_array, number, refusal
-from ..errors import SimulationError
+from ..basics.checks import finite_array, number, refusal
+from ..basics.errors import SimulationError
 from ..model.model import Model
 from ..simulation.schedules import shared_among_links
 from ..simulation.settle import check_settling

@@ -6,7 +6,7 @@ import numpy as np
 
 from serpentail_scene.layout import QUATERNION, TAIL_Q
 
-from ..errors import SimulationError
+from ..basics.errors import SimulationError
 from ..model.model import Model
 from ..planning.goal import Goal
 from ..planning.result.full_state import com_at_start

@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from ..checks import number, refusal
-from ..errors import SimulationError
+from ..basics.checks import number, refusal
+from ..basics.errors import SimulationError
 from ..model.model import Model
 from ..simulation.controllers import parts_of
 from .phase import Phase

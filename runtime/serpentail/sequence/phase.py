@@ -4,9 +4,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..brief import brief
-from ..checks import none_of, number, refusal
-from ..errors import SimulationError
+from ..basics.checks import none_of, number, refusal
+from ..basics.errors import SimulationError
+from ..basics.short_repr import brief
 from ..model.model import Model
 from ..simulation.controllers import CHOICES, Controller, Phases
 from ..simulation.ground import KINDS

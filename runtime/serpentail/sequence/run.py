@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from ..brief import brief
-from ..errors import PlanningError, SimulationError
+from ..basics.errors import PlanningError, SimulationError
+from ..basics.short_repr import brief
 from ..motion.derived import AGAIN
 from ..motion.joined import joined, joined_again
 from ..motion.trajectory import Trajectory

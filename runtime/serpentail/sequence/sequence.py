@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..brief import brief
-from ..checks import number, refusal
-from ..errors import PlanningError, SimulationError
+from ..basics.checks import number, refusal
+from ..basics.errors import PlanningError, SimulationError
+from ..basics.short_repr import brief
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
+from ..mpc.mpc import Mpc
 from ..planning.planner import plan as planned
-from ..planning.predictive.mpc import Mpc
 from ..planning.problem import checked_goal
 from ..planning.result.plan import Plan
 from ..simulation.controllers import Controller, Phases

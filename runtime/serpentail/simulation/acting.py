@@ -4,7 +4,7 @@ import ctypes
 
 import numpy as np
 
-from ..errors import SimulationError
+from ..basics.errors import SimulationError
 from ..model.model import Model
 from .actuation import Actuation
 from .controllers import Controller, controllers_of

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import numbers_in, refusal
-from ..errors import SimulationError
+from ..basics.checks import numbers_in, refusal
+from ..basics.errors import SimulationError
 from ..model.model import Model
 from .controllers import Controller, NativeTorque, parts_of, phases_of
 from .ctrl_c import CtrlC

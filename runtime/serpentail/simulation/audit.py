@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..brief import brief
+from ..basics.short_repr import brief
 from ..model.model import Model
 from ..model.parameters import total_mass
 

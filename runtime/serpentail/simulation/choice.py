@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import number, shown
-from ..errors import ModelError, SimulationError
+from ..basics.checks import number, shown
+from ..basics.errors import ModelError, SimulationError
 from ..model.model import Model
 from ..model.parameters import RunParameters
 from .acting import Acting

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import SimulationError
-from ..magnitudes import LARGEST
-from ..model.kept import kept
+from ..basics.errors import SimulationError
+from ..basics.plausible_values import LARGEST
 from ..model.kernel import address_of, aligned
+from ..model.lazy import kept
 from ..model.library import PAUSED, STEP_TOO_SMALL, STOPPED_AT_EVENT, TOO_MANY_STEPS, WHY
 from ..model.model import Model
 from ..model.parameters import RunParameters

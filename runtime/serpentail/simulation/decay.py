@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..errors import StateError
+from ..basics.errors import StateError
 from ..model.kernel import RunKernel
 from ..model.parameters import RunParameters, Values
 from .acting import Acting

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array, refusal
-from ..errors import SimulationError
+from ..basics.checks import finite_array, refusal
+from ..basics.errors import SimulationError
 from ..model.kernel import RunKernel
 from ..model.model import Model
 from ..model.parameters import RunParameters, total_mass

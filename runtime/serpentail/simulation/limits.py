@@ -3,7 +3,7 @@
 import math
 import os
 
-from ..errors import SimulationError
+from ..basics.errors import SimulationError
 from ..model.model import Model
 
 MOST_STEPS = 1e9  # of one run: hours

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import SimulationError, StateError
+from ..basics.errors import SimulationError, StateError
 from ..model.model import Model
 from ..model.passive import behind_stops, stored_energy
 from ..motion.origin import origin

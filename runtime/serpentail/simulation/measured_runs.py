@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import SimulationError, StateError
+from ..basics.errors import SimulationError, StateError
+from ..compiling.threads import in_turn
 from ..model.kernel import RunKernel
 from ..model.passive import stored_energy
-from ..model.workers import in_turn
 from ..motion.trajectory import Trajectory
 from .audit import BALANCED, Audit, Between, allowance, audited, warnings_of
 from .compiled_run import Memory

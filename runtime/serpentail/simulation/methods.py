@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import number, one_of
-from ..errors import SimulationError
+from ..basics.checks import number, one_of
+from ..basics.errors import SimulationError
 
 FIXED = ("rk4", "implicit_euler")
 ADAPTIVE = ("tsit5", "ros34pw2", "switching")

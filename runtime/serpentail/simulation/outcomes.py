@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import SimulationError
+from ..basics.errors import SimulationError
 from .compiled_run import COUNTS, Memory, Outcome
 
 

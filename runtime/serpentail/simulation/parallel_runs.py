@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import SimulationError
-from ..model.cores import threads as allowed
+from ..basics.errors import SimulationError
+from ..basics.progress import Stage
+from ..compiling.cores import threads as allowed
+from ..compiling.threads import in_turn
 from ..model.library import PAUSED
-from ..model.workers import in_turn
 from ..motion.derived import made
-from ..stages import Stage
 from .acting import Acting
 from .adaptive_runs import AdaptiveRuns, adaptive_in_lanes
 from .batched_runs import BatchedRuns, shared_steps, worth_batching

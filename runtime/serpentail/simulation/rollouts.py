@@ -8,7 +8,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from ..errors import SimulationError, ViewError
+from ..basics.errors import SimulationError, ViewError
 from ..model.model import Model
 from ..model.parameters import RunParameters
 from ..motion.account import arrays_of, framed, how_made, tail_of
@@ -152,7 +152,7 @@ class Rollouts(Exports):
         SimulationError
             The run failed before its first sample.
         """
-        from ..viewer.view import view
+        from ..show.page.view import view
 
         numbers = [k] if isinstance(k, int | np.integer) else k
         if not isinstance(numbers, Sequence) or any(n not in range(len(self)) for n in numbers):
@@ -162,7 +162,7 @@ class Rollouts(Exports):
 
     def _repr_html_(self) -> str:
         """Text and page of the first runs, for notebooks."""
-        from ..viewer.notebook import in_notebook
+        from ..show.page.notebook import in_notebook
 
         begun = [k for k, e in enumerate(self.errors) if e is None or e.trajectory is not None]
         begun = begun[:SHOWN]

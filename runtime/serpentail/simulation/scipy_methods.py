@@ -7,7 +7,7 @@ import numpy as np
 
 from serpentail_scene.layout import QUATERNION
 
-from ..errors import SimulationError
+from ..basics.errors import SimulationError
 from ..model.library import NOT_FINITE
 from .compiled_run import CompiledRun, Samples, failed
 from .methods import IntegrationMethod

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import number, refusal
-from ..errors import SimulationError, StateError
+from ..basics.checks import number, refusal
+from ..basics.errors import SimulationError, StateError
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
 from .controllers import Controller

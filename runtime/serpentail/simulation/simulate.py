@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import SimulationError
-from ..magnitudes import warn_of_degrees
-from ..model.cores import checked_threads
+from ..basics.errors import SimulationError
+from ..basics.plausible_values import warn_of_degrees
+from ..basics.progress import Stage
+from ..compiling.cores import checked_threads
 from ..model.model import Model
 from ..motion.derived import AGAIN
 from ..motion.trajectory import Trajectory
-from ..stages import Stage
 from .acting import Acting
 from .choice import prepared, still_chosen
 from .compiled_run import CompiledRun, Memory, Samples

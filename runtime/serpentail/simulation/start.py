@@ -8,9 +8,9 @@ from numpy.typing import ArrayLike
 
 from serpentail_scene.layout import QUATERNION
 
-from ..checks import finite_array, number, real_array, refusal, refuse_not_finite
-from ..errors import SimulationError, StateError
-from ..model.kept import kept
+from ..basics.checks import finite_array, number, real_array, refusal, refuse_not_finite
+from ..basics.errors import SimulationError, StateError
+from ..model.lazy import kept
 from ..model.model import Model
 from .limits import refuse_overfull
 

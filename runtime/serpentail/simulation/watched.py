@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import refusal
-from ..errors import SimulationError, StateError
+from ..basics.checks import refusal
+from ..basics.errors import SimulationError, StateError
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
 from .compiled_run import Samples

@@ -6,7 +6,7 @@ import numpy as np
 
 from serpentail_scene.layout import OMEGA, QUATERNION, TAIL_V
 
-from ..attitude import quaternion_rate
+from ..basics.attitude import quaternion_rate
 from ..model.model import Model
 from .derivative_laws import along
 from .errors import relative, sensitivity

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from serpentail_scene.layout import OMEGA, TAIL_V, VELOCITY
 
-from ..attitude import pose_of
+from ..basics.attitude import pose_of
 from ..model.model import Model
 from ..model.parameters import total_mass
 from .states import State, outputs

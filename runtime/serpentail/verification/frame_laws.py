@@ -9,7 +9,7 @@ import numpy as np
 
 from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TORSO_NV, VELOCITY
 
-from ..attitude import pose_of, product, rotation_matrix
+from ..basics.attitude import pose_of, product, rotation_matrix
 from ..model.model import Model
 from ..model.parameters import total_mass
 from .errors import (

@@ -9,8 +9,8 @@ import numpy as np
 
 from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, VELOCITY
 
-from ..attitude import product
-from ..errors import UnusualSize
+from ..basics.attitude import product
+from ..basics.errors import UnusualSize
 from ..model.model import Model
 from ..model.passive import idle
 from .errors import rounding

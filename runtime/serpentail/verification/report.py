@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import ExtraMissing, SerpentailError
-from ..extras import needed
+from ..basics.errors import ExtraMissing, SerpentailError
+from ..basics.extras import needed
 from ..model.model import Model
 from ..model.passive import PARTS, idle
 from . import (

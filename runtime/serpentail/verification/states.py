@@ -8,7 +8,7 @@ import numpy as np
 
 from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, Layout
 
-from ..errors import ModelError
+from ..basics.errors import ModelError
 from ..model.model import Model
 from ..model.parameters import total_mass
 

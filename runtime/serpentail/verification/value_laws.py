@@ -6,7 +6,7 @@ import numpy as np
 
 from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_V, VELOCITY
 
-from ..attitude import rotation_matrix
+from ..basics.attitude import rotation_matrix
 from ..model.model import Model
 from ..model.parameters import total_mass
 from ..model.passive import PARTS

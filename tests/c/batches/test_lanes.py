@@ -21,7 +21,7 @@ from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.passes.batch import batched as widened
 from serpentail_codegen.passes.batch import unrolled_step
-from serpentail_codegen.passes.directions import directions_in_turn, places_lanes
+from serpentail_codegen.passes.narrow_directions import directions_in_turn, places_lanes
 from serpentail_codegen.targets.c.batch import BATCHED, STATES
 from tests.support import zoo
 from tests.support.models import folder_of

@@ -9,7 +9,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from serpentail.model.compiler import compile_library
+from serpentail.compiling.compiler import compile_library
 from serpentail_codegen.ir.interpret import Numbers
 from tests.support.rows import row
 

@@ -9,9 +9,10 @@ import time
 import pytest
 
 import serpentail as st
-from serpentail import cli
-from serpentail.model import bound, compiler
-from serpentail.model.cache import publish
+from serpentail.cli.cli import cli
+from serpentail.compiling import cache_limit as bound
+from serpentail.compiling import compiler
+from serpentail.compiling.cache import publish
 from tests.support.file_faults import HOUR, age
 
 from ...support.rows import row
@@ -81,7 +82,7 @@ def test_c_library_processor_and_version_reach_the_key(model, monkeypatch, scrip
     build()
     monkeypatch.setattr(os, "confstr", lambda name: asked.append(name) or "glibc 2.99")
     build()
-    monkeypatch.setattr("serpentail.model.toolchain._processor", lambda: "lake")
+    monkeypatch.setattr("serpentail.compiling.toolchain._processor", lambda: "lake")
     build(target="-march= lake")
     shutil.rmtree(places[2])  # or the note of the old version would do
     build(target="-march= lake", version="mycc 2")

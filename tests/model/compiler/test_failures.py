@@ -16,8 +16,8 @@ import filelock
 import pytest
 
 import serpentail as st
-from serpentail.model import compiler, locks, toolchain
-from serpentail.model.cache import cache_folder
+from serpentail.compiling import compiler, locks, toolchain
+from serpentail.compiling.cache import cache_folder
 from serpentail.model.manifest import read_folder
 from serpentail.model.snapshot import model_library
 from tests.support import zoo

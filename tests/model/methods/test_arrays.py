@@ -147,7 +147,7 @@ def test_what_gives_no_finite_result_is_named_with_its_place(model):
                 refuse(model, name, batch, rf"the quaternion .*{place}\] of state 6 {words}")
 
 
-@pytest.mark.filterwarnings("ignore::serpentail.errors.UnusualSize")
+@pytest.mark.filterwarnings("ignore::serpentail.basics.errors.UnusualSize")
 def test_indefinite_inertia_is_named():
     """A tail so long that H overflows."""
     with pytest.warns(st.UnlikeBodies, match="factor of inf"):

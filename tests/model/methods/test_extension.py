@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.model import calls, kernel
-from serpentail.model.toolchain import candidates
+from serpentail.compiling.toolchain import candidates
+from serpentail.model import fast_call as calls
+from serpentail.model import kernel
 from tests.support import zoo
 
 from ...support.rows import row

@@ -2,9 +2,9 @@
 
 from ...autodiff.forward import tangent_program
 from ...ir.program import Array
+from ..differentiable import FUNCTIONS
 from ..draft import Draft
 from ..function import Function, assemble
-from ..plain import FUNCTIONS
 from ..tail import struct_parameters
 from .differentiated import CORE
 from .jacobians import forward_dynamics_first, minus

@@ -8,7 +8,8 @@ from serpentail_scene.layout import OMEGA, TORSO_NV, VELOCITY
 from ...autodiff.forward import tangent_program
 from ...autodiff.reverse import adjoint_program
 from ...ir.program import Array, Ref
-from ...mechanics import rotations, turns
+from ...mechanics import rotation_derivatives as turns
+from ...mechanics import rotations
 from ..draft import Draft
 from ..function import Function, assemble
 from ..layout import block

@@ -10,13 +10,14 @@ from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, VELOCITY
 from ...autodiff.forward import tangent_program
 from ...autodiff.reverse import adjoint_program
 from ...ir.program import Array, Index, Ref
-from ...mechanics import rotations, torso, translation, turns
+from ...mechanics import rotation_derivatives as turns
+from ...mechanics import rotations, torso, translation
+from ..differentiable import FUNCTIONS
 from ..draft import Draft
 from ..dynamics import assemble_forward_dynamics
 from ..factored import FactoredDynamics, Loads
 from ..function import assemble
 from ..layout import block, tail_v
-from ..plain import FUNCTIONS
 from ..scope import State, Vectors
 from ..sweeps.pieces import attitude
 from .by_segments import derivatives_by_segments

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from serpentail_scene.layout import VELOCITY
 
 from ...ir.program import Array, Ref
-from ...mechanics import torso, turns
+from ...mechanics import rotation_derivatives as turns
+from ...mechanics import torso
 from ..draft import Draft
 from ..layout import block
 from ..scope import State, Vectors

@@ -10,7 +10,7 @@ from contextlib import AbstractContextManager, contextmanager
 
 from ...ir.program import Index, Ref
 from ...mechanics import mount, rotations, torso
-from ...scene.shape import Stretch
+from ...scene.variant import Stretch
 from ..draft import Draft
 from ..scope import Pose, State
 from ..tails.mechanism import Mechanism

@@ -5,7 +5,7 @@ from fractions import Fraction
 
 from ...ir.program import Array, Ref
 from ...mechanics import airborne_power, link
-from ...scene.shape import Run
+from ...scene.variant import Run
 from ..draft import Draft
 from ..scope import Instead, Motion, State, Vectors
 from .mechanism import Mechanism, Place, Segments, simplified

@@ -11,7 +11,7 @@ from ...functions.tail import Tail
 from ...ir.cost import applied, branches, executed
 from ...ir.program import Program
 from ...passes.batch import batched, unrolled_step, with_own_parameters
-from ...passes.directions import directions_in_turn, has_directions
+from ...passes.narrow_directions import directions_in_turn, has_directions
 from ...passes.unrolled_ldl import unrolled_ldl
 from ...scene.scene import Scene
 from ..templating import render

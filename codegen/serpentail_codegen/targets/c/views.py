@@ -10,7 +10,7 @@ from serpentail_scene.signatures.arguments import FACTORS, Argument
 from ...functions.tail import Tail, struct_parameters
 from ...ir.program import Program
 from ...ir.tape import operation_count
-from ...passes.fused import AFTER
+from ...passes.fuse_steps import AFTER
 from ...scene.scene import Scene
 from .form import PrintedFunction, values
 from .routine import CFunction, Routine, routine_arguments, routine_lines

@@ -2,7 +2,7 @@
 
 from numpy.typing import ArrayLike
 
-from ...errors import StateError
+from ...basics.errors import StateError
 from .evaluated import Array, Evaluated
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import finite_array
-from ...errors import StateError
+from ...basics.checks import finite_array
+from ...basics.errors import StateError
 from .evaluated import Array, Evaluated
 
 

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from serpentail_scene.layout import Layout
 
-from ...errors import ModelError
-from ..kept import kept
+from ...basics.errors import ModelError
 from ..kernel import Kernel
+from ..lazy import kept
 
 Array = NDArray[Any]  # of doubles, or of floats if the scene asks for them
 

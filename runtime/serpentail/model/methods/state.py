@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import finite_array
+from ...basics.checks import finite_array
 from ..state_space import jacobians, q_dot, split
 from .dynamics import DynamicsMethods
 from .evaluated import Array

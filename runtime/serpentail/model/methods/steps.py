@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from numpy.typing import ArrayLike
 
-from ..kept import kept
+from ..lazy import kept
 from .evaluated import Array, Evaluated
 
 if TYPE_CHECKING:

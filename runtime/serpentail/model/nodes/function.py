@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 import casadi
 import numpy as np
 
-from ..cache import cache_folder, workshop
-from ..compiler import compile_library
-from ..cores import threads
+from ...compiling.cache import cache_folder, workshop
+from ...compiling.compiler import compile_library
+from ...compiling.cores import threads
 from .record import BATCHES, INPUTS, KINDS, PARTS, Nodes, Ports
 
 if TYPE_CHECKING:

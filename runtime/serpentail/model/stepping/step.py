@@ -11,12 +11,20 @@ from numpy.typing import ArrayLike
 
 from serpentail_scene.layout import QUATERNION
 
-from ...checks import none_of, number, one_of, real_array, refusal, refuse_not_finite, whole_number
-from ...errors import SimulationError, StateError
-from ..cores import checked_threads
+from ...basics.checks import (
+    none_of,
+    number,
+    one_of,
+    real_array,
+    refusal,
+    refuse_not_finite,
+    whole_number,
+)
+from ...basics.errors import SimulationError, StateError
+from ...compiling.cores import checked_threads
+from ...compiling.threads import MIN_STATES_PER_THREAD, shared
 from ..library import WHY
 from ..parameters import RunParameters
-from ..workers import MIN_STATES_PER_THREAD, shared
 from .held import Held
 from .lanes import GroundLaneSteps, LaneSteps
 from .singly import SingleSteps

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ...checks import shown
-from ...errors import CompilerNotFound, PlanningError
-from ...model.compiler import compile_library, opened
+from ...basics.checks import shown
+from ...basics.errors import CompilerNotFound, PlanningError
+from ...compiling.compiler import compile_library, opened
 from ..nlp.interrupt import stop_reason
 from ..nlp.solver import Solution
 from .helpers import crew_of, helped

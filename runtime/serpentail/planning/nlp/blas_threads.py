@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 
-from ...model.workers import after_fork
+from ...compiling.threads import after_fork
 
 
 @cache

@@ -9,7 +9,7 @@ import numpy as np
 
 from serpentail_scene.layout import POSITION
 
-from ...attitude import pitch_roll_yaw
+from ...basics.attitude import pitch_roll_yaw
 from ..goal import Goal
 from ..problem import PlanningProblem
 from .coordinates import Attitude

@@ -10,8 +10,14 @@ import numpy as np
 
 from serpentail_scene.layout import QUATERNION
 
-from ...attitude import from_angles, pitch_roll_yaw, product, quaternion_rate, sign_continuous
-from ...errors import PlanningError
+from ...basics.attitude import (
+    from_angles,
+    pitch_roll_yaw,
+    product,
+    quaternion_rate,
+    sign_continuous,
+)
+from ...basics.errors import PlanningError
 
 if TYPE_CHECKING:
     import casadi as ca

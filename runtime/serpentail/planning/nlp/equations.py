@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ...errors import ModelError, PlanningError
+from ...basics.errors import ModelError, PlanningError
 from ...model.model import Model
 from ..design import Design
 from .body import function_of_design

@@ -8,8 +8,8 @@ import numpy as np
 
 from serpentail_scene.layout import OMEGA, POSITION, TAIL_Q, TAIL_V, VELOCITY
 
-from ...attitude import rotation_matrix
-from ...errors import SimulationError
+from ...basics.attitude import rotation_matrix
+from ...basics.errors import SimulationError
 from ...model.model import Model
 from ...model.parameters import total_mass
 from ...motion.trajectory import Trajectory

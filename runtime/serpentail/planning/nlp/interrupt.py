@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import SimpleNamespace
 
-from ...model.workers import after_fork
+from ...compiling.threads import after_fork
 from .fork_gate import let_forks_pass
 
 # Ctrl-C for all threads: its count, the thread that receives it, and the handler before

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...brief import brief
+from ...basics.short_repr import brief
 from .rules import CollocationRule
 
 MOST_PIECES = 4  # an interval is split into at a time

@@ -11,7 +11,7 @@ import numpy as np
 
 from serpentail_scene.layout import OMEGA, TAIL_V, VELOCITY
 
-from ...model.kept import kept
+from ...model.lazy import kept
 from ...model.model import Model
 from ...model.parameters import total_mass
 from ..design import Design, refuse_unused

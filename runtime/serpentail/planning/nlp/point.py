@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...checks import did_you_mean, needed
-from ...errors import PlanningError
+from ...basics.checks import did_you_mean, needed
+from ...basics.errors import PlanningError
 from ...model.model import Model
 from .body import Body
 from .coordinates import COM_ENTRIES, IDENTITY_POSE, rotated

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.polynomial import Legendre, Polynomial
 from numpy.typing import ArrayLike
 
-from ...brief import brief
-from ...checks import shown
-from ...errors import PlanningError
+from ...basics.checks import shown
+from ...basics.errors import PlanningError
+from ...basics.short_repr import brief
 
 # name -> default degree
 FAMILIES = {"trapezoidal": 1, "hermite-simpson": 2, "lobatto": 3, "radau": 3}

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...brief import brief
-from ...checks import did_you_mean, shown
-from ...errors import PlanningError
+from ...basics.checks import did_you_mean, shown
+from ...basics.errors import PlanningError
+from ...basics.short_repr import brief
 from .blas_threads import one_thread
 from .bounds import Limits
 from .cache import memoised

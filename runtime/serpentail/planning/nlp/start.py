@@ -12,7 +12,7 @@ import numpy as np
 
 from serpentail_scene.layout import OMEGA, VELOCITY
 
-from ...model.kept import kept
+from ...model.lazy import kept
 from ...model.model import Model
 from .body import Body
 from .coordinates import COM_ENTRIES, IDENTITY_POSE, Attitude, rotated

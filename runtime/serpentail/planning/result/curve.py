@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...brief import brief
+from ...basics.short_repr import brief
 from ..nlp.program import Program
 from ..nlp.rules import CollocationRule
 

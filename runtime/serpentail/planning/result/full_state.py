@@ -8,7 +8,7 @@ import numpy as np
 
 from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, TORSO_NV, VELOCITY
 
-from ...attitude import rotation_matrix
+from ...basics.attitude import rotation_matrix
 from ...model.model import Model
 from ..nlp.coordinates import COM_ENTRIES, IDENTITY_POSE, Attitude
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from serpentail_scene.layout import TAIL_V
 
-from ...errors import SimulationError
+from ...basics.errors import SimulationError
 from ...model.model import Model
 from ...motion.account import UNITS, framed, tail_of
 from ...motion.origin import origin
@@ -137,7 +137,7 @@ class Plan:
         ViewError, ModelError
             As of ``view``.
         """
-        from ...viewer.view import view
+        from ...show.page.view import view
 
         own = self.trajectory.model if self.trajectory.model is not None else model
         motions = self._motions(own)
@@ -145,7 +145,7 @@ class Plan:
 
     def _repr_html_(self) -> str:
         """Text and page, for notebooks."""
-        from ...viewer.notebook import in_notebook
+        from ...show.page.notebook import in_notebook
 
         return in_notebook(self, lambda: self._motions(self.trajectory.model), SHOWN)
 

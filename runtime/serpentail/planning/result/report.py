@@ -6,8 +6,8 @@ import numpy as np
 
 from serpentail_scene.layout import POSITION, QUATERNION
 
-from ...attitude import pitch_roll_yaw
-from ...errors import SimulationError
+from ...basics.attitude import pitch_roll_yaw
+from ...basics.errors import SimulationError
 from ...model.model import Model
 from ...motion.trajectory import Trajectory
 from ...simulation.pfl import Pfl

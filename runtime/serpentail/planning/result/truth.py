@@ -7,8 +7,8 @@ import numpy as np
 
 from serpentail_scene.layout import OMEGA, QUATERNION, TAIL_Q, TAIL_V
 
-from ...attitude import angle_deg, tilt_deg
-from ...errors import SimulationError
+from ...basics.attitude import angle_deg, tilt_deg
+from ...basics.errors import SimulationError
 from ...model.model import Model
 from ...motion.resample import smooth
 from ...simulation.controllers import TorqueCurve

@@ -1,0 +1,1 @@
+"""Other tools and formats; no other room imports them."""

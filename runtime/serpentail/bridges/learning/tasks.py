@@ -1,0 +1,144 @@
+"""The tasks of environments: the starts of episodes, and what a model needs for them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from serpentail_scene.layout import OMEGA, QUATERNION
+
+from ...basics.attitude import from_angles
+from ...basics.checks import measured, number, numbers_in, whole_number
+from ...basics.errors import ModelError, SimulationError
+from ...model.model import Model
+
+Array = np.ndarray
+MOST_SUBSTEPS = 1000
+LEG_ANGLES = np.radians([210.0, -40.0])  # gamma and delta of both legs, all the time
+ABOVE = 1e-3  # m: how far the lowest point of an animal that lies begins above the ground
+UNITS = {  # of settings, which may be texts with units
+    "torque": "N m", "step": "s", "duration": "s", "angle": "rad",
+    "tilt": "rad", "spin": "rad/s", "height": "m",
+}  # fmt: skip
+DRAWS = 5  # numbers in [0, 1) that a start takes
+
+
+@dataclass(frozen=True)
+class Task:
+    """One kind of episode: contacts that it needs, its start, and settings by default."""
+
+    name: str
+    contacts: tuple[str, ...]  # none: it flies all the time
+    start: Callable[["Task", Model, dict[str, float], Array], tuple[Array, Array]]
+    settings: dict[str, float]
+
+    def checked(self, model: Model, given: dict[str, Any]) -> dict[str, Any]:
+        """Return all settings; SimulationError or ModelError names what is wrong."""
+        missing = [group for group in self.contacts if group not in model.contacts]
+        if missing or (model.contacts and not self.contacts):
+            needs = ", ".join(map(repr, self.contacts)) or "none, because it is a flight"
+            has = ", ".join(map(repr, model.contacts)) or "none"
+            raise ModelError(
+                f"{self.name}: {model.name} has contacts {has}: needs {needs}: build it with "
+                f"contacts={list(self.contacts)}, or change `contacts` of the scene"
+            )
+        settings: dict[str, Any] = {"angle": float(np.pi / np.max(model.joints_each))}
+        settings |= self.settings
+        unknown = [name for name in given if name not in settings]
+        if unknown:
+            raise SimulationError(
+                f"{self.name} has no setting {', '.join(map(repr, unknown))}; it has "
+                f"{', '.join(settings)}"
+            )
+        settings |= given
+        for name in (name for name in given if name in UNITS):
+            settings[name] = measured(name, given[name], UNITS[name], SimulationError)
+        for name in ("torque", "step", "duration", "angle"):
+            settings[name] = number(name, settings[name], SimulationError, above=0)
+        for name, most in (("tilt", np.pi), ("spin", np.inf), ("height", np.inf)):
+            if name in settings:
+                settings[name] = _up_to(name, settings[name], most)
+        settings["substeps"] = whole_number(
+            "substeps", settings["substeps"], SimulationError, least=1, most=MOST_SUBSTEPS
+        )
+        return settings
+
+
+def _up_to(name: str, value: Any, most: float) -> float:
+    """Return a setting from 0 to the largest one; of an angle, the error names radians."""
+    try:
+        return number(name, value, SimulationError, least=0, most=most)
+    except SimulationError as error:
+        given = numbers_in(value)
+        if UNITS[name] != "rad" or given is None or given.shape != ():
+            raise
+        remedy = f', or "{given:g} deg"' if most < given <= np.degrees(most) else ""
+        raise SimulationError(f"{error} rad{remedy}") from None
+
+
+def thrown(
+    task: Task, model: Model, settings: dict[str, float], draws: Array
+) -> tuple[Array, Array]:
+    """Return states (k, nq), (k, nv) in the air, tilted and spinning as drawn."""
+    q, v = _at_rest(model, len(draws))
+    q[:, 2] = settings["height"]
+    # a tilt about a horizontal axis, and a spin about any
+    tilt, axis = settings["tilt"] * draws[:, 0], 2 * np.pi * draws[:, 1]
+    q[:, QUATERNION] = np.stack(
+        [np.cos(tilt / 2), *(np.sin(tilt / 2) * (np.cos(axis), np.sin(axis))), 0 * tilt], axis=1
+    )
+    z, angle = 2 * draws[:, 2] - 1, 2 * np.pi * draws[:, 3]
+    level = np.sqrt(1 - z * z)
+    way = np.stack([level * np.cos(angle), level * np.sin(angle), z], axis=1)
+    v[:, OMEGA] = settings["spin"] * draws[:, 4:] * way
+    return q, v
+
+
+def lying(
+    task: Task, model: Model, settings: dict[str, float], draws: Array
+) -> tuple[Array, Array]:
+    """Return states (k, nq), (k, nv) at rest on the back, rolled aside and pitched as drawn."""
+    q, v = _at_rest(model, len(draws))
+    angles = np.zeros((len(draws), 3))  # pitch, roll, yaw
+    angles[:, 0] = settings["tilt"] / 3 * (2 * draws[:, 0] - 1)
+    angles[:, 1] = np.pi + settings["tilt"] * (2 * draws[:, 1] - 1)
+    q[:, QUATERNION] = from_angles(angles)
+    points, _ = model.contact_points(q, v, standing_legs())
+    q[:, 2] = ABOVE - points[..., 2].min(axis=1)
+    return q, v
+
+
+def _at_rest(model: Model, count: int) -> tuple[Array, Array]:
+    """Return upright states without motion."""
+    q, v = np.zeros((count, model.nq)), np.zeros((count, model.nv))
+    q[:, QUATERNION.start] = 1
+    return q, v
+
+
+def standing_legs() -> Array:
+    """Return legs (8,) that stand still: angles of both (rad), and their rates."""
+    return np.concatenate([LEG_ANGLES, LEG_ANGLES, np.zeros(4)])
+
+
+# s, N m, rad, rad/s, m: of a kangaroo rat.  step: of the integrator, of which an action has several
+FLIGHT = {"torque": 0.02, "step": 1e-3, "substeps": 5}
+GROUND = {"torque": 0.02, "step": 2e-4, "substeps": 25}
+TASKS = {
+    task.name: task
+    for task in (
+        Task(
+            "righting",
+            (),
+            thrown,
+            FLIGHT | {"duration": 0.5, "tilt": np.pi / 2, "spin": 0.0, "height": 0.3},
+        ),
+        Task(
+            "landing",
+            ("feet",),
+            thrown,
+            GROUND | {"duration": 0.8, "tilt": np.pi / 3, "spin": 0.0, "height": 0.4},
+        ),
+        Task("self_recovery", ("feet", "torso"), lying, GROUND | {"duration": 1.5, "tilt": 0.3}),
+    )
+}

@@ -1,0 +1,226 @@
+"""One axis of a sweep: a grid of values, or numbers that are spread between bounds."""
+
+import json
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from serpentail_scene.units import MEASURES, in_unit
+
+from ...basics.checks import finite_array, measured, one_of, refusal, shown
+from ...basics.errors import SweepError
+
+LAWS = ("uniform", "log")
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Values that a sweep takes one after another; ``grid`` makes it."""
+
+    values: tuple[Any, ...]
+
+    def measured(self, field: str, unit: str | Sequence[str] | None) -> "Grid":
+        """Return it with texts such as "2 g" as numbers in a unit; None: in SI."""
+        return Grid(tuple(in_units(field, value, unit) for value in self.values))
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Numbers between two bounds, of any shape; ``random``, ``latin`` and ``sobol`` make it.
+
+    given: the bounds as the caller wrote them.
+    """
+
+    way: str
+    low: np.ndarray
+    high: np.ndarray
+    law: str
+    given: tuple[Any, Any]
+
+    def measured(self, field: str, unit: str | Sequence[str] | None) -> "Spread":
+        """Return it with bounds such as "2 g" as numbers in a unit; None: in SI."""
+        low, high = (in_units(field, bound, unit) for bound in self.given)
+        return replace(_spread(self.way, low, high, self.law), given=self.given)
+
+    def at(self, unit: np.ndarray) -> np.ndarray:
+        """Return the numbers (k, ...) at places (k, size) from 0 to 1 between the bounds."""
+        places = unit.reshape(-1, *self.low.shape)
+        if self.law == "log":
+            return np.exp(np.log(self.low) + places * (np.log(self.high) - np.log(self.low)))
+        return self.low + places * (self.high - self.low)
+
+
+def grid(values: Any) -> Grid:
+    """Make an axis of a sweep that takes each of some values.
+
+    Several grids give all their combinations. A grid may set several names at once; then each
+    value has one entry for each name.
+
+    Parameters
+    ----------
+    values : sequence
+        Numbers, texts with units such as "2 g", other texts, arrays, or tables. A text that gives
+        a number for a parameter or a key is converted to SI by the sweep.
+
+    Returns
+    -------
+    Grid
+        The axis.
+
+    Raises
+    ------
+    SweepError
+        There are no values, or one is not plain data.
+
+    Examples
+    --------
+    >>> import serpentail as st
+    >>> over = {"tail_mass": st.grid(["2 g", 0.003])}
+    >>> over = {("segments", "links"): st.grid([(1, 6), (2, 3)])}
+    """
+    if isinstance(values, str | Mapping) or not hasattr(values, "__iter__"):
+        raise refusal("grid", values, "a list of values", SweepError)
+    found = tuple(plain("grid", value) for value in values)
+    if not found:
+        raise SweepError("grid: no values: needs one or more")
+    return Grid(found)
+
+
+def random(low: Any, high: Any, law: str = "uniform") -> Spread:
+    """Make an axis of independent random numbers between two bounds.
+
+    The number of points and their seed are arguments of ``sweep``. All axes made by ``random``,
+    ``latin`` or ``sobol`` together give these points, which are combined with all grids.
+
+    Parameters
+    ----------
+    low, high : float, str or array_like
+        Bounds, in SI or as text with a unit.
+    law : {"uniform", "log"}, default "uniform"
+        "log" draws logarithms uniformly, of numbers above 0.
+
+    Returns
+    -------
+    Spread
+        The axis.
+
+    Raises
+    ------
+    SweepError
+        The bounds or the law are wrong.
+    """
+    return _spread("random", low, high, law)
+
+
+def latin(low: Any, high: Any, law: str = "uniform") -> Spread:
+    """Make an axis whose points are a Latin hypercube: each of k equal parts has one point.
+
+    Another number of points gives other points.
+
+    Parameters
+    ----------
+    low, high : float, str or array_like
+        As of ``random``.
+    law : {"uniform", "log"}, default "uniform"
+        As of ``random``.
+
+    Returns
+    -------
+    Spread
+        The axis.
+
+    Raises
+    ------
+    SweepError
+        The bounds or the law are wrong.
+    """
+    return _spread("latin", low, high, law)
+
+
+def sobol(low: Any, high: Any, law: str = "uniform") -> Spread:
+    """Make an axis whose points are a scrambled Sobol sequence, even in all axes together.
+
+    The number of points should be a power of two. scipy.stats.qmc.Sobol makes the points.
+
+    Parameters
+    ----------
+    low, high : float, str or array_like
+        As of ``random``.
+    law : {"uniform", "log"}, default "uniform"
+        As of ``random``.
+
+    Returns
+    -------
+    Spread
+        The axis.
+
+    Raises
+    ------
+    SweepError
+        The bounds or the law are wrong.
+    """
+    return _spread("sobol", low, high, law)
+
+
+def _spread(way: str, low: Any, high: Any, law: str) -> Spread:
+    lows, highs = (
+        finite_array(f"{way}: {name}", in_units(f"{way}: {name}", x), SweepError)
+        for name, x in (("low", low), ("high", high))
+    )
+    one_of(f"{way}: law", law, LAWS, SweepError)
+    if lows.shape != highs.shape:
+        raise SweepError(
+            f"{way}: low is {lows.shape}, high is {highs.shape}: needs bounds of one shape"
+        )
+    if (lows > highs).any() or (law == "log" and (lows <= 0).any()):
+        least = "above 0 and " if law == "log" else ""
+        raise refusal(
+            f"{way}: low", low, f"numbers {least}not above high, {shown(high)}", SweepError
+        )
+    return Spread(way, lows, highs, law, (low, high))
+
+
+def plain(field: str, value: Any) -> Any:
+    """Return a value as JSON represents it: numbers, texts, lists and tables."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    try:
+        return json.loads(json.dumps(value, allow_nan=False, default=_listed))
+    except (TypeError, ValueError) as reason:
+        raise SweepError(
+            f"{field}: value {shown(value)}: needs numbers, texts, lists or tables ({reason})"
+        ) from None
+
+
+def as_json(value: Any) -> str:
+    """Return plain data as JSON, the same text for the same data."""
+    return _ENCODER.encode(value)
+
+
+_ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"))
+
+
+def in_units(field: str, value: Any, unit: str | Sequence[str] | None = None) -> Any:
+    """Return a value with each text such as "2 g", also in lists, as a number in a unit.
+
+    None stands for SI, whatever the text measures.
+    """
+    if unit is not None:
+        return measured(field, value, unit, SweepError)
+    if isinstance(value, list | tuple):
+        return [in_units(field, each) for each in value]
+    if not isinstance(value, str):
+        return value
+    for each in MEASURES:
+        with suppress(ValueError):
+            return in_unit(value, each)
+    raise refusal(field, value, "a unit that a scene may have, such as g, cm or deg", SweepError)
+
+
+def _listed(value: Any) -> Any:
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    raise TypeError(f"{type(value).__name__} is none of these")

@@ -1,0 +1,238 @@
+"""``Sweep``: the rows of a sweep, from its store."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import islice
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...basics.checks import one_line
+from ...basics.errors import SweepError
+from ...basics.short_repr import brief
+from .axes import Axes, checked_row
+from .driver import Spent
+from .groups import Posed
+from .shards import AT_ONCE, Row
+from .store import Store
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+
+@dataclass(frozen=True)
+class Status:
+    """How far a sweep is: points in all, points with rows, and points whose run failed."""
+
+    points: int
+    done: int
+    failed: int
+
+    def __str__(self) -> str:
+        left = self.points - self.done
+        return (
+            f"{self.done} of {self.points} points done, {self.failed} of them failed, {left} left"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """The rows of a sweep; ``sweep[k]`` is the row of point k, and ``len(sweep)`` their number.
+
+    A row is a dict of the point's values and the run's outputs. Rows are read when they are asked
+    for: ``for row in sweep`` holds some thousands of them at a time, ``rows()`` all.
+
+    Attributes
+    ----------
+    posed : Posed
+        The checked axes, job and models.
+    store : Store
+        Where the rows are kept.
+    spent : Spent
+        What this call took: ``wall_s`` and ``busy_s`` (s, of all workers), ``blocks``, ``points``,
+        ``workers``, and ``hung``: the number of points that were given up without a row.
+    """
+
+    posed: Posed = field(repr=False)
+    store: Store = field(repr=False)
+    spent: Spent
+    __repr__ = brief
+
+    @property
+    def axes(self) -> Axes:
+        """Return the axes of the sweep, in SI."""
+        return self.posed.axes
+
+    def __len__(self) -> int:
+        return len(self.axes)
+
+    def __getitem__(self, k: int) -> dict[str, Any]:
+        """Return the row of point k; KeyError if it has none yet, IndexError if k is no point."""
+        found = self.store.row(range(len(self))[k])
+        if found is None:
+            raise KeyError(f"point {k} has no row yet")
+        return self._row(found, self.axes.at([found.number])[0])
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        """Yield all rows that exist, in the order of their points."""
+        rows = self.store.rows()
+        while some := list(islice(rows, AT_ONCE)):
+            points = self.axes.at([row.number for row in some])
+            yield from map(self._row, some, points)
+
+    @staticmethod
+    def _row(row: Row, point: dict[str, Any]) -> dict[str, Any]:
+        """Return a stored row as a dict; SweepError if it is damaged."""
+        try:
+            outcome = {} if row.outcome is None else json.loads(row.outcome)
+            told = {"error": row.error, "seconds": row.seconds}
+            return {"number": row.number} | point | outcome | told
+        except (RecursionError, TypeError, ValueError) as reason:
+            raise SweepError(
+                f"store: the row of point {row.number} is damaged ({one_line(str(reason))}): "
+                "restore a copy, or name another folder"
+            ) from None
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return all rows that exist, in the order of their points.
+
+        Returns
+        -------
+        list of dict
+            Each has "number", the point's values, the run's outputs, "error" (None for success) and
+            "seconds" (s).
+        """
+        return list(self)
+
+    def status(self) -> Status:
+        """Return how far the sweep is, from the store's present content.
+
+        Returns
+        -------
+        Status
+            ``points``, ``done`` and ``failed``.
+        """
+        self.store.look()
+        return Status(len(self), int(self.store.done.sum()), self.store.failed)
+
+    def motion(self, k: int) -> Any:
+        """Run a point again and return its motion.
+
+        Parameters
+        ----------
+        k : int
+            Number of the point, from 0.
+
+        Returns
+        -------
+        Trajectory, Plan or Identification
+            The motion; of a function, what it returned as "motion".
+
+        Raises
+        ------
+        SweepError
+            There is no such point, or the function returned no motion.
+        SerpentailError
+            What the run raises.
+        """
+        from .bundles import model_of
+        from .runs import run_point
+
+        number, job = [checked_row(k, len(self))], self.posed.job
+        bundle = self.posed.bundles[self.posed.models(np.array(number))[0]]
+        _, motion = run_point(job, model_of(bundle, job), self.axes.at(number)[0])
+        if motion is None:
+            raise SweepError(
+                f"point {k}: its run returned no motion: let the function return it as "
+                '"motion", besides its outputs'
+            )
+        return motion
+
+    def view(self, k: int, path: str | PathLike[str] = "run.html") -> Path:
+        """Run a point again and write a page of its motion.
+
+        Parameters
+        ----------
+        k : int
+            Number of the point, from 0.
+        path : str or path, default "run.html"
+            The .html file.
+
+        Returns
+        -------
+        Path
+            The path of the file.
+
+        Raises
+        ------
+        SweepError, ViewError
+            As of ``motion`` and ``serpentail.view``.
+        """
+        page: Path = self.motion(k).view(path)
+        return page
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """Convert the rows to a pandas table with one row for each point; needs the extra "pandas".
+
+        Returns
+        -------
+        pandas.DataFrame
+            The table.
+
+        Raises
+        ------
+        ExtraMissing
+            pandas is not installed.
+        """
+        from .tables import frame
+
+        return frame(self)
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Convert the rows to an xarray dataset; needs the extra "xarray".
+
+        Returns
+        -------
+        xarray.Dataset
+            It has a dimension for each grid, and "sample" for all other axes together. Points that
+            failed or have no row are NaN.
+
+        Raises
+        ------
+        ExtraMissing
+            xarray is not installed.
+        """
+        from .tables import dataset
+
+        return dataset(self)
+
+    def save(self, path: str | PathLike[str]) -> Path:
+        """Write the rows to a file, whole or not at all. A .nc file is made in memory, others are
+        not.
+
+        Parameters
+        ----------
+        path : str or path
+            A .parquet, .csv or .nc file.
+
+        Returns
+        -------
+        Path
+            The path of the file.
+
+        Raises
+        ------
+        SweepError
+            The suffix is another one.
+        ExtraMissing
+            The library for this file is not installed.
+        NotWritten
+            The file cannot be written.
+        """
+        from .tables import write
+
+        return write(self, path)

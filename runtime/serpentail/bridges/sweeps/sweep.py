@@ -1,0 +1,200 @@
+"""``sweep``: makes many runs, keeps each as a row of a store, and resumes where it was stopped."""
+
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from ...basics.checks import none_of, number, refusal, shown
+from ...basics.errors import SweepError
+from ...model.model import Model
+from .axes import axes_of
+from .axis import Grid, Spread, plain
+from .blocks import Missing
+from .driver import Driver, Group, Spent
+from .groups import pose
+from .job import RUNS, STARTS, Job
+from .result import Sweep
+from .store import Store
+from .supervision import importing
+
+WITHOUT = ("watch", "threads", "parameters")  # settings of a run that a sweep has itself
+
+
+def sweep(  # noqa: PLR0913 - the public face names all that it takes
+    model: Model | str | PathLike[str] | None,
+    over: Mapping[Any, Grid | Spread],
+    run: str | Callable[..., Mapping[str, Any]] = "simulate",
+    *,
+    store: str | PathLike[str] | None = None,
+    points: int | None = None,
+    seed: int = 0,
+    settings: Mapping[str, Any] | None = None,
+    outputs: Sequence[str] | None = None,
+    limit: float | None = None,
+    executor: Any = None,
+    of: Any = None,
+    retry_failed: bool = False,
+) -> Sweep:
+    """Run a model at many points; keep a row of each, and resume where a call was stopped.
+
+    Parameters
+    ----------
+    model : Model, str, path or None
+        A model; a scene file or an example's name; None for a function of points alone.
+    over : mapping
+        Axes by name; see ``grid``, ``random``, ``latin``, ``sobol``. A name is a parameter; with
+        a scene also a key of its table, such as "start.pitch" or "duration", or of its model,
+        such as "segments" and "links"; with a model also "q0", "v0" or a setting.
+    run : {"simulate", "plan", "identify"} or callable, default "simulate"
+        What to run. A function f(model, point) or f(point) of a module returns a dict of plain
+        data. It may add its Trajectory or Plan as "motion", for pages.
+    store : str or path, optional
+        Folder for the rows, in Parquet files; needs the extra "parquet". Default: in memory. A
+        second call with the same model, run and points runs only what is missing. Workers that see
+        the folder, also on other machines, write into it; others send their rows to this process.
+    points : int, optional
+        Number of points of the axes made by ``random``, ``latin`` or ``sobol``.
+    seed : int, default 0
+        Seed of these points.
+    settings : mapping, optional
+        Further arguments of ``simulate``, ``plan`` or ``identify``. With a model they include
+        "q0" and "v0", or "data" (files of marker tracks) and "markers".
+    outputs : sequence of str, optional
+        Outputs of "simulate": "end_s", "q_end", "v_end", "kinetic_end_J", "potential_end_J"
+        (together the default), or names of ``summary``. The outputs of "plan" and "identify" are
+        their reports.
+    limit : float, optional
+        Processor time that a point may take (s). A point fails if it takes more, if its run raises
+        an error, or if its process ends. A point that takes less than a tenth of it in ten times
+        the limit on the clock hangs: it gets no row, so that the next call runs it again.
+    executor : str or concurrent.futures.Executor, optional
+        Where the points run: "processes", "processes:4", "dask" (a cluster on this machine),
+        "dask:ADDRESS", "dask:FILE.json", or an executor. They are sent in blocks of one
+        second of work or more. Default: worker processes, but flights without a limit run in this
+        process for the first 3 s.
+    of : plain data, optional
+        What else the rows of a function depend on, such as its version.
+    retry_failed : bool, default False
+        Whether to run failed points again.
+
+    Returns
+    -------
+    Sweep
+        The rows.
+
+    Raises
+    ------
+    SweepError
+        An argument is wrong, or the worker processes are gone.
+    NotWritten
+        The store cannot be written.
+    ModelError, ExtraMissing
+        A model cannot be made, or a library is not installed. Failures of single points do not
+        raise errors; they are rows.
+
+    Examples
+    --------
+    >>> import serpentail as st
+    >>> over = {"tail_mass": st.grid(["2 g", "3 g"]), "start.pitch": st.random(-1.0, 1.0)}
+    >>> sweep = st.sweep("kick", over, points=8, store="kick.rows")  # doctest: +SKIP
+    >>> sweep.to_pandas()  # doctest: +SKIP
+    """
+    if importing.is_set():
+        raise SweepError(
+            "the main program calls sweep where a worker imports its functions: put the call below "
+            'the line if __name__ == "__main__":'
+        )
+    found = posed(
+        model, over, run, store, points=points, seed=seed, settings=settings, outputs=outputs, of=of
+    )
+    limit = None if limit is None else number("limit", limit, SweepError, above=0)
+    own, store_ = found.posed, found.store
+    with store_.writing():
+        if retry_failed:
+            store_.forget()
+        groups = [
+            Group(bundle, Missing(store_.done, own.models, k))
+            for k, bundle in enumerate(own.bundles)
+        ]
+        name = model.name if isinstance(model, Model) else Path(model or _function(run)).stem
+        script = _script(own.job.pickled())
+        driver = Driver(store_, own.axes, own.job, groups, limit, script, name, found.spent)
+        driver.drive(executor)
+    return found
+
+
+def posed(model: Any, over: Any, run: Any, store: Any, **rest: Any) -> Sweep:
+    """Return a sweep with checked points; ``status`` finds the rows of its store. Run nothing."""
+    names = ("points", "settings", "outputs", "of")
+    points, settings, outputs, of = (rest.get(name) for name in names)
+    if isinstance(run, str):
+        wrong = none_of("run", run, RUNS)
+        if wrong:
+            raise SweepError(f"{wrong}, or a function")
+    axes = axes_of(over, points, rest.get("seed", 0))
+    own = _settings(settings, run)
+    job = Job(run, own, _outputs(outputs, run))
+    job.identity()  # refuses functions that other processes cannot import
+    job.pickled()
+    found = pose(model, axes, job, of)
+    return Sweep(found, Store(store, found.spec, len(found.axes)), Spent())
+
+
+def _settings(settings: Any, run: Any) -> dict[str, Any]:
+    """Return the settings of a run."""
+    if not isinstance(settings, Mapping | None):
+        raise refusal("settings", settings, "a table of arguments by name", SweepError)
+    own = dict(settings or {})
+    if own and not isinstance(run, str):
+        raise SweepError("settings: a function has none: pass what it needs by functools.partial")
+    for name in WITHOUT:
+        if name in own:
+            raise SweepError(f"settings: {name}: is set by the sweep: leave it out")
+    for name in STARTS:
+        if name in own:
+            own[name] = plain(f"settings: {name}", own[name])
+    return own
+
+
+def _outputs(outputs: Any, run: Any) -> tuple[str, ...]:
+    """Return the names of the outputs of a simulation; none for other runs."""
+    from .runs import ENDS, OUTPUTS
+
+    if run != "simulate":
+        if outputs is not None:
+            raise SweepError(
+                f"outputs: value {shown(outputs)}: only run='simulate' has a choice: leave it out"
+            )
+        return ()
+    if outputs is None:
+        return ENDS
+    if isinstance(outputs, str) or not isinstance(outputs, Sequence) or not outputs:
+        raise refusal("outputs", outputs, "a list of names", SweepError)
+    for name in outputs:
+        wrong = none_of("outputs", name, OUTPUTS)
+        if wrong:
+            raise SweepError(wrong)
+    return tuple(outputs)
+
+
+def _function(run: Any) -> str:
+    """Return the name of a function."""
+    while isinstance(run, partial):
+        run = run.func
+    return str(getattr(run, "__name__", type(run).__name__))
+
+
+def _script(data: bytes) -> str | None:
+    """Return the path of the main program if a pickled job has functions of it, else None."""
+    if b"__main__" not in data:
+        return None
+    script = getattr(sys.modules["__main__"], "__file__", None)
+    if script is None:
+        raise SweepError(
+            "run: a function of an interactive session: write it to a module that other processes "
+            "can import"
+        )
+    return str(Path(script).absolute())

@@ -1,0 +1,174 @@
+"""Looks for markers that were swapped, or that fit worse than the others."""
+
+import warnings
+from collections.abc import Collection, Sequence
+from itertools import combinations
+
+import numpy as np
+
+from serpentail_scene.layout import TAIL_Q
+
+from ..basics.attitude import REST
+from ..basics.errors import DoubtfulMarkers, IdentificationError
+from ..model.model import Model
+from .placement import Placements
+from .points import world_points
+from .start import fitted
+from .tracks import UNITS, MarkerTracks
+
+FRAMES = 3  # at which every exchange of two markers is tried
+ALWAYS = 0.8  # of the frames: a swap in more of them is one throughout
+LOOSE = 0.01  # of the tail's length: swaps are checked for larger misfits
+HALF = 0.5  # of the misfit that must be left once a swap is undone
+CLEAR = 8.0  # times the usual residual that a swapped marker is off
+WORSE = 4.0  # a marker is reported if its residual is so many times the others'
+SMALL = 1e-3  # of the markers' extent: smaller residuals are not reported
+FEWEST = 3  # markers that are seen at once
+RIGID, BENDABLE = 2.0, 5.0  # factors of distances on a torso, and on a body with its tail
+ALIKE = 1.5  # factor within which a unit explains distances
+
+
+def refuse_too_few(placed: Placements, tracks: MarkerTracks, nq: int) -> None:
+    """IdentificationError if no frame shows enough markers that are not on a line."""
+    seen = tracks.seen.sum(axis=1)
+    best = int(seen.argmax())
+    if seen[best] >= FEWEST:
+        here = tracks.positions[best, tracks.seen[best]]
+        spread = np.linalg.svd(here - here.mean(axis=0), compute_uv=False)
+        if spread[1] > 1e-3 * spread[0]:
+            return
+    raise IdentificationError(
+        f"data: too few markers: {tracks.source} shows at most {seen[best]} at once"
+        f"{', on a line' if seen[best] >= FEWEST else ''}: a configuration has {nq - 1} numbers; "
+        "it needs three markers or more that are not on a line, some of them on the tail"
+    )
+
+
+def refuse_scale(
+    model: Model, placed: Placements, tracks: MarkerTracks, moving: Collection[int] = ()
+) -> None:
+    """IdentificationError if markers are apart by another order of magnitude than their places.
+
+    Those on the torso are compared, the median of all pairs and frames; if there are too few, all
+    markers with a straight tail. moving: markers whose places are estimated.
+    """
+    straight = np.concatenate([REST, np.zeros(model.layout.nt)])
+    body = world_points(model, placed, straight[None])[0]
+    held = np.array([k not in moving for k in range(len(body))])
+    for use, most in ((held & placed.on_torso, RIGID), (held, BENDABLE)):
+        pairs = [*combinations(np.flatnonzero(use), 2)]
+        ratios = [
+            np.linalg.norm(tracks.positions[:, a] - tracks.positions[:, b], axis=1) / apart
+            for a, b in pairs
+            if (apart := np.linalg.norm(body[a] - body[b])) > 0
+        ]
+        if np.isfinite(ratios).any():
+            ratio = float(np.nanmedian(ratios))
+            if not 1 / most < ratio < most:
+                raise IdentificationError(_of_scale(tracks, ratio))
+            return
+
+
+def _of_scale(tracks: MarkerTracks, ratio: float) -> str:
+    """Return in words that positions are too large or too small, and the unit that would fit."""
+    right = {name: float(value / UNITS[tracks.unit]) * ratio for name, value in UNITS.items()}
+    unit = min(right, key=lambda name: abs(np.log(right[name])))
+    remedy = f"check the unit {tracks.unit!r}"
+    if abs(np.log(right[unit])) < np.log(ALIKE):
+        remedy = f'they look like {unit} read as {tracks.unit}: give unit="{unit}"'
+    return (
+        f"data: {tracks.source}: markers are {ratio:.4g} times as far apart as their places: "
+        f"{remedy}, or check the places, which are in m"
+    )
+
+
+def tell_of_swaps(
+    model: Model, placed: Placements, tracks: MarkerTracks, q: np.ndarray
+) -> tuple[int, ...]:
+    """Warn of two markers whose exchange makes frames fit much better; return them."""
+    rows = np.flatnonzero(tracks.seen.sum(axis=1) == tracks.seen.sum(axis=1).max())
+    positions = tracks.positions[rows]
+    misfits = fitted(model, placed, positions, q[rows])[1]
+    loose = np.flatnonzero(misfits >= LOOSE * float(model.parameters["tail_length"]))
+    if not len(loose):
+        return ()
+
+    def exchanged(pairs: Sequence[tuple[int, ...]], some: np.ndarray) -> np.ndarray:
+        changed = np.stack([positions[some]] * len(pairs))
+        for k, pair in enumerate(pairs):
+            changed[k][:, pair] = positions[some][:, pair[::-1]]
+        straight = q[rows[some]]
+        straight[:, TAIL_Q] = 0
+        begin = np.concatenate([q[rows[some]]] * len(pairs) + [straight] * len(pairs))
+        both = np.tile(changed.reshape(-1, *positions.shape[1:]), (2, 1, 1))
+        return fitted(model, placed, both, begin)[1].reshape(2, len(pairs), -1).min(axis=0)
+
+    # the pair that mends some frames best, and then how many it mends
+    few = loose[np.linspace(0, len(loose) - 1, min(FRAMES, len(loose))).astype(int)]
+    pairs = [*combinations(range(len(tracks.names)), 2)]
+    best = pairs[int(np.median(exchanged(pairs, few), axis=1).argmin())]
+    (after,) = exchanged([best], loose)
+    swapped = loose[after < HALF * misfits[loose]]
+    if len(swapped) <= len(loose) / 2:
+        return ()
+    where = "throughout"
+    if len(swapped) < ALWAYS * len(rows):
+        first, last = tracks.times[rows[swapped[[0, -1]]]]
+        where = f"in {len(swapped)} frames from {first:g} to {last:g} s"
+    names = [tracks.names[k] for k in best]
+    _tell(
+        f"{tracks.source}: markers {names[0]!r} and {names[1]!r} look swapped {where}: with them "
+        f"exchanged these frames fit to {1e3 * np.median(after):.3g} mm in place of "
+        f"{1e3 * np.median(misfits[loose]):.3g} mm"
+    )
+    return best
+
+
+def tell_of_residuals(
+    tracks: MarkerTracks, modelled: np.ndarray, missing: bool = False, swapped: tuple[int, ...] = ()
+) -> None:
+    """Warn of markers that look swapped in some frames, and of torques or markers that fit badly.
+
+    modelled (F, M, 3): positions of the markers by the fit; missing: residuals look as where
+    torques are missing, so that no marker is to blame; swapped: markers of which it is known.
+    """
+    off = np.linalg.norm(tracks.positions - modelled, axis=2)
+    usual, told = float(np.nanmedian(off)), set(swapped)
+    for a, b in combinations(range(len(tracks.names)), 2):
+        crossed = np.hypot(
+            np.linalg.norm(tracks.positions[:, a] - modelled[:, b], axis=1),
+            np.linalg.norm(tracks.positions[:, b] - modelled[:, a], axis=1),
+        )
+        own = np.hypot(off[:, a], off[:, b])
+        rows = np.flatnonzero((crossed < HALF * own) & (own > CLEAR * usual))
+        if len(rows) and not told >= {a, b}:
+            told |= {a, b}
+            first, last = tracks.times[rows[[0, -1]]]
+            _tell(
+                f"{tracks.source}: markers {tracks.names[a]!r} and {tracks.names[b]!r} look "
+                f"swapped in {len(rows)} frames from {first:g} to {last:g} s: exchange them"
+            )
+    rms = np.sqrt(np.nanmean(off**2, axis=0))
+    extent = float(np.linalg.norm(np.ptp(modelled, axis=1), axis=-1).max())
+    if missing and not told and rms.max() > SMALL * extent:
+        worst = int(rms.argmax())
+        _tell(
+            f"{tracks.source}: residuals change smoothly over time and grow to the tip, to "
+            f"{1e3 * rms[worst]:.3g} mm at {tracks.names[worst]!r}, as where torques are missing: "
+            "if joints are driven give torques, or give torques=st.TorquePrior(std, time); if not, "
+            "estimate stiffness and damping"
+        )
+        return
+    for k, name in enumerate(tracks.names):
+        others = np.median(np.delete(rms, k)) if len(rms) > 1 else np.inf
+        if k not in told and rms[k] > max(WORSE * others, SMALL * extent):
+            _tell(
+                f"{tracks.source}: marker {name!r} is off by {1e3 * rms[k]:.3g} mm, others by "
+                f"{1e3 * others:.3g} mm: check its name and its placement, or estimate "
+                f'"marker:{name}"'
+            )
+
+
+def _tell(words: str) -> None:
+    """Issue a warning at the line that calls ``identify``."""
+    warnings.warn(words, DoubtfulMarkers, stacklevel=5)

@@ -1,0 +1,179 @@
+"""What cannot be true of an animal in a motion: parts in the ground or in each other, blows, bends.
+
+Found in the samples when somebody asks, never while a run is simulated.
+"""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from serpentail_scene.layout import PER_SEGMENT, POSITION, QUATERNION
+
+from ..basics.attitude import Array, rotation_matrix
+from ..basics.errors import StateError
+from ..model.model import Model
+from ..model.parameters import total_mass
+from .body import semi_axes, weight
+from .forces import peaks
+from .tail_in_torso import sunk
+
+if TYPE_CHECKING:
+    from .trajectory import Trajectory
+
+DEEP = 0.1  # of the torso's length, below the ground: as deep as a torso rests in it by contact
+SUNK = 0.1  # of the way from the torso's centre to its surface
+# Body weights, kg: of a triple jumper's leg, Perttunen et al., J. Sports Sci. 18 (2000) 363.
+# Bodies of one shape bear, at equal stress, forces like mass^(2/3): body weights like mass^(-1/3).
+BORNE, BEARER = 15.2, 75.0
+# rad, of a segment: beyond half a turn its end points back into it, and plans may go just so far
+MOST_BEND = 1.02 * np.pi
+DEGREES = 4 * np.pi  # rad, of a segment: two whole turns; degrees are the likely cause
+KNEES = 3  # hip, D and knee come first in a leg, and are no contacts
+AT_ONCE = 4096  # samples
+
+Moment = tuple[float, float]  # value, time (s)
+Measure = Callable[[slice], Array]  # samples -> (K,)
+
+
+def warnings_of(model: Model | None, motion: "Trajectory") -> list[str]:
+    """Return the doubts about a motion: what does not balance, then what no animal can do.
+
+    Without a model the latter are those found before the motion was saved or pickled.
+    """
+    books: list[str] = motion.info.get("warnings", [])
+    found = motion.info.get("doubts", []) if model is None else doubts(model, motion)
+    return [*books, *found]
+
+
+def doubts(model: Model, motion: "Trajectory") -> list[str]:
+    """Return a sentence with value, time and remedy for everything that no animal can do.
+
+    Checks of tail or legs need the functions ``tail_points`` and ``leg_points`` of the scene.
+    """
+    with np.errstate(all="ignore"):  # of a run that blows up
+        return [
+            *_in_the_ground(model, motion),
+            *_through_the_torso(model, motion),
+            *_blows(model, motion),
+            *_bends(model, motion),
+        ]
+
+
+def _in_the_ground(model: Model, motion: "Trajectory") -> list[str]:
+    """Return parts that are deep in the ground, because the scene gives them no contact."""
+    if motion.contact is None:
+        return []
+    allowed, told = DEEP * 2 * float(semi_axes(model).max()), []
+    for part, (depth, time) in _depths(model, motion).items():
+        if depth > allowed:
+            remedy = f'add "{part}" to `contacts` of the scene'
+            if part == "legs":
+                remedy = "above the ankle they touch nothing: start higher, or bend the legs less"
+            told.append(
+                f"{part}: {1e3 * depth:.3g} mm below the ground at t = {time:.4g} s, more than "
+                f"{1e3 * allowed:.3g} mm, and no contact there: {remedy}"
+            )
+    return told
+
+
+def _depths(model: Model, motion: "Trajectory") -> dict[str, Moment]:
+    """Return the largest depth (m) of each part without contact, and its time."""
+    contact = motion.contact
+    assert contact is not None
+    q, axes, depths = motion.q, semi_axes(model), {}
+    if "torso" not in contact.groups:
+        depths["torso"] = _largest(motion, lambda rows: _depth_of_torso(q[rows], axes))
+    if "tail" not in contact.groups and "tail_points" in model.kernels:
+        depths["tail"] = _largest(
+            motion, lambda rows: -model.tail_points(q[rows])[..., 2].min(axis=1)
+        )
+    legs = contact.legs
+    if legs is not None and "leg_points" in model.kernels:
+        depths["legs"] = _largest(
+            motion,
+            lambda rows: -model.leg_points(q[rows], legs[rows])[..., :KNEES, 2].min(axis=(1, 2)),
+        )
+    return depths
+
+
+def _depth_of_torso(q: Array, axes: Array) -> Array:
+    """Depth (K,) in m of the lowest point of the torso's ellipsoid."""
+    up = rotation_matrix(q[:, QUATERNION])[:, 2]
+    return np.linalg.norm(axes * up, axis=1) - q[:, 2]
+
+
+def _through_the_torso(model: Model, motion: "Trajectory") -> list[str]:
+    """A tail that bends into the torso, or comes back into it."""
+    axes = semi_axes(model)
+    if "tail_points" not in model.kernels or not axes.all():
+        return []
+
+    def depth(rows: slice) -> Array:
+        q = motion.q[rows]
+        from_b = model.tail_points(q) - q[:, None, POSITION]
+        return sunk(np.einsum("kij,kpi->kpj", rotation_matrix(q[:, QUATERNION]), from_b) / axes)
+
+    deepest, time = _largest(motion, depth)
+    if not deepest > SUNK:
+        return []
+    return [
+        f"tail: goes through the torso at t = {time:.4g} s, {deepest:.2g} of the way from its "
+        f"surface to its centre too deep, more than {SUNK}: bend the tail less, or damp it more"
+    ]
+
+
+def _blows(model: Model, motion: "Trajectory") -> list[str]:
+    """A force of the ground that no legs of the animal's size bear."""
+    found, whole = peaks(motion), weight(model)
+    if not found or not whole:
+        return []
+    force, time = found["all"]
+    most = BORNE * (BEARER / float(total_mass(model.parameters))) ** (1 / 3)
+    if not force > most * whole:
+        return []
+    return [
+        f"ground: pushes with {force:.4g} N at t = {time:.4g} s, {force / whole:.3g} body weights, "
+        f"more than {most:.3g}, which legs of this size bear: let the legs move, or the animal "
+        "land, more slowly, or make the ground softer by K_n and D_n"
+    ]
+
+
+def _bends(model: Model, motion: "Trajectory") -> list[str]:
+    """Segments that are bent by clearly more than half a turn."""
+    bends = _bend(model, motion.tail)
+    told = []
+    for segment, k in enumerate(bends.argmax(axis=0)):
+        if bends[k, segment] > MOST_BEND:
+            remedy = "damp it more, or give its reference smaller bends"
+            if bends[k, segment] > DEGREES:
+                remedy = "are degrees given in place of radians (np.radians)? If not, damp it more"
+            told.append(
+                f"tail: segment {segment + 1} is bent by {bends[k, segment]:.3g} rad at t = "
+                f"{motion.t[k]:.4g} s, more than {MOST_BEND:.3g}: {remedy}"
+            )
+    return told
+
+
+def _bend(model: Model, tail: Array) -> Array:
+    """How far the segments are bent, (K, m), rad: of joints the larger of pitch and yaw."""
+    first, second = (tail[:, k::PER_SEGMENT] for k in range(PER_SEGMENT))
+    of_joints = model.joints_each * np.maximum(np.abs(first), np.abs(second))
+    if model.kind == "articulated":
+        return of_joints
+    if model.manifest["scene"]["coordinates"] == "polar":
+        return np.abs(second)
+    jointed = np.array(model.kinds) == "articulated"
+    return np.where(jointed, of_joints, np.hypot(first, second))
+
+
+def _largest(motion: "Trajectory", measure: Measure) -> Moment:
+    """The largest value of a measure of samples, and its time; some samples at once."""
+    try:
+        values = np.concatenate(
+            [measure(slice(k, k + AT_ONCE)) for k in range(0, len(motion.t), AT_ONCE)]
+        )
+    except StateError:  # a run that blows up has points that no number holds
+        return -np.inf, float(motion.t[0])
+    k = int(values.argmax())
+    return float(values[k]), float(motion.t[k])

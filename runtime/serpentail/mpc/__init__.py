@@ -1,0 +1,1 @@
+"""Predictive control in C: corrects a plan at each tick."""

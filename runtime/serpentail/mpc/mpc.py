@@ -1,0 +1,250 @@
+"""``Mpc``: a controller that corrects the rest of a planned flight at each tick."""
+
+import ctypes
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from serpentail_scene.layout import TAIL_V
+
+from ..basics.checks import refusal
+from ..basics.errors import SimulationError
+from ..model.kernel import aligned
+from ..model.model import Model
+from ..planning.result.plan import Plan
+from ..simulation.controllers import NativeTorque
+from ..simulation.parts import OwnState, Parts
+from .emission import write_c
+from .kernel import Simulation, kernel
+from .settings import checked_settings, refuse_unable
+from .task import MpcTask, task_of
+
+RATE = 100.0  # Hz
+COUNTS = ("ticks", "failed", "set_changes")
+
+
+class Mpc:
+    """Model-predictive control of a planned flight: a controller for ``simulate``.
+
+    At each tick it measures the state and computes a correction of the plan's torques by one
+    Gauss-Newton step. The correction is constant in each of some intervals, stays within the
+    plan's torque bounds, and brings the end nearest to the plan's goal. The motion until the new
+    torques act is predicted. A tick that fails, for instance because the state is not finite,
+    changes nothing.
+
+    Parameters
+    ----------
+    model : Model
+        The model that the controller uses; it needs "airborne_rates",
+        "airborne_rates_derivatives" and "momentum", computes with double, and has a free base.
+    plan : Plan
+        The plan, with ``attitude="quaternion"``.
+    rate : float, default 100
+        Rate of the ticks (Hz).
+    horizon : float, optional
+        How far each tick looks ahead (s), at most to the plan's end. A horizon that ends earlier
+        aims at the plan's state of that time. Default: to the plan's end.
+    intervals : int, default 6
+        Number of intervals of the correction.
+    delay : float, default 0
+        Time from a tick until its torques act (s), at most the time between ticks.
+    iterations : int, default 1
+        Number of Gauss-Newton steps at a tick.
+    step : float, default 0.005
+        Longest Runge-Kutta step of the prediction (s).
+    rest : float, optional
+        Time before the plan's end without ticks (s). Default: the time between two ticks.
+
+    Raises
+    ------
+    PlanningError
+        The model, the plan or a setting is wrong.
+    ModelError
+        The base is fixed.
+
+    Notes
+    -----
+    Called with (t, q, v), t (s) from the plan's start, it returns the torques (2m,) (N m), and
+    takes q and v as measured if a tick is due. In simulations each run has its own memory. After
+    the plan's end only the plan's damping acts.
+
+    Examples
+    --------
+    >>> mpc = st.Mpc(model, plan, rate=200)  # doctest: +SKIP
+    >>> motion = st.simulate(other, q0, v0, controller=mpc, t_span=plan.duration)  # doctest: +SKIP
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        plan: Plan,
+        *,
+        rate: float = RATE,
+        horizon: float | None = None,
+        **settings: Any,
+    ):
+        refuse_unable(model, plan)
+        given = {"rate": rate, "horizon": horizon} | settings
+        self.model, self.plan = model, plan
+        self.settings = checked_settings(plan, given)
+        self.task = task_of(model, plan, self.settings)
+        self._own = Memory(self.task)
+
+    def __repr__(self) -> str:
+        """Model, rate, horizon and intervals."""
+        rate, ahead = self.settings.rate, self.task.numbers["horizon"]
+        return f"Mpc({self.model.name}, {rate:g} Hz, {ahead:.4g} s in {self.settings.intervals})"
+
+    @property
+    def info(self) -> dict[str, int]:
+        """Counts since ``begin``: ticks, failed ticks, and changes of active sets.
+
+        They count calls of this object only; a simulation's counts are in its ``info["mpc"]``.
+        """
+        return self._own.info()
+
+    @property
+    def memory_size(self) -> int:
+        """Number of doubles of its workspace."""
+        return len(self._own.memory)
+
+    def begin(self) -> None:
+        """Forget all ticks."""
+        self._own.begin()
+
+    def tick(self, t: float, q: Any, v: Any) -> bool:
+        """Compute a correction from a measured state.
+
+        Parameters
+        ----------
+        t : float
+            Time of the measurement (s).
+        q : array_like, shape (nq,)
+            Configuration.
+        v : array_like, shape (nv,)
+            Velocity.
+
+        Returns
+        -------
+        bool
+            False if the tick failed and changed nothing.
+        """
+        return self._own.tick(float(t), *self._state(q, v))
+
+    def torque(self, t: float) -> np.ndarray:
+        """Evaluate the corrected torques, without damping.
+
+        Parameters
+        ----------
+        t : float
+            Time (s).
+
+        Returns
+        -------
+        ndarray, shape (2m,)
+            Torques (N m).
+        """
+        return self._own.torque(float(t))
+
+    def __call__(self, t: float, q: Any, v: Any) -> np.ndarray:
+        """Return tau (2m,), N m; compute a correction if a tick is due."""
+        q, v = self._state(q, v)
+        return self._own.control(float(t), q, v) - self.plan.problem.damping * v[TAIL_V]
+
+    def parts(self, nt: int) -> Parts:
+        """Return its parts in a run, with that run's own memory."""
+        if nt != self.model.layout.nt:
+            needs = f"a model of {self.model.layout.nt} tail coordinates, as the controller's"
+            raise refusal("Mpc: tail coordinates", nt, needs, SimulationError)
+        memory = Memory(self.task)
+        native = NativeTorque(kernel().mpc_simulated, ctypes.addressof(memory.run))
+        own = OwnState(memory.begin_run, lambda: {"mpc": memory.info()}, lambda *_: self.stops())
+        return Parts(np.full(nt, self.plan.problem.damping), native=native, own=own)
+
+    def write_c(self, folder: str | PathLike[str] = ".") -> list[Path]:
+        """Write the controller and its plan as C99.
+
+        The files need the model's generated C, allocate nothing, and compute what this object does;
+        the header describes how to call them.
+
+        Parameters
+        ----------
+        folder : str or path, default "."
+            The folder; a missing one is made.
+
+        Returns
+        -------
+        list of Path
+            Paths of ``<model>_mpc.h`` and ``<model>_mpc.c``.
+
+        Raises
+        ------
+        PlanningError
+            ``folder`` is no path.
+        NotWritten
+            The system refuses the folder or a file.
+        """
+        return write_c(self.model, self.task, self.memory_size, folder)
+
+    def stops(self) -> list[float]:
+        """Return the times (s) at which the torques jump or are computed."""
+        numbers, plan = self.task.numbers, self.task.arrays["times"]
+        period, delay = numbers["period"], numbers["delay"]
+        ticks = period * np.arange(np.floor(numbers["last"] / period + 1e-6) + 1)
+        return sorted({*ticks.tolist(), *(ticks + delay).tolist(), *plan[1:].tolist()})
+
+    def _state(self, q: Any, v: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Return q and v as arrays of the right size; their values may be anything."""
+        arrays = []
+        for name, value, size in (("q", q, self.model.nq), ("v", v, self.model.nv)):
+            array = np.ascontiguousarray(value, float)
+            if array.shape != (size,):
+                raise refusal(f"Mpc: {name}", value, f"{size} numbers", SimulationError)
+            arrays.append(array)
+        return arrays[0], arrays[1]
+
+
+class Memory:
+    """The memory of one controller at work, and the C code that uses it."""
+
+    def __init__(self, task: MpcTask):
+        self.task, self.code = task, kernel()
+        self.place = ctypes.addressof(task.record)
+        self.memory = aligned(self.code.mpc_memory_size(self.place), np.dtype(float))
+        self.run = Simulation()
+        self.state = ctypes.addressof(self.run)  # its first member is the controller's state
+        self.tau = np.zeros(task.record.tail)
+        self.begin()
+
+    def begin(self) -> None:
+        """Forget all ticks."""
+        self.code.mpc_begin(self.state, self.place, self.memory.ctypes.data)
+
+    def begin_run(self, record: Any, clock: float) -> None:
+        """Begin a run of the generated C whose time is ``clock`` (s) at the controller's time 0."""
+        if type(record).t.size != ctypes.sizeof(ctypes.c_double):
+            raise SimulationError("Mpc: the simulated model computes with float: needs double")
+        self.begin()
+        self.run.step_begin = ctypes.addressof(record) + type(record).t.offset
+        self.run.clock = clock
+
+    def tick(self, t: float, q: np.ndarray, v: np.ndarray) -> bool:
+        """Compute a correction; return False if that failed."""
+        return bool(self.code.mpc_tick(self.state, t, q.ctypes.data, v.ctypes.data) == 0)
+
+    def torque(self, t: float) -> np.ndarray:
+        """Return the torques at t."""
+        self.code.mpc_torque(self.state, t, t, self.tau.ctypes.data)
+        return self.tau.copy()
+
+    def control(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Return the torques at t; compute a correction if a tick is due."""
+        places = (q.ctypes.data, v.ctypes.data, self.tau.ctypes.data)
+        self.code.mpc_control(self.state, t, t, *places)
+        return self.tau.copy()
+
+    def info(self) -> dict[str, int]:
+        """Return counts."""
+        return {name: int(getattr(self.run.state, name)) for name in COUNTS}

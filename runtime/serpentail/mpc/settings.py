@@ -1,0 +1,100 @@
+"""Settings of ``Mpc``, checked one by one."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..basics.checks import none_of, number, refusal, shown
+from ..basics.errors import PlanningError
+from ..model.model import Model
+from ..planning.result.plan import Plan
+from .kernel import FUNCTIONS
+
+NEEDED = dict(
+    zip(FUNCTIONS, ("airborne_rates", "airborne_rates_derivatives", "momentum"), strict=True)
+)
+DEFAULTS = {"intervals": 6, "delay": 0.0, "iterations": 1, "step": 5e-3, "rest": None}
+NAMES = ("rate", "horizon", *DEFAULTS)
+MOST = 100  # intervals, Gauss-Newton steps
+MOST_STEPS = 1000  # of Runge-Kutta, in an interval
+MOST_TICKS = 100_000
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Checked settings of ``Mpc``; horizon: s, inf for the rest of the plan."""
+
+    rate: float
+    horizon: float
+    intervals: int
+    delay: float
+    iterations: int
+    step: float
+    rest: float
+
+
+def checked_settings(plan: Plan, given: dict[str, Any]) -> Settings:
+    """Return the settings, with defaults for those left out; PlanningError if one is wrong."""
+    for name in given:
+        unknown = none_of("Mpc: setting", name, NAMES)
+        if unknown:
+            raise PlanningError(unknown)
+    given = DEFAULTS | given
+    rate = _number("rate", given["rate"], above=0)
+    if rate * plan.duration > MOST_TICKS:
+        needs = f"at most {MOST_TICKS / plan.duration:.3g} Hz: {MOST_TICKS} ticks"
+        raise refusal("Mpc: rate", rate, needs, PlanningError)
+    delay = _number("delay", given["delay"], least=0)
+    if delay > 1 / rate:
+        needs = f"at most the time between ticks, {1 / rate:.3g} s: or take a lower rate"
+        raise refusal("Mpc: delay", delay, needs, PlanningError)
+    horizon = np.inf if given["horizon"] is None else _number("horizon", given["horizon"], above=0)
+    rest = 1 / rate if given["rest"] is None else _number("rest", given["rest"], least=0)
+    if rest + delay >= plan.duration:
+        needs = f"to be less than the plan's {plan.duration:.4g} s, together with the delay"
+        raise refusal("Mpc: rest", rest, needs, PlanningError)
+    step = _number("step", given["step"], above=0)
+    intervals = _count("intervals", given["intervals"])
+    if max(min(horizon, plan.duration) / intervals, delay) / step > MOST_STEPS:
+        needs = f"at most {MOST_STEPS} steps in an interval: make it longer"
+        raise refusal("Mpc: step", step, needs, PlanningError)
+    iterations = _count("iterations", given["iterations"])
+    return Settings(rate, horizon, intervals, delay, iterations, step, rest)
+
+
+def refuse_unable(model: Model, plan: Plan) -> None:
+    """PlanningError if the model or the plan cannot be controlled."""
+    model.refuse_fixed("Mpc")
+    missing = [name for name in NEEDED.values() if name not in model.generated]
+    if missing:
+        raise PlanningError(
+            f"Mpc: the model lacks {', '.join(missing)}: add them to the scene's functions"
+        )
+    if model.manifest["real"] != "double":
+        raise PlanningError(f"Mpc: the model computes with {model.manifest['real']}: needs double")
+    if model.library is None:
+        raise PlanningError("Mpc: the model was loaded with compiled=False: load it again with C")
+    if not isinstance(plan, Plan):
+        raise PlanningError(f"Mpc: plan: value {shown(plan)}: needs what st.plan returns")
+    if plan.problem.attitude != "quaternion":
+        raise PlanningError(
+            f"Mpc: the plan's attitude is {plan.problem.attitude!r}: plan it with "
+            "attitude='quaternion'"
+        )
+    tail = plan.curve.starts["tail"].shape[1]
+    if tail != model.layout.nt:
+        raise PlanningError(
+            f"Mpc: the plan has {tail} tail coordinates, the model {model.layout.nt}"
+        )
+
+
+def _number(name: str, value: Any, **bounds: float) -> float:
+    return float(number(f"Mpc: {name}", value, PlanningError, **bounds))
+
+
+def _count(name: str, value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 1 <= value <= MOST:
+        needs = f"a whole number from 1 to {MOST}"
+        raise refusal(f"Mpc: {name}", value, needs, PlanningError)
+    return int(value)

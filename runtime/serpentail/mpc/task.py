@@ -1,0 +1,129 @@
+"""A plan, its goal and its bounds as the controller's C takes them (native/mpc.h)."""
+
+import ctypes
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..model.model import Model
+from ..planning.nlp.coordinates import attitude
+from ..planning.nlp.direct import goal_matrix
+from ..planning.problem import PlanningProblem
+from ..planning.result.curve import Curve
+from ..planning.result.plan import Plan
+from .kernel import FUNCTIONS, Task
+from .settings import NEEDED, Settings
+
+# errors at the end that weigh as much as a correction by the largest torque all the time
+TURN, TURN_RATE = 1e-3, 0.1  # rad, rad/s: of the torso
+ANGLE, RATE = 1e-2, 1.0  # rad, rad/s: of the tail
+BEYOND = 1e-2  # rad beyond an angle's bound
+NONE = 1e300  # no bound
+BLOCKS = ("torque", "attitude", "tail", "tail_rate")
+
+
+@dataclass(frozen=True, eq=False)
+class MpcTask:
+    """A task's numbers and arrays by the names of ``mpc_task``; record: the same for ctypes."""
+
+    numbers: dict[str, float]
+    arrays: dict[str, np.ndarray]
+    record: Task
+
+
+def task_of(model: Model, plan: Plan, settings: Settings) -> MpcTask:
+    """Return the task of a plan that a model's body is to follow."""
+    problem, duration = plan.problem, plan.duration
+    horizon = min(settings.horizon, duration)
+    times, polynomials = polynomials_of(plan.curve)
+    most = _most_torque(plan)
+    arrays = {
+        "times": times,
+        "plan": polynomials,
+        "most_torque": np.full_like(most, NONE) if problem.bounds.torque is None else most,
+        "most_angle": _most_angle(problem, len(most)),
+        "torque_weight": 1 / most**2 / duration,
+        "rate_weight": (problem.smoothing / most) ** 2 / duration,
+        "track_weight": np.repeat([1 / ANGLE**2, 1 / RATE**2], len(most)),
+        "parameters": model.parameter_vector,
+    } | _goal(problem, len(most))
+    numbers = {
+        "tail": model.layout.nt,
+        "intervals": settings.intervals,
+        "steps": _steps(horizon / settings.intervals, settings.step),
+        "late_steps": _steps(settings.delay, settings.step),
+        "iterations": settings.iterations,
+        "goal_rows": len(arrays["goal"]),
+        "pieces": len(times) - 1,
+        "powers": polynomials.shape[2],
+        "work": max(model.manifest["work"].get(name, 0) for name in NEEDED.values()),
+        "period": 1 / settings.rate,
+        "delay": settings.delay,
+        "horizon": horizon,
+        "end": duration,
+        "last": duration - settings.rest - settings.delay,
+        "damping": problem.damping,
+        "angle_weight": 1 / BEYOND**2,
+        "attitude_weight": 1 / TURN**2,
+    }
+    arrays = {name: np.ascontiguousarray(array, float) for name, array in arrays.items()}
+    places: dict[str, Any] = {name: array.ctypes.data for name, array in arrays.items()}
+    for name in FUNCTIONS:
+        function = getattr(model.library, f"{model.name}_{NEEDED[name]}")
+        places[name] = ctypes.cast(function, ctypes.c_void_p).value
+    return MpcTask(numbers, arrays, Task(**numbers, **places))
+
+
+def polynomials_of(curve: Curve) -> tuple[np.ndarray, np.ndarray]:
+    """Return times (pieces + 1,) s and coefficients (pieces, channels, powers) of a plan's torques,
+    quaternion, tail coordinates and their rates, by powers of the time since the piece's begin.
+    """
+    pieces, powers = len(curve.ends) - 1, len(curve.rule.nodes) + 1
+    s = (1 - np.cos(np.pi * np.arange(powers) / (powers - 1))) / 2
+    k = np.repeat(np.arange(pieces), powers)
+    blocks = curve.inside(k, np.tile(s, pieces))
+    values = np.concatenate([blocks[name] for name in BLOCKS], axis=1)
+    values = values.reshape(pieces, powers, -1)
+    found = np.linalg.solve(np.vander(s, increasing=True), values)
+    widths = np.diff(curve.ends)[:, None, None]
+    return curve.ends, np.swapaxes(found, 1, 2) / widths ** np.arange(powers)
+
+
+def _steps(time: float, step: float) -> int:
+    """Return the number of steps of at most this length (s) in a time (s)."""
+    return int(np.ceil(time / step - 1e-9))
+
+
+def _most_torque(plan: Plan) -> np.ndarray:
+    """Return the bounds of torques (2m,); without bounds, the largest torques of the plan."""
+    bound = plan.problem.bounds.torque
+    if bound is not None:
+        return np.asarray(bound, float)
+    used = np.abs(plan.trajectory.tau).max(axis=0)
+    return np.maximum(used, max(float(used.max()), 1e-12) / 10)
+
+
+def _most_angle(problem: PlanningProblem, size: int) -> np.ndarray:
+    bound = problem.bounds.angle
+    return np.full(size, NONE) if bound is None else np.asarray(bound, float)
+
+
+def _goal(problem: PlanningProblem, size: int) -> dict[str, np.ndarray]:
+    """Return the goal's numbers; free ones are 0 with a weight of 0."""
+    goal = problem.goal
+    parts = (
+        (goal.tail, size, ANGLE),
+        (goal.tail_rate, size, RATE),
+        (goal.torso_rate, 3, TURN_RATE),
+    )
+    values = np.concatenate(
+        [np.full(count, np.nan) if part is None else part for part, count, _ in parts]
+    )
+    units = np.repeat([unit for *_, unit in parts], [count for _, count, _ in parts])
+    given = np.isfinite(values)
+    return {
+        "goal": goal_matrix(goal.attitude, attitude("quaternion")),
+        "end_state": np.where(given, values, 0.0),
+        "end_weight": given / units**2,
+    }

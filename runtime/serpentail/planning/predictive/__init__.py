@@ -1,1 +1,0 @@
-"""Model-predictive control of planned flights, computed in C that also runs on microcontrollers."""

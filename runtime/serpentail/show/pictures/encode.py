@@ -1,0 +1,96 @@
+"""Pictures become a moving film: GIF by Pillow, MP4 by ffmpeg."""
+
+import importlib.util
+import shutil
+import subprocess
+from collections.abc import Iterator
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...basics.errors import ViewError
+from ...basics.files import replacing
+from .animal import FORCE, LEG, SHADE, SHADOW
+from .style import HEAD, INK, QUIET, TAIL, TORSO
+
+Picture = NDArray[np.uint8]  # (height, width, 3), both even
+RATE = 25  # frames a second
+
+
+def encoder() -> str:
+    """Return the path of ffmpeg: that of imageio-ffmpeg, else one on PATH; ViewError if none."""
+    if importlib.util.find_spec("imageio_ffmpeg") is not None:
+        from imageio_ffmpeg import get_ffmpeg_exe
+
+        return str(get_ffmpeg_exe())
+    found = shutil.which("ffmpeg")
+    if found is None:
+        remedy = 'pip install "serpentail[film]", or write a .gif'
+        raise ViewError(f"an .mp4 needs ffmpeg, which is not on PATH: {remedy}")
+    return found
+
+
+def write_gif(path: Path, pictures: Iterator[Picture]) -> None:
+    """Write a GIF that repeats for ever, whole or not at all."""
+    from PIL import Image
+
+    whole, colours = BytesIO(), Image.new("P", (1, 1))
+    colours.putpalette(palette())
+    plain = {"palette": colours, "dither": Image.Dither.NONE}
+    images = (Image.fromarray(picture).quantize(**plain) for picture in pictures)
+    look = {"duration": 1000 // RATE, "loop": 0, "optimize": False}
+    next(images).save(whole, format="GIF", save_all=True, append_images=images, **look)
+    with replacing(path) as part:
+        part.write_bytes(whole.getvalue())
+
+
+def palette() -> list[int]:
+    """Return the colours of a film and of the edges between them, as red, green and blue.
+
+    They are the same for all frames, so that only what moves is stored.
+    """
+    from matplotlib.colors import to_rgb
+
+    ink = np.array([to_rgb(colour) for colour in (INK, QUIET, TAIL, HEAD, LEG, FORCE, SHADOW)])
+    ground = np.array([to_rgb(colour) for colour in ("white", SHADE, TORSO)])
+    share = np.linspace(0, 1, 9)[:, None, None, None]
+    mixed = (share * ink[:, None] + (1 - share) * ground).reshape(-1, 3)
+    return np.unique(np.round(255 * mixed).astype(int), axis=0).ravel().tolist()
+
+
+def write_mp4(path: Path, pictures: Iterator[Picture]) -> None:
+    """Write an H.264 film that every browser plays, whole or not at all."""
+    first = next(pictures)
+    size = f"{first.shape[1]}x{first.shape[0]}"
+    raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", str(RATE), "-i", "-"]
+    plain = ["-map_metadata", "-1", "-fflags", "+bitexact", "-flags:v", "+bitexact"]
+    coded = ["-c:v", "libx264", "-crf", "20", "-pix_fmt", "yuv420p", "-movflags", "+faststart"]
+    with replacing(path) as part:
+        command = [encoder(), "-v", "error", "-y", *raw, *coded, *plain, "-f", "mp4", str(part)]
+        _feed(command, first, pictures)
+
+
+def _feed(command: list[str], first: Picture, pictures: Iterator[Picture]) -> None:
+    """Run ffmpeg on pictures; OSError with its last message if it fails."""
+    pipe = subprocess.PIPE
+    process = subprocess.Popen(command, stdin=pipe, stdout=subprocess.DEVNULL, stderr=pipe)
+    assert process.stdin is not None and process.stderr is not None
+    try:
+        try:
+            process.stdin.write(first.tobytes())
+            for picture in pictures:
+                process.stdin.write(picture.tobytes())
+            process.stdin.close()
+        except BrokenPipeError:
+            pass  # it ended, and says why
+        said = process.stderr.read().decode(errors="replace").split("\n")
+        if process.wait() != 0:
+            told = [line for line in said if line.strip()]
+            raise OSError(f"ffmpeg: {told[-1] if told else process.returncode}")
+    finally:
+        process.kill()
+        process.wait()
+        process.stdin.close()
+        process.stderr.close()

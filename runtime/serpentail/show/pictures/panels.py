@@ -1,0 +1,142 @@
+"""What can be drawn over time of a motion: each panel's curves, in units that are read easily."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from serpentail_scene.layout import OMEGA
+
+from ...basics.attitude import pitch_roll_yaw, tilt_deg
+from ...model.model import Model
+from ...motion.body import bends
+from ...motion.trajectory import Trajectory
+from .style import INK, TAIL, Array
+
+# Okabe and Ito, dashed for grey prints
+TRIPLE = (("#0072b2", "-"), ("#d55e00", "--"), ("#009e73", "-."))
+WORLD = ("right $x$", "forward $y$", "up $z$")
+SINGULAR = 0.15  # |cos(pitch)| below which roll and yaw are not drawn: 9 degrees about the vertical
+SEEN = 1e-3  # of a panel's least span
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """One axis, and the curves on it; `still` names curves that stay zero, which are not drawn."""
+
+    label: str
+    curves: Array  # (K, n)
+    names: Sequence[str]
+    styles: Sequence[tuple[Any, str]]  # (colour, dash)
+    span: float  # the least
+    still: Sequence[str] = ()
+
+    def without_still(self) -> "Panel":
+        """The panel with the curves that do not stay zero."""
+        moves = np.nanmax(np.abs(self.curves), axis=0, initial=0) > SEEN * self.span
+        kept, gone = (np.flatnonzero(which).tolist() for which in (moves, ~moves))
+        return replace(
+            self,
+            curves=self.curves[:, kept],
+            names=[self.names[k] for k in kept],
+            styles=[self.styles[k] for k in kept],
+            still=[self.names[k] for k in gone],
+        )
+
+
+def height(motion: Trajectory, model: Model | None) -> Panel:
+    """Height of B."""
+    return Panel("height of\ntorso [mm]", 1e3 * motion.pose[:, 2:3], ("torso",), ((INK, "-"),), 1.0)
+
+
+def attitude(motion: Trajectory, model: Model | None) -> Panel:
+    """Euler angles, with whole turns; roll and yaw have gaps where the torso points up or down."""
+    angles = pitch_roll_yaw(motion.pose, unwrap=True)
+    angles[np.abs(np.cos(angles[:, 0])) < SINGULAR, 1:] = np.nan
+    names = (r"pitch $\phi_x$", r"roll $\phi_y$", r"yaw $\phi_z$")
+    return Panel("attitude [deg]", np.degrees(angles), names, TRIPLE, 1.0)
+
+
+def tilt(motion: Trajectory, model: Model | None) -> Panel:
+    """Angle between the back and upright."""
+    curve = tilt_deg(motion.attitude)[:, None]
+    return Panel("tilt of the\nback [deg]", curve, ("tilt",), ((INK, "-"),), 1.0)
+
+
+def tail(motion: Trajectory, model: Model | None) -> Panel:
+    """Bends of the segments, for articulated ones the sum of their links' angles.
+
+    Tail coordinates if no model is known.
+    """
+    names, styles, order = of_segments(motion)
+    if model is None:
+        told, angles = "tail coord.\n[deg]", motion.tail
+    else:
+        told, angles = "bend of\nsegment [deg]", bends(model, motion.tail)
+    return Panel(told, np.degrees(angles[:, order]), names, styles, 1.0)
+
+
+def torque(motion: Trajectory, model: Model | None) -> Panel:
+    """Torques of the tail coordinates."""
+    names, styles, order = of_segments(motion)
+    return Panel("tail torque\n[mN m]", 1e3 * motion.tau[:, order], names, styles, 0.01)
+
+
+def force(motion: Trajectory, model: Model | None) -> Panel:
+    """The ground's normal forces, the sum of each group."""
+    contact = motion.contact
+    if contact is None:
+        return Panel("normal force\n[N]", np.zeros((len(motion.t), 0)), (), (), 1.0)
+    names = list(contact.groups)
+    curves = np.stack([contact.of(name).forces[..., 2].sum(axis=1) for name in names], axis=1)
+    told = "normal force\n[N]" if len(names) > 1 else f"normal force\nof {names[0]} [N]"
+    return Panel(told, curves, names, TRIPLE[: len(names)], 1.0)
+
+
+def rate(motion: Trajectory, model: Model | None) -> Panel:
+    """Angular velocity of the torso in its own frame."""
+    names = (r"$\omega_x$", r"$\omega_y$", r"$\omega_z$")
+    fixed = motion.layout.fixed
+    curves = np.zeros((len(motion.t), 3)) if fixed else motion.v[:, OMEGA]
+    return Panel("torso rate\n[rad/s]", curves, names, TRIPLE, 0.1)
+
+
+def energy(motion: Trajectory, model: Model | None) -> Panel:
+    """Kinetic, potential and total energy."""
+    curves = 1e3 * np.stack([motion.kinetic, motion.potential, motion.energy], axis=1)
+    styles = (*TRIPLE[:2], (INK, "-"))
+    return Panel("energy [mJ]", curves, ("kinetic", "potential", "total"), styles, 1.0)
+
+
+def momentum(motion: Trajectory, model: Model | None) -> Panel:
+    """Linear momentum."""
+    return Panel("momentum\n[mN s]", 1e3 * motion.linear_momentum, WORLD, TRIPLE, 1.0)
+
+
+def angular_momentum(motion: Trajectory, model: Model | None) -> Panel:
+    """Angular momentum about the centre of mass."""
+    return Panel("angular mom.\n[mN m s]", 1e3 * motion.angular_momentum, WORLD, TRIPLE, 0.01)
+
+
+PANELS: dict[str, Callable[[Trajectory, Model | None], Panel]] = {
+    each.__name__: each
+    for each in (
+        *(height, attitude, tilt, tail, torque, force),
+        *(rate, energy, momentum, angular_momentum),
+    )
+}
+
+
+def of_segments(motion: Trajectory) -> tuple[list[str], list[tuple[Any, str]], list[int]]:
+    """Names and styles of tail coordinates, a colour a segment, yaw dashed; and their order."""
+    from matplotlib import colormaps
+
+    segments = motion.segments
+    colours = (
+        [TAIL] if segments == 1 else list(colormaps["viridis"](np.linspace(0, 0.85, segments)))
+    )
+    styles = [(colour, dash) for dash in ("-", "--") for colour in colours]
+    numbers = [f" {i + 1}" for i in range(segments)] if segments > 1 else [""] * segments
+    names = [bend + number for bend in ("pitch", "yaw") for number in numbers]
+    return names, styles, [*range(0, 2 * segments, 2), *range(1, 2 * segments, 2)]

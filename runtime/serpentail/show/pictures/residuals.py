@@ -1,0 +1,68 @@
+"""Draws the results of an identification over time: residuals of markers, torques and power."""
+
+import os
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...basics.extras import needed
+from ...motion.trajectory import Trajectory
+from .panels import Panel, of_segments, torque
+from .plot import labelled, stacked
+from .style import QUIET, Array, drawn
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Residuals = tuple[tuple[str, ...], Array, float]  # names, (F, M, 3) m, noise m
+Bands = tuple[Array, Array, Array, float] | None  # times (U,), low and high (U, 2m), probability
+ROOM = 0.3  # of a panel, for its legend
+
+
+def residual_figure(
+    motion: Trajectory,
+    residuals: Residuals,
+    bands: Bands = None,
+    path: str | os.PathLike[str] | None = None,
+) -> tuple["Figure", Any]:
+    """Draw distances of seen from modelled markers, torques with their intervals, and power.
+
+    path: also write the figure to this .pdf, .png or .svg file.  ExtraMissing without the extra
+    "plot".
+    """
+    needed("matplotlib", "plot")
+    return drawn(lambda: _figure(motion, residuals, bands), path)
+
+
+def _figure(motion: Trajectory, residuals: Residuals, bands: Bands) -> tuple["Figure", Any]:
+    """A figure of three panels on one time axis."""
+    from matplotlib import colormaps
+
+    names, off, noise = residuals
+    distances = 1e3 * np.linalg.norm(off, axis=2)
+    colours = colormaps["viridis"](np.linspace(0, 0.9, len(names)))
+    tau = torque(motion, None)
+    coordinates, styles, order = of_segments(motion)
+    rates = motion.v[:, -motion.tau.shape[1] :][:, order]
+    power = Panel("power\n[mW]", tau.curves * rates, coordinates, styles, 0.01)
+    dots = [(colour, ".") for colour in colours]
+    figure, every = stacked(
+        motion, [Panel("residual\n[mm]", distances, names, dots, 0.1), tau, power]
+    )
+    usual = 1e3 * noise * np.sqrt(3)
+    told = f"rms of noise: {usual:.2g} mm"
+    every[0].axhline(usual, color=QUIET, linewidth=0.8, zorder=0.5, label=told)
+    labelled(every[0], len(names) + 1)
+    if bands is not None:
+        times, low, high, probability = bands
+        shown = np.stack([np.interp(times, motion.t, row) for row in rates.T], axis=1)
+        ends = 1e3 * np.stack([low[:, order], high[:, order]])
+        for axes, pair in ((every[1], ends), (every[2], np.sort(ends * shown, axis=0))):
+            for k, (colour, _) in enumerate(styles):
+                shade = {"color": colour, "alpha": 0.2, "linewidth": 0}
+                label = None if k else f"{100 * probability:g} %"
+                axes.fill_between(times, pair[0, :, k], pair[1, :, k], label=label, **shade)
+            least, most = float(pair.min()), float(pair.max())
+            axes.set_ylim(least, least + (most - least) / (1 - ROOM))
+            labelled(axes, len(styles) + 1)
+    return figure, every

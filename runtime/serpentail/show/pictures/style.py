@@ -1,0 +1,71 @@
+"""The style that all drawings share, and how they are written."""
+
+import io
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...basics.errors import ViewError
+from ...basics.files import replacing
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+METADATA: dict[str, dict[str, Any]] = {
+    ".pdf": {"CreationDate": None},
+    ".png": {},
+    ".svg": {"Date": None},
+}
+DPI = 200
+INK, QUIET, TORSO, TAIL, HEAD = "#222222", "#8c8c8c", "#c6e0f0", "#d55e00", "#0072b2"
+STYLE: dict[str, Any] = {
+    "svg.hashsalt": "serpentail",
+    "font.size": 8,
+    "axes.linewidth": 0.6,
+    "axes.edgecolor": QUIET,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "lines.linewidth": 1.3,
+    "lines.solid_capstyle": "round",
+    "legend.frameon": False,
+    "legend.handlelength": 2.2,
+}
+
+
+def writable(path: str | os.PathLike[str]) -> Path:
+    """Return the path if its suffix is a known format; ViewError otherwise."""
+    path = Path(path)
+    if path.suffix.lower() not in METADATA:
+        raise ViewError(
+            f"figure {str(path)!r} has suffix {path.suffix!r}: use one of {', '.join(METADATA)}"
+        )
+    return path
+
+
+Drawn = tuple["Figure", Any]  # with its axes
+
+
+def drawn(draw: Callable[[], Drawn], path: str | os.PathLike[str] | None) -> Drawn:
+    """Draw in the shared style; with a path, write the figure too."""
+    from matplotlib import style
+
+    target = None if path is None else writable(path)
+    with style.context(STYLE, after_reset=True):
+        figure, axes = draw()
+        if target is not None:
+            write(target, figure)
+    return figure, axes
+
+
+def write(path: Path, figure: "Figure") -> None:
+    """Write a figure whole or not at all; the same figure gives the same bytes."""
+    kind = path.suffix.lower()
+    drawn = io.BytesIO()  # Matplotlib would hide that a write failed, and leave its file open
+    figure.savefig(drawn, format=kind[1:], metadata=METADATA[kind], dpi=DPI)
+    with replacing(path) as part:
+        part.write_bytes(drawn.getvalue())
