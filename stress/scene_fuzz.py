@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 
 import serpentail as st
-from serpentail.cli.cli import cli
+from serpentail.cli import cli
 from serpentail.scenes.file import read_scene, subtable
 from serpentail.scenes.simulate import scenario_of
 from serpentail_codegen.__main__ import parser, scene_of

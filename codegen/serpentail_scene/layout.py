@@ -34,12 +34,12 @@ class Sizes:
 
     @property
     def nq(self) -> int:
-        """Numbers of a configuration."""
+        """Length of q, 7 + nt; with a fixed base nt, the tail coordinates alone."""
         return self.nt + (0 if self.fixed else TORSO_NQ)
 
     @property
     def nv(self) -> int:
-        """Numbers of a velocity."""
+        """Length of v, 6 + nt; with a fixed base nt, the rates of the tail coordinates alone."""
         return self.nt + (0 if self.fixed else TORSO_NV)
 
 

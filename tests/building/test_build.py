@@ -20,7 +20,7 @@ from serpentail.building import build as building
 from serpentail.building.fewer_contacts import FUNCTIONS, NEEDED, with_contacts
 from serpentail.building.options import Parameters, SceneKeys
 from serpentail.building.scene_text import scene_text
-from serpentail.cli.cli import cli
+from serpentail.cli import cli
 from serpentail_codegen.scene.parameters import PARAMETERS
 from serpentail_codegen.scene.parse import load_scene, parse_scene
 from serpentail_codegen.scene.passive import PASSIVE

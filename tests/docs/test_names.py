@@ -8,9 +8,8 @@ import re
 import shlex
 from pathlib import Path
 
-from serpentail.cli.cli.cli import ROOMS, arguments_of
-
 import serpentail as st
+from serpentail.cli.cli import ROOMS, arguments_of
 from serpentail.model.model import Model
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.scene.parameters import PARAMETERS
@@ -69,7 +68,7 @@ def test_files_exist():
         own = re.sub(r"https?://\S+", "", text)
         names = re.findall(r"(?<![\w<>*/.-])[\w./-]+\.(?:py|toml|md|jinja|png|c|h)\b", own)
         names += [span for span in code(document) if re.fullmatch(r"[\w.-]+(/[\w.-]*)+", span)]
-        homes = (ROOT, document.parent, CODEGEN, RUNTIME)
+        homes = (ROOT, ROOT / "codegen", document.parent, CODEGEN, RUNTIME)
         names = {name for name in names if not name.startswith(MADE)} - YOURS
         with row(document.name):
             assert [n for n in names if not any((home / n).exists() for home in homes)] == []

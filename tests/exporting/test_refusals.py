@@ -19,7 +19,7 @@ import pytest
 import serpentail as st
 from serpentail.bridges.exporting import mjcf
 from serpentail.bridges.exporting.fmu import NATIVE
-from serpentail.cli.cli import cli, models
+from serpentail.cli import cli, models
 from tests.support import zoo
 from tests.support.models import model_folder
 from tests.support.rows import row

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from serpentail.cli.cli import cli
+from serpentail.cli import cli
 from serpentail.verification import report as verify
 from serpentail_scene.signatures.table import SIGNATURES
 from tests.support import zoo

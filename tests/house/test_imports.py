@@ -14,7 +14,7 @@ import pytest
 
 import serpentail as st
 from serpentail.building import build as building
-from serpentail.cli.cli import cli
+from serpentail.cli import cli
 from serpentail.scenes.plan import planned
 from serpentail.verification import report
 from tests.support import zoo
@@ -77,8 +77,8 @@ def test_names_are_the_contract_and_no_module_hides_one():
 BROUGHT_ALONG = {"trimesh": "viser"}  # by a library of the extra
 HOMES = {  # where alone a library of an extra may be imported, behind the room's gates
     "casadi": ("model/casadi.py", "model/nodes/", "planning/"),
-    "matplotlib": ("pictures/",),
-    "PIL": ("pictures/",),
+    "matplotlib": ("show/pictures/",),
+    "PIL": ("show/pictures/",),
     "imageio_ffmpeg": ("show/pictures/encode.py",),
     "ezc3d": ("identification/c3d_child.py",),
     "gymnasium": ("bridges/learning/environments.py",),

@@ -13,7 +13,7 @@ import pytest
 
 import serpentail as st
 from examples import front
-from serpentail.cli.cli import cli
+from serpentail.cli import cli
 from tests.identification.flights import flown, placed, scene, start, tracks
 from tests.support import zoo
 from tests.support.rows import row

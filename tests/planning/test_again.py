@@ -18,7 +18,7 @@ import pytest
 
 import serpentail as st
 from serpentail.basics.attitude import from_angles
-from serpentail.cli.cli import cli
+from serpentail.cli import cli
 from serpentail.planning import rounds, ways
 from serpentail.planning.condensed import fatrop
 from serpentail.planning.nlp import interrupt, solver, transcription

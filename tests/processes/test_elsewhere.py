@@ -156,7 +156,7 @@ PROGRAM = """
 import json, os, sys, time
 from pathlib import Path
 import serpentail as st
-from serpentail.model import toolchain
+from serpentail.compiling import toolchain
 from serpentail.compiling.cache_limit import contents, empty
 from serpentail.compiling.cache import cache_folder
 from serpentail.compiling.commands import run_all

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.cli.cli import cli
+from serpentail.cli import cli
 from serpentail.scenes.overrides import changed, parsed
 from serpentail.scenes.plan import plan_arguments
 from serpentail.simulation import limits

@@ -9,7 +9,7 @@ import pytest
 
 import serpentail as st
 from serpentail.basics.checks import Refusals
-from serpentail.cli.cli import cli
+from serpentail.cli import cli
 from serpentail.planning.problem import SETTINGS as PROBLEM_SETTINGS
 from serpentail.planning.settings import PlanSettings
 from serpentail.scenes.keys import read

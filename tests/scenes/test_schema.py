@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as some
 
 import serpentail as st
-from serpentail.cli.cli import cli
+from serpentail.cli import cli
 from serpentail.planning.nlp.rules import collocation_rule
 from serpentail.scenes import plan_keys, simulate_keys
 from serpentail.scenes.plan import plan_arguments

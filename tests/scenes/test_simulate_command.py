@@ -10,7 +10,7 @@ import pytest
 from scipy.io import netcdf_file
 
 import serpentail as st
-from serpentail.cli.cli import cli
+from serpentail.cli import cli
 from tests.support import zoo
 from tests.support.rows import row
 from tests.support.told import besides_progress

@@ -15,7 +15,7 @@ import xarray
 from jsonschema import Draft7Validator
 
 import serpentail as st
-from serpentail.cli.cli import cli
+from serpentail.cli import cli
 from tests.identification.flights import flown, placed, scene, seen, start
 from tests.support import zoo
 from tests.support.rows import row as named

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.cli.cli import cli
+from serpentail.cli import cli
 from serpentail.show.page import view as viewer
 from serpentail_codegen.scene.parse import load_scene
 from tests.support import zoo

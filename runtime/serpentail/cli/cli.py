@@ -18,7 +18,7 @@ try:
 except KeyboardInterrupt:  # these take longer than Python itself
     sys.exit(INTERRUPTED)
 
-ROOMS = {  # modules of `commands`, each with a function of the name of each verb
+ROOMS = {  # modules, each with a function of the name of each verb
     "scenes": ("examples", "new", "generate", "schema", "completion"),
     "motions": ("simulate", "plan", "identify", "view"),
     "sweeps": ("sweep",),
@@ -71,7 +71,7 @@ def tell_warning(message: Warning | str, *_: Any, **__: Any) -> None:
 def run(arguments: argparse.Namespace) -> Outcome | int:
     """Return the outcome of a verb; the status if the verb prints its own output."""
     (room,) = (room for room, verbs in ROOMS.items() if arguments.verb in verbs)
-    module = import_module(f".commands.{room}", __package__)
+    module = import_module(f".{room}", __package__)
     outcome: Outcome | int = getattr(module, arguments.verb)(arguments)
     return outcome
 

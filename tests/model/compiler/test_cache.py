@@ -9,7 +9,7 @@ import time
 import pytest
 
 import serpentail as st
-from serpentail.cli.cli import cli
+from serpentail.cli import cli
 from serpentail.compiling import cache_limit as bound
 from serpentail.compiling import compiler
 from serpentail.compiling.cache import publish

@@ -145,7 +145,7 @@ def test_place_of_the_cache_and_what_cannot_be_one(model, monkeypatch, tmp_path)
 
 
 COMPILE = (
-    "import pathlib, sys; from serpentail.model import compiler; path = pathlib.Path\n"
+    "import pathlib, sys; from serpentail.compiling import compiler; path = pathlib.Path\n"
     "print(compiler.compile_library([path(sys.argv[1])], path(sys.argv[2])))"
 )
 LOAD = "import sys, serpentail as st; print(st.load(sys.argv[1]).library._name)"

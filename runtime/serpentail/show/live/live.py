@@ -14,7 +14,6 @@ from ...basics.errors import ViewError
 from ...basics.extras import needed
 from ...model.model import Model
 from ...motion.trajectory import Trajectory
-from ...planning.result.plan import Plan
 from ..page.shape import length
 from .poses import Instances, animal
 
@@ -92,17 +91,17 @@ class Live:
     def __repr__(self) -> str:
         return f"<serpentail live view of {self.model.name} at {self.url}>"
 
-    def __call__(self, news: Trajectory | Plan) -> None:
-        """Show the last sample of a motion, or nine moments of a plan.
+    def __call__(self, news: Any) -> None:
+        """Show the last sample of a Trajectory, or nine moments of a Plan.
 
         ViewError if it is not of this model.
         """
-        motion = news.trajectory if isinstance(news, Plan) else news
+        motion = getattr(news, "trajectory", news)
         if not isinstance(motion, Trajectory) or motion.q.shape[1] != self.model.nq:
             needs = f"a Trajectory or a Plan of {self.model.name}, whose q has {self.model.nq}"
             raise refusal("news", news, needs, ViewError)
         rows, text = np.array([-1]), f"t = {motion.t[-1]:.4f} s"
-        if isinstance(news, Plan):
+        if motion is not news:
             rows = np.linspace(0, len(motion.t) - 1, POSES).round().astype(int)
             text = f"```\n{news!r}\n```"
         legs = None if motion.contact is None else motion.contact.legs
