@@ -18,8 +18,8 @@ import numpy as np
 import serpentail as st
 from benchmarks.fixtures import built, label
 from examples import righting
-from serpentail.planning.condensed import fatrop
-from serpentail.planning.condensed.helpers import helped
+from serpentail.planning.staged import fatrop
+from serpentail.planning.staged.thread_pool import helped
 from serpentail_scene.signatures.table import AIRBORNE, EXACT_DERIVATIVES
 
 NODES, ROUNDS = 64, 300

@@ -18,7 +18,7 @@ import numpy as np
 
 import serpentail as st
 from examples import righting
-from serpentail.planning import ways
+from serpentail.planning import backends as ways
 from serpentail.planning.nlp.equations import equations_of_motion
 from serpentail.planning.problem import SMOOTHING
 from serpentail_codegen.scene.parse import scene_for

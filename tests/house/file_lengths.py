@@ -1,22 +1,33 @@
-"""Refuses Python files that are too long to read; `make lint` runs it."""
+"""Refuses Python files that are too long to read, and classes of one name; `make lint` runs it."""
 
 import argparse
+import re
 import sys
+from collections import defaultdict
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("codegen", "runtime", "tests", "benchmarks", "embedded", "examples", "mutants", "stress")
 MOST_LINES = 300
+CLASS = re.compile(r"^class (\w+)", re.MULTILINE)
 
 
 def main() -> int:
-    """Print a complaint for each file that is too long; return the exit status."""
-    complaints = []
+    """Print a complaint for each file that is too long and each name of two classes of the
+    packages; return the exit status.
+    """
+    complaints, homes = [], defaultdict(list)
     for path in sorted(path for name in FOLDERS for path in (ROOT / name).rglob("*.py")):
-        lines = len(path.read_text(encoding="utf-8").splitlines())
-        if lines > MOST_LINES:
+        text = path.read_text(encoding="utf-8")
+        if (lines := text.count("\n")) > MOST_LINES:
             complaints.append(f"{path}: {lines} lines, more than {MOST_LINES}: split it by concept")
-    print("\n".join(complaints) or f"all files have {MOST_LINES} lines or less")
+        if path.relative_to(ROOT).parts[0] in FOLDERS[:2]:
+            for name in CLASS.findall(text):
+                homes[name].append(str(path.relative_to(ROOT)))
+    for name, paths in homes.items():
+        if len(paths) > 1:
+            complaints.append(f"class {name} stands in {' and in '.join(paths)}: rename one")
+    print("\n".join(complaints) or f"all files have {MOST_LINES} lines or less, all classes a name")
     return 1 if complaints else 0
 
 

@@ -19,14 +19,15 @@ import pytest
 import serpentail as st
 from serpentail.basics.attitude import from_angles
 from serpentail.cli import cli
-from serpentail.planning import rounds, ways
-from serpentail.planning.condensed import fatrop
+from serpentail.planning import backends as ways
+from serpentail.planning import mesh_refinement as rounds
 from serpentail.planning.nlp import interrupt, solver, transcription
 from serpentail.planning.nlp.blas_threads import _blas, one_thread
 from serpentail.planning.nlp.equations import equations_of_motion
 from serpentail.planning.nlp.multipliers import carried
 from serpentail.planning.nlp.transcription import transcription_of
 from serpentail.planning.result import report as result_report
+from serpentail.planning.staged import fatrop
 from serpentail.scenes.plan import arguments_for, plan_arguments
 from serpentail.scenes.plan import planned as planned_by
 from tests.support import zoo
@@ -147,7 +148,7 @@ def test_a_stop_between_rounds_keeps_the_best_round_and_what_is_raised_is_raised
         ("stop_reason", lambda: "time limit", "time limit"),
     ):
         with monkeypatch.context() as patch:
-            patch.setattr(f"serpentail.planning.rounds.{name}", fake)
+            patch.setattr(f"serpentail.planning.mesh_refinement.{name}", fake)
             plan = again(**settings)
         assert not plan.success and plan.report["converged"]
         assert (plan.report["stopped"], plan.report["intervals"]) == (why, 6)

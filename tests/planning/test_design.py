@@ -11,7 +11,7 @@ import pytest
 import serpentail as st
 from serpentail.basics.attitude import angle_deg, pitch_roll_yaw
 from serpentail.planning.design import checked_design
-from serpentail.planning.nlp.body import Body
+from serpentail.planning.nlp.body import BodyFunctions
 from serpentail.planning.nlp.equations import equations_of_motion
 from serpentail.planning.nlp.mesh import uniform
 from serpentail.planning.nlp.rules import collocation_rule
@@ -63,7 +63,7 @@ def test_parameters_follow_as_in_the_model():
     ):
         ranges = {name: (value, 1.1 * np.abs(value)) for name, value in values.items()}
         numbers = np.concatenate([np.atleast_1d(x) for x in values.values()])
-        body = Body(model, checked_design(model, ranges), ca.SX(numbers))
+        body = BodyFunctions(model, checked_design(model, ranges), ca.SX(numbers))
         wanted = model.with_parameters(**values)
         vector, masses = np.array(ca.DM(body.vector)), ca.DM(body.parameters["tail_mass"])
         with row(*values):

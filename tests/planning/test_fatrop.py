@@ -11,15 +11,15 @@ import pytest
 import serpentail as st
 from examples import righting
 from serpentail.basics.attitude import tilt_deg
-from serpentail.planning.condensed import fatrop
-from serpentail.planning.condensed.stages import stages_of
-from serpentail.planning.found import start_blocks
+from serpentail.planning.backends import STAGED
+from serpentail.planning.free_variables import start_blocks
 from serpentail.planning.nlp.bounds import limits
 from serpentail.planning.nlp.equations import equations_of_motion
 from serpentail.planning.nlp.solver import solve, solver
 from serpentail.planning.nlp.transcription import transcription_of
 from serpentail.planning.result.truth import planned_torques
-from serpentail.planning.ways import STAGED
+from serpentail.planning.staged import fatrop
+from serpentail.planning.staged.stages import stages_of
 from tests.support import zoo
 from tests.support.rows import row
 from tests.support.tumbling import AGAIN, DURATION, integrated, rat, start

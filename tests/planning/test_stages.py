@@ -12,10 +12,11 @@ import pytest
 from scipy.interpolate import BPoly
 
 import serpentail as st
-from serpentail.planning.condensed import fatrop, helpers
-from serpentail.planning.condensed.fatrop import kernel
 from serpentail.planning.nlp.mesh import Mesh, refined, uniform
 from serpentail.planning.nlp.rules import MOST_DEGREE, collocation_rule
+from serpentail.planning.staged import fatrop
+from serpentail.planning.staged import thread_pool as helpers
+from serpentail.planning.staged.fatrop import kernel
 from tests.support.rows import row
 from tests.support.stages import first_stage
 from tests.support.tumbling import AGAIN, rat, start

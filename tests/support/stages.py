@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 import serpentail as st
-from serpentail.planning.condensed.fatrop import kernel
-from serpentail.planning.condensed.stages import stages_of
-from serpentail.planning.condensed.task import task_of
 from serpentail.planning.nlp.mesh import uniform
 from serpentail.planning.nlp.node import PARAMETERS
 from serpentail.planning.nlp.rules import collocation_rule
 from serpentail.planning.problem import PlanningProblem
+from serpentail.planning.staged.fatrop import kernel
+from serpentail.planning.staged.stages import stages_of
+from serpentail.planning.staged.task import task_of
 
 _numbers = ctypes.POINTER(ctypes.c_double)
 
@@ -36,7 +36,7 @@ class Stage(ctypes.Structure):
 
 
 class Head(ctypes.Structure):
-    """The first members of ``Program`` in native/program.h."""
+    """The first members of ``Program`` in native/ocp.h."""
 
     _fields_ = (("task", ctypes.c_void_p), ("stages", ctypes.POINTER(Stage)))
 

@@ -10,7 +10,7 @@ from ..basics.checks import shown
 from ..basics.errors import PlanningError
 from ..basics.files import refuse_unwritable, replacing
 from ..model.model import Model
-from .kernel import FUNCTIONS, NATIVE, SIZES, SOURCES, Task
+from .kernel import FUNCTIONS, NATIVE, SIZES, SOURCES, TaskRecord
 from .settings import NEEDED
 from .task import MpcTask
 
@@ -94,7 +94,7 @@ def header(prefix: str, memory: int) -> str:
 
 def source(prefix: str, task: MpcTask) -> str:
     """Return its source: the controller, then the plan."""
-    names = ("inside.h", *SOURCES)
+    names = ("mpc_layout.h", *SOURCES)
     parts = [INCLUDE.sub("", (NATIVE / name).read_text(encoding="utf-8")) for name in names]
     includes = f'#include "{prefix}.h"\n#include "{prefix}_mpc.h"\n\n'
     code = _renamed("\n".join(parts), prefix)
@@ -122,5 +122,5 @@ def _plan(prefix: str, task: MpcTask) -> str:
     values = {name: f"call_{name}" for name in FUNCTIONS} | {name: name for name in ARRAYS}
     for name, number in task.numbers.items():
         values[name] = str(int(number)) if name in SIZES else repr(float(number))
-    rows = ",\n".join(f"    {values[name]} /* {name} */" for name, *_ in Task._fields_)
+    rows = ",\n".join(f"    {values[name]} /* {name} */" for name, *_ in TaskRecord._fields_)
     return f"\nconst {prefix}_mpc_task {prefix}_mpc_plan = {{\n{rows}\n}};\n"

@@ -8,7 +8,7 @@ from ..basics.errors import CompilerNotFound, PlanningError
 from ..compiling.compiler import compile_library, opened
 
 NATIVE = Path(__file__).parent / "native"
-SOURCES = ("plan.c", "motion.c", "program.c", "quadratic.c", "tick.c")
+SOURCES = ("plan.c", "motion.c", "least_squares.c", "box_qp.c", "controller.c")
 FLAGS = ("-O3",)  # loops along rows of matrices
 _pointer, _int, _double = ctypes.c_void_p, ctypes.c_int, ctypes.c_double
 INTEGERS = ("tail", "intervals", "steps", "late_steps", "iterations", "goal_rows")
@@ -17,7 +17,7 @@ TIMES = ("period", "delay", "horizon", "end", "last", "damping")
 FUNCTIONS = ("rates", "slopes", "momentum")
 
 
-class Task(ctypes.Structure):
+class TaskRecord(ctypes.Structure):
     """``mpc_task`` of native/mpc.h."""
 
     _fields_ = (
@@ -31,7 +31,7 @@ class Task(ctypes.Structure):
     )
 
 
-class State(ctypes.Structure):
+class StateRecord(ctypes.Structure):
     """``mpc_state``."""
 
     _fields_ = (
@@ -48,7 +48,7 @@ class State(ctypes.Structure):
 class Simulation(ctypes.Structure):
     """``mpc_simulation``."""
 
-    _fields_ = (("state", State), ("step_begin", _pointer), ("clock", _double))
+    _fields_ = (("state", StateRecord), ("step_begin", _pointer), ("clock", _double))
 
 
 @cache

@@ -90,7 +90,7 @@ class Mpc:
         self.model, self.plan = model, plan
         self.settings = checked_settings(plan, given)
         self.task = task_of(model, plan, self.settings)
-        self._own = Memory(self.task)
+        self._own = ControllerMemory(self.task)
 
     def __repr__(self) -> str:
         """Model, rate, horizon and intervals."""
@@ -158,7 +158,7 @@ class Mpc:
         if nt != self.model.layout.nt:
             needs = f"a model of {self.model.layout.nt} tail coordinates, as the controller's"
             raise refusal("Mpc: tail coordinates", nt, needs, SimulationError)
-        memory = Memory(self.task)
+        memory = ControllerMemory(self.task)
         native = NativeTorque(kernel().mpc_simulated, ctypes.addressof(memory.run))
         own = OwnState(memory.begin_run, lambda: {"mpc": memory.info()}, lambda *_: self.stops())
         return Parts(np.full(nt, self.plan.problem.damping), native=native, own=own)
@@ -206,7 +206,7 @@ class Mpc:
         return arrays[0], arrays[1]
 
 
-class Memory:
+class ControllerMemory:
     """The memory of one controller at work, and the C code that uses it."""
 
     def __init__(self, task: MpcTask):

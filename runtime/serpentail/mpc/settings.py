@@ -1,4 +1,4 @@
-"""Settings of ``Mpc``, checked one by one."""
+"""MpcSettings of ``Mpc``, checked one by one."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -22,7 +22,7 @@ MOST_TICKS = 100_000
 
 
 @dataclass(frozen=True)
-class Settings:
+class MpcSettings:
     """Checked settings of ``Mpc``; horizon: s, inf for the rest of the plan."""
 
     rate: float
@@ -34,7 +34,7 @@ class Settings:
     rest: float
 
 
-def checked_settings(plan: Plan, given: dict[str, Any]) -> Settings:
+def checked_settings(plan: Plan, given: dict[str, Any]) -> MpcSettings:
     """Return the settings, with defaults for those left out; PlanningError if one is wrong."""
     for name in given:
         unknown = none_of("Mpc: setting", name, NAMES)
@@ -60,7 +60,7 @@ def checked_settings(plan: Plan, given: dict[str, Any]) -> Settings:
         needs = f"at most {MOST_STEPS} steps in an interval: make it longer"
         raise refusal("Mpc: step", step, needs, PlanningError)
     iterations = _count("iterations", given["iterations"])
-    return Settings(rate, horizon, intervals, delay, iterations, step, rest)
+    return MpcSettings(rate, horizon, intervals, delay, iterations, step, rest)
 
 
 def refuse_unable(model: Model, plan: Plan) -> None:

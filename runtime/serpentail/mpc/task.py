@@ -12,8 +12,8 @@ from ..planning.nlp.direct import goal_matrix
 from ..planning.problem import PlanningProblem
 from ..planning.result.curve import Curve
 from ..planning.result.plan import Plan
-from .kernel import FUNCTIONS, Task
-from .settings import NEEDED, Settings
+from .kernel import FUNCTIONS, TaskRecord
+from .settings import NEEDED, MpcSettings
 
 # errors at the end that weigh as much as a correction by the largest torque all the time
 TURN, TURN_RATE = 1e-3, 0.1  # rad, rad/s: of the torso
@@ -29,10 +29,10 @@ class MpcTask:
 
     numbers: dict[str, float]
     arrays: dict[str, np.ndarray]
-    record: Task
+    record: TaskRecord
 
 
-def task_of(model: Model, plan: Plan, settings: Settings) -> MpcTask:
+def task_of(model: Model, plan: Plan, settings: MpcSettings) -> MpcTask:
     """Return the task of a plan that a model's body is to follow."""
     problem, duration = plan.problem, plan.duration
     horizon = min(settings.horizon, duration)
@@ -72,7 +72,7 @@ def task_of(model: Model, plan: Plan, settings: Settings) -> MpcTask:
     for name in FUNCTIONS:
         function = getattr(model.library, f"{model.name}_{NEEDED[name]}")
         places[name] = ctypes.cast(function, ctypes.c_void_p).value
-    return MpcTask(numbers, arrays, Task(**numbers, **places))
+    return MpcTask(numbers, arrays, TaskRecord(**numbers, **places))
 
 
 def polynomials_of(curve: Curve) -> tuple[np.ndarray, np.ndarray]:

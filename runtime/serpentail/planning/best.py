@@ -6,6 +6,7 @@ from dataclasses import replace
 from ..basics.progress import Stage
 from ..model.model import Model
 from ..simulation.simulate import read_clocks
+from .mesh_refinement import Search
 from .momentum import refuse_impossible
 from .nlp.equations import equations_of_motion
 from .nlp.fork_gate import forks_wait
@@ -14,7 +15,6 @@ from .paths_at_start import refuse_violated
 from .problem import PlanningProblem
 from .result.plan import Plan
 from .round import Round
-from .rounds import Search
 from .settings import PlanSettings
 from .softening import SOFTENING
 

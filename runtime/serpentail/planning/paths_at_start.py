@@ -7,10 +7,10 @@ import numpy as np
 from ..basics.errors import PlanningError
 from ..model.model import Model
 from .design import Design
-from .found import start_blocks
-from .nlp.body import Body
+from .free_variables import start_blocks
+from .nlp.body import BodyFunctions
 from .nlp.coordinates import attitude, rotated
-from .nlp.point import Point, asked, point_of
+from .nlp.point import PathPoint, asked, point_of
 from .nlp.start import conserved_of
 from .problem import START_SLACK, PlanningProblem
 from .result.excess import SLACK
@@ -46,14 +46,14 @@ def refuse_violated(model: Model, problem: PlanningProblem) -> None:
             )
 
 
-def _start(model: Model, problem: PlanningProblem) -> "tuple[Point, ca.SX]":
+def _start(model: Model, problem: PlanningProblem) -> "tuple[PathPoint, ca.SX]":
     """Return the point of a known start, and the symbols of what is not known there."""
     import casadi as ca
 
     # the state
     blocks = {name: ca.SX(ca.DM(part)) for name, part in start_blocks(problem).items()}
     blocks["quaternion"] = attitude(problem.attitude).quaternion(blocks["attitude"])
-    body = Body(model, Design(), None)
+    body = BodyFunctions(model, Design(), None)
     _, com, com_velocity = conserved_of(body, blocks)
     blocks["drift"] = rotated(blocks["quaternion"], blocks["velocity"] - com_velocity, -1)
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..model.model import Model
 from .flight import State
-from .nlp.program import Program
+from .nlp.program import NonlinearProgram
 from .nlp.solver import Solution
 from .problem import PlanningProblem
 from .result.curve import Curve
@@ -24,7 +24,7 @@ class Round:
 
     model: Model
     problem: PlanningProblem
-    nlp: Program
+    nlp: NonlinearProgram
     solution: Solution
     curve: Curve
     planned: tuple[np.ndarray, np.ndarray]

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "inside.h"
+#include "mpc_layout.h"
 
 static const double NODES[4] = {0.0, 0.5, 0.5, 1.0};
 static const double WEIGHTS[4] = {1.0 / 6, 1.0 / 3, 1.0 / 3, 1.0 / 6};

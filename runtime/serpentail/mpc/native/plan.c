@@ -1,6 +1,6 @@
 /* The plan's torques and states, which are polynomials on each piece. */
 
-#include "inside.h"
+#include "mpc_layout.h"
 
 /* Return the last piece that begins at or before the clock. */
 static int piece_of(const mpc_task *task, double clock)

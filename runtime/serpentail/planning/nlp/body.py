@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     import casadi as ca
 
 
-class Body:
+class BodyFunctions:
     """Parameters of a model by name, and its functions of SX operations with them.
 
     values (size,): symbols of the design's numbers, SI; None without a design.
@@ -44,7 +44,7 @@ def function_of_design(model: Model, design: Design, name: str) -> "ca.Function"
 
     symbolic, values = model.casadi.symbolic(name), ca.SX.sym("design", design.size)
     inputs = [ca.SX.sym(key, symbolic.size1_in(key)) for key in symbolic.name_in()[:-1]]
-    outputs = Body(model, design, values).call(name, *inputs)
+    outputs = BodyFunctions(model, design, values).call(name, *inputs)
     return ca.Function(name, [*inputs, values], [outputs])
 
 

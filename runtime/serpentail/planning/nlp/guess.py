@@ -18,7 +18,7 @@ from ..flight import State, flight
 from ..free_start import part_of
 from ..problem import PlanningProblem
 from .coordinates import Attitude, attitude
-from .program import Program
+from .program import NonlinearProgram
 from .start import StartRows
 from .transcription import Transcription
 
@@ -28,7 +28,7 @@ PUSH_WAVES = 3  # sines that it sums
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class GuessMotion:
     """A motion of a duration (s): at times (K,), s, blocks (K, size) in SI by name.
 
     start: its state; parameters: of the model that moves.
@@ -42,7 +42,7 @@ class Motion:
 
 def passive(
     model: Model, problem: PlanningProblem, damping: float, duration: float, push: np.ndarray
-) -> Motion:
+) -> GuessMotion:
     """Return the motion whose tail only damps (Eq. 47), the paper's guess (Sect. 3.2), and a push.
 
     push (n, 2m): torques, N m.  A flight that leaves the model's range serves until there.
@@ -69,7 +69,7 @@ def pushes(random: np.random.Generator, size: float, model: Model) -> np.ndarray
 
 def of_trajectory(
     model: Model, motion: Trajectory, coordinates: Attitude, damping: float = 0.0
-) -> Motion:
+) -> GuessMotion:
     """Return the motion of a trajectory; its torques without the part that damping gives."""
     mass = total_mass(model.parameters)
     R, velocity, tail_rate = (
@@ -92,14 +92,14 @@ def of_trajectory(
     def at(times: np.ndarray) -> dict[str, np.ndarray]:
         return {name: _linear(t, values, times) for name, values in samples.items()}
 
-    return Motion(t[-1], at, (motion.q[0], motion.v[0]), model.parameters)
+    return GuessMotion(t[-1], at, (motion.q[0], motion.v[0]), model.parameters)
 
 
 def _linear(t: np.ndarray, values: np.ndarray, times: np.ndarray) -> np.ndarray:
     return np.column_stack([np.interp(times, t, column) for column in values.T])
 
 
-def unknowns(motion: Motion, nlp: Program, duration: float) -> np.ndarray:
+def unknowns(motion: GuessMotion, nlp: NonlinearProgram, duration: float) -> np.ndarray:
     """Return w: the motion, stretched to a duration (s), at the points of a mesh."""
     variables, indices = nlp.variables, nlp.indices
     blocks = motion.at(nlp.fractions * motion.duration)
@@ -118,7 +118,7 @@ def unknowns(motion: Motion, nlp: Program, duration: float) -> np.ndarray:
     return w
 
 
-def _fill_shared(w: np.ndarray, nlp: Transcription, rows: StartRows, motion: Motion) -> None:
+def _fill_shared(w: np.ndarray, nlp: Transcription, rows: StartRows, motion: GuessMotion) -> None:
     """Set the unknowns that all nodes share, and those of the start alone."""
     variables, indices, design = nlp.variables, nlp.indices, nlp.variables.design
     parts = [part_of(motion.start, name) for name, _ in variables.at_start]

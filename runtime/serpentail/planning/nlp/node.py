@@ -18,7 +18,7 @@ from ..design import Design, refuse_unused
 from .coordinates import Attitude, rotated
 from .equations import Equations
 from .node_calls import NodeCall, NodeDerivatives, linear_call
-from .point import Point, asked, at_identity, point_of
+from .point import PathPoint, asked, at_identity, point_of
 from .start import Shared, StartRows, shared_of, start_rows
 
 if TYPE_CHECKING:
@@ -196,7 +196,7 @@ def _refuse_unused(
 def _calls(
     shared: Shared,
     problem: "PlanningProblem",
-    point: Point,
+    point: PathPoint,
     zeta: "ca.SX",
     equations: Equations,
 ) -> list[NodeCall]:
@@ -226,7 +226,7 @@ def _point(
     variables: Variables,
     attitude: Attitude,
     legs: "Legs | None" = None,
-) -> Point:
+) -> PathPoint:
     """Return the blocks of a node in SI units, which objectives and path constraints see."""
     blocks: dict[str, Any] = {"duration": zeta[0], "time": p[PARAMETERS] * zeta[0]}
     start = 1 + sum(size for _, size in variables.common)
@@ -238,7 +238,7 @@ def _point(
     return point_of(shared.body, blocks, shared.com, legs)
 
 
-def _rates(shared: Shared, point: Point, attitude: Attitude, v_dot: "ca.SX") -> dict[str, Any]:
+def _rates(shared: Shared, point: PathPoint, attitude: Attitude, v_dot: "ca.SX") -> dict[str, Any]:
     """Return the rates of state blocks; p_ddot = R (p_ddot(identity) + g z) - g z."""
     gravity = shared.body.gravity()
     return {
@@ -251,7 +251,7 @@ def _rates(shared: Shared, point: Point, attitude: Attitude, v_dot: "ca.SX") -> 
     }
 
 
-def _momentum(shared: Shared, point: Point, momentum: "ca.SX") -> "ca.SX":
+def _momentum(shared: Shared, point: PathPoint, momentum: "ca.SX") -> "ca.SX":
     """Return H v of the motion relative to the COM less (0, R^T h), in units.
 
     It is zero if omega carries h. If the linear momentum is zero, the angular momentum about B is
@@ -269,7 +269,7 @@ def _momentum(shared: Shared, point: Point, momentum: "ca.SX") -> "ca.SX":
 
 
 def cost(
-    problem: "PlanningProblem", point: Point, softening: "ca.SX", torque_unit: np.ndarray
+    problem: "PlanningProblem", point: PathPoint, softening: "ca.SX", torque_unit: np.ndarray
 ) -> "ca.SX":
     """Return the objective's integrand (Eq. 40; CasADi), in units of the torques.
 

@@ -1,4 +1,4 @@
-"""``Point``: a node, as objectives and path constraints receive it."""
+"""``PathPoint``: a node, as objectives and path constraints receive it."""
 
 from collections.abc import Callable
 from types import SimpleNamespace
@@ -9,7 +9,7 @@ import numpy as np
 from ...basics.checks import did_you_mean, needed
 from ...basics.errors import PlanningError
 from ...model.model import Model
-from .body import Body
+from .body import BodyFunctions
 from .coordinates import COM_ENTRIES, IDENTITY_POSE, rotated
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ...simulation.schedules import Legs
 
 
-class Point(SimpleNamespace):
+class PathPoint(SimpleNamespace):
     """CasADi blocks of a node by name, in SI units.
 
     They are those of the formulation, torque (2m,), quaternion, time and duration (s), and
@@ -43,7 +43,7 @@ class Point(SimpleNamespace):
 
 
 def asked(
-    field: str, function: Callable[[Any], Any], point: Point, single: bool = False
+    field: str, function: Callable[[Any], Any], point: PathPoint, single: bool = False
 ) -> "ca.SX":
     """Return the result of a user's function of a point, a matrix.
 
@@ -86,28 +86,28 @@ def _has_nan(expression: "ca.SX") -> bool:
 
 
 def point_of(
-    body: Body, blocks: dict[str, Any], start: "ca.SX", legs: "Legs | None" = None
-) -> Point:
+    body: BodyFunctions, blocks: dict[str, Any], start: "ca.SX", legs: "Legs | None" = None
+) -> PathPoint:
     """Return the point of a node's blocks; start (6,): position and velocity of the COM then."""
     import casadi as ca
 
     model = body.model
 
-    def center_of_mass(point: Point) -> "ca.SX":
+    def center_of_mass(point: PathPoint) -> "ca.SX":
         if "velocity" in blocks:
             return point.position + _offset(body, point)
         t = point.time
         return start[:3] + start[3:] * t - body.gravity() * t**2 / 2
 
-    def position(point: Point) -> "ca.SX":
+    def position(point: PathPoint) -> "ca.SX":
         return point.center_of_mass - _offset(body, point)
 
-    def tail_points(point: Point) -> "ca.SX":
+    def tail_points(point: PathPoint) -> "ca.SX":
         own = body.call("tail_points", at_identity(point))
         rows = [point.position + rotated(point.quaternion, own[k, :].T) for k in range(own.size1())]
         return ca.horzcat(*rows).T
 
-    def contact_points(point: Point) -> "ca.SX":
+    def contact_points(point: PathPoint) -> "ca.SX":
         if "feet" in model.contacts and legs is None:
             raise PlanningError(
                 "contact_points: give the plan `legs`, such as st.Legs.fixed(gamma, delta)"
@@ -115,7 +115,7 @@ def point_of(
         still = () if legs is None else (np.append(legs.curve.at(0.0)[0], np.zeros(4)),)
         return _touching(body, point, still)
 
-    def body_points(point: Point) -> "ca.SX":
+    def body_points(point: PathPoint) -> "ca.SX":
         return _touching(body, point, any_legs(model))[model.contacts.get("feet", 0) :, :]
 
     makers = {
@@ -127,7 +127,7 @@ def point_of(
         makers |= {"tail_points": tail_points, "tip": lambda point: point.tail_points[-1, :].T}
     if model.contacts:
         makers |= {"contact_points": contact_points, "body_points": body_points}
-    return Point(makers=makers, parameters=dict(body.parameters), **blocks)
+    return PathPoint(makers=makers, parameters=dict(body.parameters), **blocks)
 
 
 def any_legs(model: Model) -> tuple[np.ndarray, ...]:
@@ -135,19 +135,19 @@ def any_legs(model: Model) -> tuple[np.ndarray, ...]:
     return (np.zeros(8),) if "feet" in model.contacts else ()
 
 
-def body_heights(point: Point) -> "ca.SX":
+def body_heights(point: PathPoint) -> "ca.SX":
     """Heights (K,) of the points of tail and torso that may touch the ground."""
     return point.body_points[:, 2]
 
 
-def at_identity(point: Point) -> "ca.SX":
+def at_identity(point: PathPoint) -> "ca.SX":
     """q of the tail on a torso at the origin that is not rotated."""
     import casadi as ca
 
     return ca.vertcat(ca.DM(IDENTITY_POSE), point.tail)
 
 
-def _touching(body: Body, point: Point, legs: tuple[np.ndarray, ...]) -> "ca.SX":
+def _touching(body: BodyFunctions, point: PathPoint, legs: tuple[np.ndarray, ...]) -> "ca.SX":
     """Points (K, 3) that may touch the ground, world."""
     import casadi as ca
 
@@ -156,7 +156,7 @@ def _touching(body: Body, point: Point, legs: tuple[np.ndarray, ...]) -> "ca.SX"
     return body.call("contact_points", q, np.zeros(body.model.nv), *legs)[0]
 
 
-def _offset(body: Body, point: Point) -> "ca.SX":
+def _offset(body: BodyFunctions, point: PathPoint) -> "ca.SX":
     """The COM from B, world."""
     import casadi as ca
 

@@ -12,7 +12,7 @@ from .node import Variables
 from .rules import CollocationRule
 
 
-class Program(Protocol):
+class NonlinearProgram(Protocol):
     """A problem on a mesh, and what its unknowns w mean."""
 
     @property

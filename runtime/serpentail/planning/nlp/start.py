@@ -14,7 +14,7 @@ from serpentail_scene.layout import OMEGA, VELOCITY
 
 from ...model.lazy import kept
 from ...model.model import Model
-from .body import Body
+from .body import BodyFunctions
 from .coordinates import COM_ENTRIES, IDENTITY_POSE, Attitude, rotated
 from .point import asked, point_of
 
@@ -60,7 +60,7 @@ class Shared:
     velocity (6,) of the COM at the start, SI. design: its numbers, if there are any.
     """
 
-    body: Body
+    body: BodyFunctions
     momentum: "ca.SX"
     com: "ca.SX"
     design: "tuple[ca.SX, ...]"
@@ -76,7 +76,7 @@ def shared_of(model: Model, zeta: "ca.SX", p: "ca.SX", variables: "Variables") -
         found[name] = variables.units[name] * zeta[start : start + size]
         start += size
     design = (found["design"],) if "design" in found else ()
-    body = Body(model, variables.design, found.get("design"))
+    body = BodyFunctions(model, variables.design, found.get("design"))
     return Shared(body, found["momentum"], ca.vertcat(found["com"], found["com_velocity"]), design)
 
 
@@ -135,7 +135,7 @@ def start_rows(
     for name, size in parts:
         blocks[name] = variables.units[name] * x[first : first + size]
         first += size
-    body = Body(model, variables.design, blocks.pop("design", None))
+    body = BodyFunctions(model, variables.design, blocks.pop("design", None))
     blocks["quaternion"] = attitude.quaternion(blocks["attitude"])
     momentum, com, com_velocity = conserved_of(body, blocks)
 
@@ -164,7 +164,7 @@ def start_rows(
     )
 
 
-def conserved_of(body: Body, blocks: dict[str, Any]) -> "tuple[ca.SX, ca.SX, ca.SX]":
+def conserved_of(body: BodyFunctions, blocks: dict[str, Any]) -> "tuple[ca.SX, ca.SX, ca.SX]":
     """Return the quantities of CONSERVED, from H v in body axes."""
     import casadi as ca
 

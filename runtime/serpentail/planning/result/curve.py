@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...basics.short_repr import brief
-from ..nlp.program import Program
+from ..nlp.program import NonlinearProgram
 from ..nlp.rules import CollocationRule
 
 
@@ -61,7 +61,7 @@ class Curve:
         }
 
 
-def curve(nlp: Program, w: np.ndarray, p: np.ndarray) -> Curve:
+def curve(nlp: NonlinearProgram, w: np.ndarray, p: np.ndarray) -> Curve:
     """Return the curve of the unknowns w; p: the program's parameters."""
     indices, rule, variables, mesh = nlp.indices, nlp.rule, nlp.variables, nlp.mesh
     scale = variables.scale(variables.states)

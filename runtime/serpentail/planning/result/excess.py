@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..nlp.node import Node
-from ..nlp.program import Program
+from ..nlp.program import NonlinearProgram
 from ..nlp.transcription import Transcription
 from .curve import Curve
 from .truth import planned_torques
@@ -14,7 +14,7 @@ SLACK = 1e-3  # of a bound: a successful plan may exceed it by this part
 Excess = dict[str, np.ndarray]
 
 
-def excess(nlp: Program, curve: Curve, p: np.ndarray, w: np.ndarray) -> Excess:
+def excess(nlp: NonlinearProgram, curve: Curve, p: np.ndarray, w: np.ndarray) -> Excess:
     """Return by what part (N,) of a bound each interval exceeds it, by name; 0 or less inside it.
 
     Names: "torque", "torque_rate", "angle", "rate", "path", if they are bounded. For a path
@@ -57,7 +57,7 @@ def _beyond(ratios: np.ndarray, intervals: int) -> np.ndarray:
     return np.abs(ratios).reshape(intervals, -1).max(axis=1) - 1
 
 
-def _slopes(nlp: Program, curve: Curve, k: np.ndarray, s: np.ndarray) -> np.ndarray:
+def _slopes(nlp: NonlinearProgram, curve: Curve, k: np.ndarray, s: np.ndarray) -> np.ndarray:
     """Slopes of torques (N SAMPLES, 2m), N m/s; of torques that are constant in intervals, their
     steps over the distance of nodes.
     """

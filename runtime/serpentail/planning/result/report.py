@@ -12,15 +12,15 @@ from ...model.model import Model
 from ...motion.trajectory import Trajectory
 from ...simulation.pfl import Pfl
 from ..flight import flight
-from ..found import chosen, start_found
+from ..free_variables import chosen, start_found
 from ..problem import PlanningProblem
 from .curve import Curve
 from .excess import largest
 from .truth import attitude_errors, work
 
 if TYPE_CHECKING:
+    from ..mesh_refinement import Search
     from ..round import Round
-    from ..rounds import Search
 
 TRACKED_SAMPLES = 580  # of a tracked motion
 TRACKING_COST = 0.1  # about how long tracking takes (s), of the flight's duration

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "inside.h"
+#include "stage_layout.h"
 
 static double *next(double **memory, size_t count)
 {

@@ -18,8 +18,8 @@ from ..nlp.node import Variables, variables_of
 from ..nlp.rules import CollocationRule
 from ..nlp.transcription import torque_unit
 from ..problem import PlanningProblem
-from .cut import Cut, coefficients_of, cut
 from .node import NodeCode, node_code
+from .stage_mesh import Cut, coefficients_of, cut
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,6 @@
 /* A node in the program's units, its joints damped. */
 
-#include "inside.h"
+#include "stage_layout.h"
 
 /* The unit of entry i of y. */
 static double unit_of_y(const Task *task, int i)

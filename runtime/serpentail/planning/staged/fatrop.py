@@ -15,11 +15,11 @@ from ...basics.errors import CompilerNotFound, PlanningError
 from ...compiling.compiler import compile_library, opened
 from ..nlp.interrupt import stop_reason
 from ..nlp.solver import Solution
-from .helpers import crew_of, helped
 from .stages import Stages, packed, unpacked
-from .task import Task, task_of
+from .task import StageTask, task_of
+from .thread_pool import crew_of, helped
 
-NATIVE = Path(__file__).parents[1] / "native"
+NATIVE = Path(__file__).parent / "native"
 FLAGS = ("-O3", "-ftree-vectorize", "-pthread")  # loops along rows of matrices; threads
 CALLED = {  # of FATROP's C interface, by the names of Library in native/fatrop.c
     "create": "create",
@@ -86,7 +86,7 @@ class Option(ctypes.Structure):
     _fields_ = (("name", ctypes.c_char_p), ("kind", ctypes.c_int), ("value", ctypes.c_double))
 
 
-class Outcome(ctypes.Structure):
+class SolveResult(ctypes.Structure):
     """How a solve ended, and the elapsed times (s) of evaluations and in total."""
 
     _fields_ = (
@@ -126,7 +126,7 @@ def kernel() -> ctypes.CDLL:
         raise PlanningError(f"solver: value 'fatrop': {error}") from error
     pointer = ctypes.c_void_p
     made.program_new.restype = pointer
-    made.program_new.argtypes = (ctypes.POINTER(Task),)
+    made.program_new.argtypes = (ctypes.POINTER(StageTask),)
     made.program_free.argtypes = made.program_variables.argtypes = (pointer,)
     made.program_rows.argtypes = made.program_help.argtypes = (pointer,)
     made.program_dismiss.argtypes = (pointer,)
@@ -135,7 +135,7 @@ def kernel() -> ctypes.CDLL:
     made.program_nodes.argtypes = (pointer, pointer, pointer)
     made.fatrop_run.argtypes = (
         *(pointer, ctypes.POINTER(Library), ctypes.POINTER(Option), ctypes.c_int, Stop),
-        *(pointer, pointer, ctypes.POINTER(Outcome)),
+        *(pointer, pointer, ctypes.POINTER(SolveResult)),
     )
     made.fatrop_run.restype = None
     return made
@@ -246,12 +246,12 @@ def solve_stages(
 
 def _run(
     task: Any, variables: np.ndarray, states: np.ndarray, settings: Any, crew: int = 1
-) -> tuple[Outcome, np.ndarray, np.ndarray, dict[str, np.ndarray]]:
+) -> tuple[SolveResult, np.ndarray, np.ndarray, dict[str, np.ndarray]]:
     """Run FATROP; what it ends with, its variables, multipliers, and states and turn at nodes.
 
     crew: number of threads that evaluate stages.
     """
-    code, stopping, outcome = kernel(), _Stopping(), Outcome()
+    code, stopping, outcome = kernel(), _Stopping(), SolveResult()
     found, nodes = variables.copy(), np.ascontiguousarray(states)
     y = np.zeros((*states.shape[:2], states.shape[2] + 3))
     program = code.program_new(ctypes.byref(task.task))

@@ -10,13 +10,13 @@ from serpentail_scene.layout import OMEGA, POSITION, TAIL_Q, TAIL_V, VELOCITY
 from ..model.model import Model
 from .free_start import part_of, with_parts
 from .nlp.coordinates import attitude
-from .nlp.program import Program
+from .nlp.program import NonlinearProgram
 from .problem import PlanningProblem
 
 Flown = tuple[Model, PlanningProblem]  # the problem's start is the one that is flown
 
 
-def flown(model: Model, problem: PlanningProblem, nlp: Program, w: np.ndarray) -> Flown:
+def flown(model: Model, problem: PlanningProblem, nlp: NonlinearProgram, w: np.ndarray) -> Flown:
     """Return the model with the parameters of the unknowns w, and the problem with their start."""
     if not problem.is_free or not np.isfinite(w).all():
         return model, problem

@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-#include "inside.h"
+#include "stage_layout.h"
 
 /* Scratch of a Hessian, after what a node needs. */
 typedef struct {

@@ -1,6 +1,6 @@
 /* Threads that share pieces of work, each of which takes much longer than the lock. */
 
-#include "crew.h"
+#include "thread_pool.h"
 
 int crew_begin(Crew *crew)
 {

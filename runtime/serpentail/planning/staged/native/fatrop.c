@@ -8,7 +8,7 @@
 #include <string.h>
 
 #include "fatrop/ocp/OCPCInterface.h"
-#include "program.h"
+#include "ocp.h"
 
 /* What is called of the library. */
 typedef struct {

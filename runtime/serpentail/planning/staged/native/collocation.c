@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "inside.h"
+#include "stage_layout.h"
 
 /* largest residual that counts as none, in units; where rounding keeps it above, so much will do */
 static const double TIGHT = 1e-12, LOOSE = 1e-9;

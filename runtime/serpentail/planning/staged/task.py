@@ -19,7 +19,7 @@ GIVES = {"far": 1e5, "close": 1e8}
 _pointer = ctypes.c_void_p
 
 
-class Task(ctypes.Structure):
+class StageTask(ctypes.Structure):
     """The fields of native/stage.h, in its order."""
 
     _fields_ = (
@@ -47,7 +47,7 @@ class Task(ctypes.Structure):
 class OwnedTask:
     """A task, and what it points to."""
 
-    task: Task
+    task: StageTask
     arrays: dict[str, np.ndarray]
     node: NodeCode
 
@@ -62,7 +62,7 @@ def task_of(
     arrays = _arrays(stages) | _goal(stages) | _bounds(stages)
     arrays |= {"start": start, "momentum": p[:3]}
     arrays = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
-    task = Task(
+    task = StageTask(
         stages=stages.cut.stages,
         intervals=stages.mesh.intervals,
         nodes=len(stages.rule.nodes),

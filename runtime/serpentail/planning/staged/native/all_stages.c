@@ -2,8 +2,8 @@
 
 #include <string.h>
 
-#include "inside.h"
-#include "program.h"
+#include "stage_layout.h"
+#include "ocp.h"
 
 /* What is asked of all stages: values (order 0), slopes (1), or Hessians (2) as of program_curve. */
 typedef struct {

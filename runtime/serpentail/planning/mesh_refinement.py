@@ -12,14 +12,15 @@ import numpy as np
 
 from ..model.model import Model
 from ..simulation.simulate import spent
-from .found import chosen, flown, guessed
+from .backends import Begin, way_of
+from .free_variables import chosen, flown, guessed
 from .nlp.coordinates import attitude
 from .nlp.equations import Equations
-from .nlp.guess import Motion, of_trajectory, passive, pushes, unknowns
+from .nlp.guess import GuessMotion, of_trajectory, passive, pushes, unknowns
 from .nlp.interrupt import stop_reason, time_left
 from .nlp.mesh import Mesh, refined
 from .nlp.multipliers import Multipliers
-from .nlp.program import Program
+from .nlp.program import NonlinearProgram
 from .nlp.rules import collocation_rule
 from .nlp.solver import Solution
 from .nlp.transcription import torque_unit
@@ -33,7 +34,6 @@ from .result.truth import end_errors, local_errors, open_loop
 from .round import Round
 from .settings import PlanSettings
 from .softening import softening_of
-from .ways import Begin, way_of
 
 FIRST_PUSH = 0.05  # of the torques' unit: takes the first guess out of a plane of symmetry
 DURATIONS = (1.0, 0.5, 0.75, 0.25)  # of guesses, in turn, from the least (0) to the most (1)
@@ -111,7 +111,9 @@ class Search:
                 break
             self.softening = self.softening[1:] or self.softening
             nlp = self._transcribed(mesh)
-            motion = Motion(last.curve.duration, last.curve.at, last.start, last.model.parameters)
+            motion = GuessMotion(
+                last.curve.duration, last.curve.at, last.start, last.model.parameters
+            )
             multipliers = self.way.carried(last.solution.multipliers, last.nlp, nlp)
             last = self._round(nlp, self._solved_near(nlp, motion, multipliers))
             yield last
@@ -185,11 +187,11 @@ class Search:
         yield
         self.spent[name] += time.perf_counter() - begun
 
-    def _transcribed(self, mesh: Mesh) -> Program:
+    def _transcribed(self, mesh: Mesh) -> NonlinearProgram:
         with self._timed("derive_s"):
             return self.way.program(self, mesh)
 
-    def _solved_given(self, nlp: Program) -> Solution:
+    def _solved_given(self, nlp: NonlinearProgram) -> Solution:
         """Solve from the user's guess, or from passive flight."""
         guess = self.settings.guess
         if guess is None:
@@ -209,18 +211,18 @@ class Search:
         multipliers = guess.solution.multipliers
         same_size = [part.size for part in multipliers] == [nlp.indices.size, nlp.rows]
         parameters = {**self.model.parameters, **guess.design}
-        motion = Motion(guess.duration, guess.curve.at, guess.start, parameters)
+        motion = GuessMotion(guess.duration, guess.curve.at, guess.start, parameters)
         return self._solved_near(nlp, motion, multipliers if same_size else None)
 
     def _solved_near(
-        self, nlp: Program, motion: Motion, multipliers: Multipliers | None
+        self, nlp: NonlinearProgram, motion: GuessMotion, multipliers: Multipliers | None
     ) -> Solution:
         """Solve from a motion that is close to a solution; as from afar if that fails."""
         guess = "close" if multipliers is None else "warm"
         solution = self._solved(nlp, motion, guess, multipliers)
         return solution if solution.success or self.stopped else self._solved(nlp, motion)
 
-    def _pushed(self, k: int) -> Motion:
+    def _pushed(self, k: int) -> GuessMotion:
         """Passive flight; the tail is pushed a little for k = 0, or about at random."""
         settings, (least, most) = self.settings, self.problem.duration
         duration = least + (most - least) * DURATIONS[k % len(DURATIONS)]
@@ -232,8 +234,8 @@ class Search:
 
     def _solved(
         self,
-        nlp: Program,
-        motion: Motion,
+        nlp: NonlinearProgram,
+        motion: GuessMotion,
         guess: str = "far",
         multipliers: Multipliers | None = None,
     ) -> Solution:
@@ -250,7 +252,7 @@ class Search:
             self._stopped()
         return solution
 
-    def _round(self, nlp: Program, solution: Solution) -> Round:
+    def _round(self, nlp: NonlinearProgram, solution: Solution) -> Round:
         """Return a round: the solution's curve, and its truth."""
         motion = curve(nlp, solution.w, self.parameters)
         model, problem = flown(self.model, self.problem, nlp, solution.w)

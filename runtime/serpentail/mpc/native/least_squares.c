@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "inside.h"
+#include "mpc_layout.h"
 
 /* Add weight r^2 / 2; row (columns) is dr / d(correction). */
 static void add_square(const mpc_motion *motion, mpc_program *program, double weight, double r,

@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..basics.errors import PlanningError
-from .condensed.fatrop import engine_of, solve_stages
-from .condensed.node import lacking
-from .condensed.stages import Stages, stages_of
-from .found import start_blocks
+from .free_variables import start_blocks
 from .nlp.bounds import limits
 from .nlp.mesh import Mesh, uniform
 from .nlp.multipliers import Multipliers, carried
-from .nlp.program import Program
+from .nlp.program import NonlinearProgram
 from .nlp.solver import Solution, solve, solver
 from .nlp.transcription import Transcription, transcription_of
+from .staged.fatrop import engine_of, solve_stages
+from .staged.node import lacking
+from .staged.stages import Stages, stages_of
 
 if TYPE_CHECKING:
-    from .rounds import Search
+    from .mesh_refinement import Search
 
 FATROP = "fatrop"
 INTERVALS, MOST = 12, 200  # of a sparse program: of its first mesh, and the most
@@ -134,7 +134,7 @@ def _staged_solved(search: "Search", stages: Stages, engine: Any, begin: Begin) 
     return solve_stages(stages, start_blocks(search.problem), begin.w, search.parameters, engine)
 
 
-def _not_carried(_multipliers: Multipliers, _old: Program, _new: Program) -> None:
+def _not_carried(_multipliers: Multipliers, _old: NonlinearProgram, _new: NonlinearProgram) -> None:
     """FATROP's interface takes no multipliers."""
 
 

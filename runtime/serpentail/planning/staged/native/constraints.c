@@ -3,8 +3,8 @@
 #include <math.h>
 #include <string.h>
 
-#include "inside.h"
-#include "program.h"
+#include "stage_layout.h"
+#include "ocp.h"
 
 /* ---- inequalities: torques, states at the start or the duration, states at inner nodes */
 

@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "inside.h"
-#include "program.h"
+#include "stage_layout.h"
+#include "ocp.h"
 
 /* ---- memory */
 

@@ -14,7 +14,7 @@
 #ifndef SERPENTAIL_PROGRAM_H
 #define SERPENTAIL_PROGRAM_H
 
-#include "crew.h"
+#include "thread_pool.h"
 #include "stage.h"
 
 typedef struct {
@@ -58,7 +58,7 @@ Stage *sloped(Program *program, int k, const double *u, const double *s);
 /* Their v. */
 void variables_of(const Program *program, int k, const double *u, const double *s, double *v);
 
-/* together.c: all stages, at u and s of all in a row; what they give is kept, so that the functions
+/* all_stages.c: all stages, at u and s of all in a row; what they give is kept, so that the functions
    above give it at once.  The Hessian (all variables of the stage) of stage k is that of scale cost
    + lambda[next[k] ..]^T end + lambda[inner[k] ..]^T inequalities, as those of the stage are. */
 void program_values(Program *program, const double *w);

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "inside.h"
+#include "mpc_layout.h"
 
 static const double NEVER = 1e300, SAME = 1e-6; /* of a period: closer times count as equal */
 static const double ROUNDING = 1e-9;            /* relative, of a sum of squares */

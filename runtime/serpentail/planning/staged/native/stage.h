@@ -60,7 +60,7 @@ typedef struct {
     const double *start;    /* (4 + 2m), in units */
     double shortest, longest; /* s; equal where the duration is no variable */
     const double *most_torque, *most_angle, *most_rate; /* (m) magnitudes in units, or NULL */
-    double give;            /* what squares of the goal's rows cost, twice: see program.h */
+    double give;            /* what squares of the goal's rows cost, twice: see ocp.h */
     int goal_rows;
     const double *goal;     /* (goal_rows, 4): rows that are zero at the attitude of the end */
     const double *end_state;/* (4 + 2m) in units, nan where it is free */
@@ -85,19 +85,19 @@ typedef struct {
     int known, failed;            /* whether v is known, and has no z */
     int sloped, factored;         /* whether slopes and factors are there, as of any v */
     long node_calls, newton_steps;
-    double *given;                /* v where the program evaluates it, see together.c */
+    double *given;                /* v where the program evaluates it, see all_stages.c */
     double *mu, *H;               /* weights of r, and its Hessian with them */
     int curved;                   /* whether H could be had */
 } Stage;
 
-/* dense.c: matrices row by row */
+/* lu.c: matrices row by row */
 int factorise(int n, double *A, int *pivots); /* 1 where A is singular */
 void subtract_rows(int count, const double *factors, const double *A, int stride, double *b,
                    int columns); /* b -= factors A */
 void solve(int n, const double *A, const int *pivots, int columns, double *B);
 void solve_transposed(int n, const double *A, const int *pivots, double *b);
 
-/* dense.c: whether all are finite, and below FAR */
+/* lu.c: whether all are finite, and below FAR */
 int is_moderate(const double *values, size_t count);
 
 /* node.c: a node in the program's units; 0 where all is finite */

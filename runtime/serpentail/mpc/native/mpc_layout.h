@@ -48,7 +48,7 @@ int mpc_step(mpc_motion *motion, double t, double h, const double *correction, i
              int columns);
 int mpc_node(mpc_motion *motion, double t, const double *x, const double *correction, int slopes);
 
-/* program.c: compute the cost of a motion from x0, with derivatives if the program has arrays for
+/* least_squares.c: compute the cost of a motion from x0, with derivatives if the program has arrays for
    them; return 0 if all numbers are finite */
 int mpc_program_of(mpc_motion *motion, const double *x0, mpc_program *program);
 
