@@ -11,9 +11,9 @@ import serpentail as st
 from serpentail.identification import radau_steps as stages
 from serpentail.identification import start as start_room
 from serpentail.identification.inverse import smoothed
+from serpentail.identification.linear import marker_jacobians
 from serpentail.identification.placement import placements
 from serpentail.identification.points import world_points
-from serpentail.identification.trial import marker_jacobians
 from serpentail.identification.unknowns import unknowns
 from tests.identification.flights import flown, placed, start, tracks
 from tests.support import zoo
@@ -196,8 +196,8 @@ def test_derivatives_of_markers_are_central_differences():
 def interval(model, x, torques, span=0.004):
     nodes = stages.NODES[:, None]
     over = ((1 - nodes) * torques[0] + nodes * torques[1])[None]
-    guess = np.tile(x, (1, 3, 1))
-    return stages.solved(model, np.array([span]), x[None], over, guess)[0], over
+    one = stages.Intervals(np.array([span]), x[None], over)
+    return stages.solved(model, one, np.tile(x, (1, 3, 1)))[0], one
 
 
 @pytest.mark.parametrize("name", ["m1_n3", "elastic", "arcs2", "elastic_arcs"])
@@ -208,9 +208,9 @@ def test_intervals_end_as_by_scipy_and_their_derivatives_are_central_differences
     flight = flown(model, np.array([0, span]), x, lambda t: [1 - t / span, t / span] @ torques)
     ours = interval(model, x, torques, span)[0][-1]
     assert np.abs(stages.difference(model, ours, flight[-1])).max() < 1e-7 or name == "elastic_arcs"
-    X, over = interval(model, x, torques)
-    parts = X[None], np.eye(len(model.parameter_vector)), True
-    found = stages.differentiated(model, np.array([0.004]), x[None], over, parts)
+    X, one = interval(model, x, torques)
+    by_struct = np.eye(len(model.parameter_vector))
+    found = stages.differentiated(model, one, X[None], by_struct, unknown_torques=True)
 
     def change(h, end_at):
         ahead, behind = (interval(*end_at(sign * h))[0][-1] for sign in (1, -1))

@@ -1,7 +1,7 @@
 """``Marker``: where a marker is on the torso or along the tail."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -71,39 +71,29 @@ class Placements:
         """Which markers are on the torso, (M,)."""
         return self.piece == TORSO
 
-    def moved(self, offset: np.ndarray) -> "Placements":
-        """Return the same markers with other offsets."""
-        return replace(self, offset=offset)
-
-
-def pieces_of(model: Model) -> Pieces:
-    """Return the pieces of a model's tail."""
-    count = np.atleast_1d(model.joints_each)
-    arc = np.repeat([kind == "continuum" for kind in model.kinds], count)
-    points = np.where(arc, model.samples or 1, 1)
-    return Pieces(
-        np.repeat(np.arange(model.segments), count), arc, np.concatenate([[0], np.cumsum(points)])
-    )
-
-
-def piece_lengths(model: Model, pieces: Pieces) -> np.ndarray:
-    """Return the length (m) of each piece: between its ends on a tail that is almost straight."""
-    tail = np.tile([0.0, STRAIGHT], model.segments)
-    points = model.tail_points(np.concatenate([REST, tail]))[pieces.ends]
-    return np.linalg.norm(np.diff(points, axis=0), axis=1)
-
 
 def placements(model: Model, markers: Any) -> Placements:
     """Return the places of the markers; IdentificationError if one is wrong."""
     if not isinstance(markers, Mapping) or not markers:
         needs = 'a Marker for each name, such as {"head": Marker(torso=(0, 0.03, 0.02))}'
         raise refusal("markers", markers, needs, IdentificationError)
-    pieces = pieces_of(model)
-    ends = np.concatenate([[0.0], np.cumsum(piece_lengths(model, pieces))])
-    placed = [_placed(str(name), marker, ends) for name, marker in markers.items()]
-    at, fractions, offsets = zip(*placed, strict=True)
-    numbers = np.array(at), np.array(fractions), np.array(offsets, float)
-    return Placements(tuple(map(str, markers)), *numbers, pieces)
+    count = np.atleast_1d(model.joints_each)
+    arc = np.repeat([kind == "continuum" for kind in model.kinds], count)
+    points = np.where(arc, model.samples or 1, 1)
+    ends = np.concatenate([[0], np.cumsum(points)])
+    pieces = Pieces(np.repeat(np.arange(model.segments), count), arc, ends)
+
+    # where pieces begin and end by length (m), on a tail that is almost straight
+    tail = np.tile([0.0, STRAIGHT], model.segments)
+    joints = model.tail_points(np.concatenate([REST, tail]))[pieces.ends]
+    lengths = np.linalg.norm(np.diff(joints, axis=0), axis=1)
+    along = np.concatenate([[0.0], np.cumsum(lengths)])
+
+    placed = [_placed(str(name), marker, along) for name, marker in markers.items()]
+    piece, fraction, offset = zip(*placed, strict=True)
+    return Placements(
+        tuple(map(str, markers)), np.array(piece), np.array(fraction), np.array(offset), pieces
+    )
 
 
 def _placed(name: str, marker: Any, ends: np.ndarray) -> tuple[int, float, np.ndarray]:

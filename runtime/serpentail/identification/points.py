@@ -1,4 +1,4 @@
-"""Where markers are in the torso's axes, and how they move with the tail and with its geometry.
+"""Where markers are at given configurations, and how they move with the tail.
 
 Places on the centre line follow from the model's own tail points, for every kind of tail. A place
 on a link is between the link's ends. A place on an arc is the end of a shorter arc of the same
@@ -7,17 +7,21 @@ it bent by x times as much. Only the axes of offsets are turned here. Derivative
 differences.
 """
 
+from collections.abc import Mapping
 from functools import partial
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from serpentail_scene.layout import OMEGA, PER_SEGMENT, QUATERNION, TAIL_Q, TAIL_V
 
 from ..basics.attitude import REST, Entries, from_angles, product, rotation_matrix
+from ..basics.checks import finite_array
+from ..basics.errors import IdentificationError
 from ..model.kernel import Kernel
 from ..model.model import Model
 from ..model.polar import polar_to_bend
-from .placement import TORSO, Placements
+from .placement import TORSO, Marker, Placements, placements
 
 CROSS = np.array(
     [
@@ -121,3 +125,34 @@ def _centre_line(kernel: Kernel, tail: np.ndarray, placed: Placements) -> np.nda
     places = first + placed.fraction[:, None, None] * (last - first)
     places[placed.on_torso] = 0.0
     return np.swapaxes(places, 0, 1)
+
+
+def marker_positions(model: Model, q: ArrayLike, markers: Mapping[str, Marker]) -> np.ndarray:
+    """Return the positions of markers at given configurations.
+
+    Parameters
+    ----------
+    model : Model
+        The model, with a free base.
+    q : array_like, shape (F, nq)
+        Configurations.
+    markers : mapping of str to Marker
+        Place of each marker.
+
+    Returns
+    -------
+    ndarray, shape (F, M, 3)
+        Positions (m, world).
+
+    Raises
+    ------
+    IdentificationError
+        An argument is wrong.
+    ModelError
+        The base is fixed.
+    """
+    model.refuse_fixed("marker_positions")
+    rows = finite_array("q", q, IdentificationError)
+    if rows.ndim != 2 or rows.shape[1] != model.nq:
+        raise IdentificationError(f"q has shape {rows.shape}: needs (F, {model.nq})")
+    return world_points(model, placements(model, markers), rows)

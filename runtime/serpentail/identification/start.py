@@ -37,34 +37,38 @@ def configurations(model: Model, placed: Placements, tracks: MarkerTracks) -> np
     """
     begun, laid = _begin(model, placed, tracks)
     q = begun.copy()
-    rows = np.flatnonzero(tracks.seen.mean(axis=1) >= min(ENOUGH, tracks.seen.mean(axis=1).max()))
+    shown = tracks.seen.mean(axis=1)
+    rows = np.flatnonzero(shown >= min(ENOUGH, shown.max()))
     positions = tracks.positions[rows]
     q[rows], misfit = fitted(model, placed, positions, q[rows])
     usual = max(FAR * np.median(misfit), TIGHT * float(model.parameters["tail_length"]))
-    fine = misfit <= usual
-    straightest = np.abs(q[rows][:, TAIL_Q]).max(axis=1)
-    anchor = int(np.where(fine & laid[rows], straightest, np.inf).argmin())
-    kept = np.ones(len(rows), bool)
+    fits = misfit <= usual
+    bent = np.abs(q[rows][:, TAIL_Q]).max(axis=1)
+    anchor = int(np.where(fits & laid[rows], bent, np.inf).argmin())
+
+    # from the anchor outward, a frame that is far from its neighbour is fitted again from there
+    sound = np.ones(len(rows), bool)
     for way in (range(anchor + 1, len(rows)), range(anchor - 1, -1, -1)):
         last = q[rows[anchor]]
         for k in way:
-            here, known = q[rows[k]], laid[rows[k]]
-            if not fine[k] or _apart(here, last, known) > APART:
-                torso = (begun[rows[k]] if known else last)[TORSO_Q]
+            current, torso_laid = q[rows[k]], laid[rows[k]]
+            if not fits[k] or _apart(current, last, torso_laid) > APART:
+                torso = (begun[rows[k]] if torso_laid else last)[TORSO_Q]
                 begin = np.concatenate([torso, last[TAIL_Q]])[None]
-                (here,), off = fitted(model, placed, positions[k : k + 1], begin)
-                fine[k] = off[0] <= usual
-            kept[k] = fine[k] and (known or _apart(here, last, known) <= APART)
-            q[rows[k]] = here
-            last = here if kept[k] else last
-    return _between(tracks.times, q, rows[kept])
+                (current,), off = fitted(model, placed, positions[k : k + 1], begin)
+                fits[k] = off[0] <= usual
+            sound[k] = fits[k] and (torso_laid or _apart(current, last, torso_laid) <= APART)
+            q[rows[k]] = current
+            last = current if sound[k] else last
+    frames = rows[sound]
+    return interpolated(tracks.times[frames], q[frames], tracks.times)
 
 
-def _apart(q: np.ndarray, other: np.ndarray, known: bool) -> float:
-    """Return how far configurations (nq,) differ, rad: in the tail; unless known, in the torso."""
+def _apart(q: np.ndarray, other: np.ndarray, torso_laid: bool) -> float:
+    """Return how far configurations (nq,) differ, rad: in the tail; unless laid, in the torso."""
     off = float(np.abs(q - other)[TAIL_Q].max())
     cosine = min(abs(float(q[QUATERNION] @ other[QUATERNION])), 1.0)
-    return off if known else max(off, 2 * np.arccos(cosine))
+    return off if torso_laid else max(off, 2 * np.arccos(cosine))
 
 
 def fitted(
@@ -132,22 +136,26 @@ def _begin(model: Model, placed: Placements, tracks: MarkerTracks) -> tuple[np.n
     q[:, QUATERNION.start] = 1
     body = world_points(model, placed, q[:1])[0]
     use = tracks.seen & placed.on_torso
-    laid = np.array([_spread(body[here]) for here in use])
+    laid = np.array([off_line(body[here], LINE) for here in use])
     if not laid.any():
         use = tracks.seen
-        laid = np.array([_spread(body[here]) for here in use])
+        laid = np.array([off_line(body[here], LINE) for here in use])
     for frame in np.flatnonzero(laid):
         here = use[frame]
         q[frame, :7] = _laid(body[here], tracks.positions[frame, here])
-    return (_between(tracks.times, q, np.flatnonzero(laid)) if laid.any() else q), laid
+    if laid.any():
+        q = interpolated(tracks.times[laid], q[laid], tracks.times)
+    return q, laid
 
 
-def _spread(points: np.ndarray) -> bool:
-    """Tell whether points (K, 3) give an attitude: three or more that are not on a line."""
+def off_line(points: np.ndarray, least: float) -> bool:
+    """Tell whether points (K, 3) give an attitude: three or more, and wider than ``least`` times
+    the line that they are near.
+    """
     if len(points) < 3:
         return False
     sizes = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    return bool(sizes[1] > LINE * sizes[0])
+    return bool(sizes[1] > least * sizes[0])
 
 
 def _laid(body: np.ndarray, world: np.ndarray) -> np.ndarray:
@@ -172,15 +180,13 @@ def quaternion_of(R: np.ndarray) -> np.ndarray:
     return np.linalg.eigh(K)[1][:, -1]
 
 
-def _between(times: np.ndarray, q: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Return configurations in which frames with too few markers are interpolated."""
-    q = q.copy()
-    kept = q[rows]
-    kept[:, QUATERNION] = sign_continuous(kept[:, QUATERNION])
-    for k in range(q.shape[1]):
-        q[:, k] = np.interp(times, times[rows], kept[:, k])
-    q[:, QUATERNION] /= np.linalg.norm(q[:, QUATERNION], axis=1, keepdims=True)
-    return q
+def interpolated(times: np.ndarray, rows: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Return states or configurations at times, between those (F, nx) of frames."""
+    rows = rows.copy()
+    rows[:, QUATERNION] = sign_continuous(rows[:, QUATERNION])
+    between = np.stack([np.interp(at, times, column) for column in rows.T], axis=1)
+    between[:, QUATERNION] /= np.linalg.norm(between[:, QUATERNION], axis=1, keepdims=True)
+    return between
 
 
 def velocities(model: Model, times: np.ndarray, q: np.ndarray) -> np.ndarray:
@@ -196,12 +202,3 @@ def velocities(model: Model, times: np.ndarray, q: np.ndarray) -> np.ndarray:
         t = times[near] - times[k]
         v[k] = np.linalg.lstsq(np.vander(t, 3), steps, rcond=None)[0][1]
     return v
-
-
-def on_mesh(model: Model, frames: np.ndarray, times: np.ndarray, mesh: np.ndarray) -> np.ndarray:
-    """Return states (K+1, nx) at a mesh, interpolated from those of frames at times."""
-    states = frames.copy()
-    states[:, QUATERNION] = sign_continuous(states[:, QUATERNION])
-    found = np.stack([np.interp(mesh, times, column) for column in states.T], axis=1)
-    found[:, QUATERNION] /= np.linalg.norm(found[:, QUATERNION], axis=1, keepdims=True)
-    return found

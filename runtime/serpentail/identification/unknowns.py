@@ -3,7 +3,7 @@
 import re
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -26,13 +26,15 @@ NAME = re.compile(r"([A-Za-z_]\w*)(?:\[(\d+|same)\])?")
 @dataclass(frozen=True)
 class Unknown:
     """One estimated number: a name, its unit, the parameter or the marker that it is of, which
-    entries of that it sets, its size for relative changes, and the spread of a prior on it.
+    entries of that it sets, its value at the start, its size for relative changes, and the spread
+    of a prior on it.
     """
 
     name: str
     unit: str
     of: str
     entries: tuple[int, ...]
+    start: float
     size: float
     spread: float | None = None
 
@@ -44,12 +46,16 @@ class Unknown:
 
 @dataclass(frozen=True, eq=False)
 class Unknowns:
-    """All estimated numbers of a model and its markers; start (P,): their first values."""
+    """All estimated numbers of a model and its markers."""
 
     model: Model
     placed: Placements
     each: tuple[Unknown, ...]
-    start: np.ndarray
+
+    @property
+    def start(self) -> np.ndarray:
+        """The value of each at the start, (P,)."""
+        return np.array([each.start for each in self.each], float)
 
     @property
     def sizes(self) -> np.ndarray:
@@ -66,20 +72,20 @@ class Unknowns:
 
     def model_at(self, values: np.ndarray) -> Model:
         """Return the model with these parameters; ModelError if they are unphysical."""
-        changes = independent(self.model.manifest, self.model.parameters)
-        own = {each.of for each in self.each if not each.is_offset}
-        new = {name: np.array(changes[name], float) for name in own}
+        begin = independent(self.model.manifest, self.model.parameters)
+        changes: dict[str, Any] = {}
         for each, value in zip(self.each, values, strict=True):
             if not each.is_offset:
-                new[each.of] = _with(new[each.of], each.entries, value)
-        return _changed(self.model, new) if new else self.model
+                array = np.array(changes.get(each.of, begin[each.of]), float)
+                changes[each.of] = _with(array, each.entries, value)
+        return _changed(self.model, changes) if changes else self.model
 
     def placed_at(self, values: np.ndarray) -> Placements:
         """Return the markers with these offsets."""
         offset = self.placed.offset.copy()
         for marker, axis, k in self.offsets():
             offset[marker, axis] = values[k]
-        return self.placed.moved(offset)
+        return replace(self.placed, offset=offset)
 
     def offsets(self) -> list[tuple[int, int, int]]:
         """Return marker, axis and index of each number that is an offset."""
@@ -89,6 +95,18 @@ class Unknowns:
             if each.is_offset
         ]
 
+    def prior_rows(self, values: np.ndarray) -> np.ndarray:
+        """Return the rows (R, P + 1) of the priors over relative changes, right-hand side last."""
+        believed = [
+            (k, each.size / each.spread, (each.start - values[k]) / each.spread)
+            for k, each in enumerate(self.each)
+            if each.spread is not None
+        ]
+        rows = np.zeros((len(believed), len(self.each) + 1))
+        for row, (k, weight, off) in zip(rows, believed, strict=True):
+            row[k], row[-1] = weight, off
+        return rows
+
     def struct_jacobian(self, model: Model) -> np.ndarray:
         """Return d(parameter struct) / d(unknowns), (scalars, P), at a model's parameters."""
         jacobian = np.zeros((len(model.parameter_vector), len(self.each)))
@@ -97,16 +115,17 @@ class Unknowns:
                 jacobian[:, k] = _struct_direction(model, each)
         return jacobian
 
-    def beside(self, model: Model) -> dict[int, list[Model]]:
+    def neighbours(self, model: Model) -> dict[int, list[Model]]:
         """Return the models a small step above and below, by index of what moves the tail."""
         models: dict[int, list[Model]] = {}
         for k, each in enumerate(self.each):
             if each.of in GEOMETRY:
                 values = np.array(model.parameters[each.of], float)
-                here = np.atleast_1d(values)[each.entries[0]]
-                ends = (here + STEP * each.size, here - STEP * each.size)
-                changes = [{each.of: _with(values, each.entries, end)} for end in ends]
-                models[k] = [_changed(model, change) for change in changes]
+                value = np.atleast_1d(values)[each.entries[0]]
+                ends = (value + STEP * each.size, value - STEP * each.size)
+                models[k] = [
+                    _changed(model, {each.of: _with(values, each.entries, end)}) for end in ends
+                ]
         return models
 
 
@@ -155,31 +174,23 @@ def unknowns(model: Model, placed: Placements, estimate: Any) -> Unknowns:
     else:
         needs = 'names of parameters and markers, such as ["tail_mass", "marker:head"]'
         raise refusal("estimate", estimate, needs, IdentificationError)
-    found: list[Unknown] = []
-    start: list[float] = []
+    each: list[Unknown] = []
     for name, spread in wanted.items():
-        for each, value in _of_name(model, placed, name, spread):
-            if any(_overlap(each, other) for other in found):
-                raise IdentificationError(f"estimate: {each.name} is named twice")
-            found.append(each)
-            start.append(value)
-    if any(not each.is_offset for each in found) and model.manifest["scene"]["baked"]:
+        for unknown in _of_name(model, placed, name, spread):
+            taken = [entry for x in each if x.of == unknown.of for entry in x.entries]
+            if not set(taken).isdisjoint(unknown.entries):
+                raise IdentificationError(f"estimate: {unknown.name} is named twice")
+            each.append(unknown)
+    if not all(unknown.is_offset for unknown in each) and model.manifest["scene"]["baked"]:
         raise IdentificationError(
             f"estimate: the parameters are baked into {model.name}: set `baked = false` in its "
             "scene and generate it again"
         )
-    return Unknowns(model, placed, tuple(found), np.array(start, float))
+    return Unknowns(model, placed, tuple(each))
 
 
-def _overlap(a: Unknown, b: Unknown) -> bool:
-    """Tell whether two are of the same entry."""
-    return a.of == b.of and bool(set(a.entries) & set(b.entries))
-
-
-def _of_name(
-    model: Model, placed: Placements, name: Any, spread: Any
-) -> list[tuple[Unknown, float]]:
-    """Return the unknowns that a name stands for, and their values."""
+def _of_name(model: Model, placed: Placements, name: Any, spread: Any) -> list[Unknown]:
+    """Return the unknowns that a name stands for."""
     if spread is not None:
         spread = number(f"estimate.{name}", spread, IdentificationError, above=0)
     if isinstance(name, str) and name.startswith(MARKER):
@@ -190,21 +201,21 @@ def _of_name(
         remedy = did_you_mean(match[1] if match else name, fields)
         remedy = remedy or f"needs marker:NAME, or one of {', '.join(fields)}"
         raise IdentificationError(f"estimate: value {name!r:.80}: {remedy}")
-    values = np.atleast_1d(np.asarray(fields[match[1]], float))
-    units = {p["name"]: p["unit"] for p in model.manifest["parameters"]}
+    field, chosen = match.groups()
+    values = np.atleast_1d(np.asarray(fields[field], float))
+    (unit,) = (p["unit"] for p in model.manifest["parameters"] if p["name"] == field)
     # a part that is zero is as large as the largest
     sizes = np.where(values != 0, np.abs(values), np.abs(values).max(initial=0.0) or 1.0)
-    groups = _groups(name, match[2], values)
     return [
-        (
-            Unknown(word, units[match[1]], match[1], entries, float(sizes[entries[0]]), spread),
-            float(values[entries[0]]),
-        )
-        for word, entries in groups
+        Unknown(word, unit, field, entries, float(values[k]), float(sizes[k]), spread)
+        for word, entries in _entries(name, chosen, values)
+        for k in entries[:1]
     ]
 
 
-def _groups(name: str, chosen: str | None, values: np.ndarray) -> list[tuple[str, tuple[int, ...]]]:
+def _entries(
+    name: str, chosen: str | None, values: np.ndarray
+) -> list[tuple[str, tuple[int, ...]]]:
     """Return names of numbers and the entries of a parameter that each sets."""
     if chosen == SAME:
         if len(set(values.tolist())) > 1:
@@ -220,17 +231,15 @@ def _groups(name: str, chosen: str | None, values: np.ndarray) -> list[tuple[str
     return [(f"{name}[{k}]", (k,)) for k in range(len(values))]
 
 
-def _of_marker(
-    model: Model, placed: Placements, name: str, spread: float | None
-) -> list[tuple[Unknown, float]]:
+def _of_marker(model: Model, placed: Placements, name: str, spread: float | None) -> list[Unknown]:
     """Return the three offsets of a marker."""
     marker = name[len(MARKER) :]
     if marker not in placed.names:
         remedy = did_you_mean(marker, placed.names) or f"there are {', '.join(placed.names)}"
         raise IdentificationError(f"estimate: {name}: no such marker; {remedy}")
     offset = placed.offset[placed.names.index(marker)]
-    size = float(model.parameters["tail_length"])
+    size = 0.1 * float(model.parameters["tail_length"])
     return [
-        (Unknown(f"{name}.{axis}", "m", name, (k,), 0.1 * size, spread), float(offset[k]))
+        Unknown(f"{name}.{axis}", "m", name, (k,), float(offset[k]), size, spread)
         for k, axis in enumerate("xyz")
     ]

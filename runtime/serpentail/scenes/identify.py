@@ -6,8 +6,8 @@ from typing import Any
 from ..basics.checks import Refusals, needed
 from ..basics.errors import IdentificationError
 from ..identification.identify import identify
+from ..identification.marker_files import read_markers
 from ..identification.placement import Marker
-from ..identification.readers import read_markers
 from ..identification.result import Identification
 from ..identification.torques import TorquePrior
 from .file import model_of, read_scene, size_of, subtable

@@ -1,5 +1,8 @@
-"""Looks for markers that were swapped, or that fit worse than the others."""
+"""Refuses tracks that no fit can use, and warns of markers that look swapped or misplaced, and of
+torques that seem to be missing.
+"""
 
+import sys
 import warnings
 from collections.abc import Collection, Sequence
 from itertools import combinations
@@ -11,11 +14,22 @@ from serpentail_scene.layout import TAIL_Q
 from ..basics.attitude import REST
 from ..basics.errors import DoubtfulMarkers, IdentificationError
 from ..model.model import Model
+from .linear import Linear
 from .placement import Placements
-from .points import world_points
-from .start import fitted
+from .points import offset_axes, world_points
+from .start import fitted, off_line
 from .tracks import UNITS, MarkerTracks
+from .trial import Iterate, Trial
 
+PACKAGE = __name__.partition(".")[0] + "."
+
+# of sound tracks
+FEWEST = 3  # markers that are seen at once
+NARROW = 1e-3  # of their length: narrower markers are on a line
+RIGID, BENDABLE = 2.0, 5.0  # factors of distances on a torso, and on a body with its tail
+ALIKE = 1.5  # factor within which a unit explains distances
+
+# of swapped and of misplaced markers
 FRAMES = 3  # at which every exchange of two markers is tried
 ALWAYS = 0.8  # of the frames: a swap in more of them is one throughout
 LOOSE = 0.01  # of the tail's length: swaps are checked for larger misfits
@@ -23,20 +37,20 @@ HALF = 0.5  # of the misfit that must be left once a swap is undone
 CLEAR = 8.0  # times the usual residual that a swapped marker is off
 WORSE = 4.0  # a marker is reported if its residual is so many times the others'
 SMALL = 1e-3  # of the markers' extent: smaller residuals are not reported
-FEWEST = 3  # markers that are seen at once
-RIGID, BENDABLE = 2.0, 5.0  # factors of distances on a torso, and on a body with its tail
-ALIKE = 1.5  # factor within which a unit explains distances
+
+# of missing torques
+SMOOTH = 1.2  # squares of steps over squares of values; 2 for noise
+SURE = 3.5  # standard deviations of this ratio of noise
+FEWEST_STEPS = 5  # of the marker at the tip
+GROWS = 1.4  # of the residual at the tip over that on the torso
 
 
-def refuse_too_few(placed: Placements, tracks: MarkerTracks, nq: int) -> None:
+def refuse_too_few(tracks: MarkerTracks, nq: int) -> None:
     """IdentificationError if no frame shows enough markers that are not on a line."""
     seen = tracks.seen.sum(axis=1)
     best = int(seen.argmax())
-    if seen[best] >= FEWEST:
-        here = tracks.positions[best, tracks.seen[best]]
-        spread = np.linalg.svd(here - here.mean(axis=0), compute_uv=False)
-        if spread[1] > 1e-3 * spread[0]:
-            return
+    if off_line(tracks.positions[best, tracks.seen[best]], NARROW):
+        return
     raise IdentificationError(
         f"data: too few markers: {tracks.source} shows at most {seen[best]} at once"
         f"{', on a line' if seen[best] >= FEWEST else ''}: a configuration has {nq - 1} numbers; "
@@ -54,12 +68,11 @@ def refuse_scale(
     """
     straight = np.concatenate([REST, np.zeros(model.layout.nt)])
     body = world_points(model, placed, straight[None])[0]
-    held = np.array([k not in moving for k in range(len(body))])
-    for use, most in ((held & placed.on_torso, RIGID), (held, BENDABLE)):
-        pairs = [*combinations(np.flatnonzero(use), 2)]
+    fixed = np.array([k not in moving for k in range(len(body))])
+    for use, most in ((fixed & placed.on_torso, RIGID), (fixed, BENDABLE)):
         ratios = [
             np.linalg.norm(tracks.positions[:, a] - tracks.positions[:, b], axis=1) / apart
-            for a, b in pairs
+            for a, b in combinations(np.flatnonzero(use), 2)
             if (apart := np.linalg.norm(body[a] - body[b])) > 0
         ]
         if np.isfinite(ratios).any():
@@ -82,24 +95,26 @@ def _of_scale(tracks: MarkerTracks, ratio: float) -> str:
     )
 
 
-def tell_of_swaps(
+def warn_of_swaps(
     model: Model, placed: Placements, tracks: MarkerTracks, q: np.ndarray
 ) -> tuple[int, ...]:
     """Warn of two markers whose exchange makes frames fit much better; return them."""
-    rows = np.flatnonzero(tracks.seen.sum(axis=1) == tracks.seen.sum(axis=1).max())
+    seen = tracks.seen.sum(axis=1)
+    rows = np.flatnonzero(seen == seen.max())
     positions = tracks.positions[rows]
     misfits = fitted(model, placed, positions, q[rows])[1]
     loose = np.flatnonzero(misfits >= LOOSE * float(model.parameters["tail_length"]))
     if not len(loose):
         return ()
 
-    def exchanged(pairs: Sequence[tuple[int, ...]], some: np.ndarray) -> np.ndarray:
-        changed = np.stack([positions[some]] * len(pairs))
+    def exchanged(pairs: Sequence[tuple[int, ...]], frames: np.ndarray) -> np.ndarray:
+        """Return misfits (pairs, frames) with pairs exchanged, from these and straight tails."""
+        changed = np.stack([positions[frames]] * len(pairs))
         for k, pair in enumerate(pairs):
-            changed[k][:, pair] = positions[some][:, pair[::-1]]
-        straight = q[rows[some]]
+            changed[k][:, pair] = positions[frames][:, pair[::-1]]
+        straight = q[rows[frames]]
         straight[:, TAIL_Q] = 0
-        begin = np.concatenate([q[rows[some]]] * len(pairs) + [straight] * len(pairs))
+        begin = np.concatenate([q[rows[frames]]] * len(pairs) + [straight] * len(pairs))
         both = np.tile(changed.reshape(-1, *positions.shape[1:]), (2, 1, 1))
         return fitted(model, placed, both, begin)[1].reshape(2, len(pairs), -1).min(axis=0)
 
@@ -111,20 +126,53 @@ def tell_of_swaps(
     swapped = loose[after < HALF * misfits[loose]]
     if len(swapped) <= len(loose) / 2:
         return ()
-    where = "throughout"
+    place = "throughout"
     if len(swapped) < ALWAYS * len(rows):
         first, last = tracks.times[rows[swapped[[0, -1]]]]
-        where = f"in {len(swapped)} frames from {first:g} to {last:g} s"
-    names = [tracks.names[k] for k in best]
-    _tell(
-        f"{tracks.source}: markers {names[0]!r} and {names[1]!r} look swapped {where}: with them "
+        place = f"in {len(swapped)} frames from {first:g} to {last:g} s"
+    a, b = (tracks.names[k] for k in best)
+    _warn(
+        f"{tracks.source}: markers {a!r} and {b!r} look swapped {place}: with them "
         f"exchanged these frames fit to {1e3 * np.median(after):.3g} mm in place of "
         f"{1e3 * np.median(misfits[loose]):.3g} mm"
     )
     return best
 
 
-def tell_of_residuals(
+def torques_missing(
+    model: Model, placed: Placements, trial: Trial, iterate: Iterate, linear: Linear
+) -> bool:
+    """Tell whether residuals are smooth and grow to the tip, whatever the markers' offsets are.
+
+    A marker that is elsewhere than stated leaves residuals that are constant in the axes of its
+    offset. A missing torque leaves residuals that change smoothly over time, most of all at the
+    tip.
+    """
+    seen, rows = trial.tracks.seen, trial.coordinates
+    q = iterate.states[trial.frames, : model.nq]
+    axes = offset_axes(model, placed, q) / trial.noise[..., None, None]
+
+    # what is left of the residuals with offsets of all markers as further columns
+    markers = seen.shape[1]
+    offsets = np.einsum("fmij,mn->fminj", axes, np.eye(markers))[seen].reshape(rows, -1)
+    columns = np.hstack([linear.rows[:rows], offsets])
+    scale = np.linalg.norm(columns, axis=0)
+    columns = columns / np.where(scale > 0, scale, 1)
+    residual = linear.residual[:rows]
+    left = residual - columns @ np.linalg.lstsq(columns, residual, rcond=1e-9)[0]
+    remainder = np.full((*seen.shape, 3), np.nan)
+    remainder[seen] = left.reshape(-1, 3)
+
+    sizes = np.sqrt(np.nanmean(remainder**2, axis=(0, 2)))
+    torso, tip = placed.on_torso, int(np.argmax(placed.piece + placed.fraction))
+    steps = np.diff(remainder[seen[:, tip], tip], axis=0)
+    if torso[tip] or not torso.any() or len(steps) < FEWEST_STEPS:
+        return False
+    smooth = min(SMOOTH, 2 * (1 - SURE / np.sqrt(steps.size))) * sizes[tip] ** 2
+    return bool(np.mean(steps**2) < smooth and sizes[tip] > GROWS * np.median(sizes[torso]))
+
+
+def warn_of_residuals(
     tracks: MarkerTracks, modelled: np.ndarray, missing: bool = False, swapped: tuple[int, ...] = ()
 ) -> None:
     """Warn of markers that look swapped in some frames, and of torques or markers that fit badly.
@@ -133,26 +181,12 @@ def tell_of_residuals(
     torques are missing, so that no marker is to blame; swapped: markers of which it is known.
     """
     off = np.linalg.norm(tracks.positions - modelled, axis=2)
-    usual, told = float(np.nanmedian(off)), set(swapped)
-    for a, b in combinations(range(len(tracks.names)), 2):
-        crossed = np.hypot(
-            np.linalg.norm(tracks.positions[:, a] - modelled[:, b], axis=1),
-            np.linalg.norm(tracks.positions[:, b] - modelled[:, a], axis=1),
-        )
-        own = np.hypot(off[:, a], off[:, b])
-        rows = np.flatnonzero((crossed < HALF * own) & (own > CLEAR * usual))
-        if len(rows) and not told >= {a, b}:
-            told |= {a, b}
-            first, last = tracks.times[rows[[0, -1]]]
-            _tell(
-                f"{tracks.source}: markers {tracks.names[a]!r} and {tracks.names[b]!r} look "
-                f"swapped in {len(rows)} frames from {first:g} to {last:g} s: exchange them"
-            )
+    named = _warn_of_crossings(tracks, modelled, off, set(swapped))
     rms = np.sqrt(np.nanmean(off**2, axis=0))
-    extent = float(np.linalg.norm(np.ptp(modelled, axis=1), axis=-1).max())
-    if missing and not told and rms.max() > SMALL * extent:
+    small = SMALL * float(np.linalg.norm(np.ptp(modelled, axis=1), axis=-1).max())
+    if missing and not named and rms.max() > small:
         worst = int(rms.argmax())
-        _tell(
+        _warn(
             f"{tracks.source}: residuals change smoothly over time and grow to the tip, to "
             f"{1e3 * rms[worst]:.3g} mm at {tracks.names[worst]!r}, as where torques are missing: "
             "if joints are driven give torques, or give torques=st.TorquePrior(std, time); if not, "
@@ -161,14 +195,39 @@ def tell_of_residuals(
         return
     for k, name in enumerate(tracks.names):
         others = np.median(np.delete(rms, k)) if len(rms) > 1 else np.inf
-        if k not in told and rms[k] > max(WORSE * others, SMALL * extent):
-            _tell(
+        if k not in named and rms[k] > max(WORSE * others, small):
+            _warn(
                 f"{tracks.source}: marker {name!r} is off by {1e3 * rms[k]:.3g} mm, others by "
                 f"{1e3 * others:.3g} mm: check its name and its placement, or estimate "
                 f'"marker:{name}"'
             )
 
 
-def _tell(words: str) -> None:
-    """Issue a warning at the line that calls ``identify``."""
-    warnings.warn(words, DoubtfulMarkers, stacklevel=5)
+def _warn_of_crossings(
+    tracks: MarkerTracks, modelled: np.ndarray, off: np.ndarray, named: set[int]
+) -> set[int]:
+    """Warn of pairs that fit better exchanged in some frames; return all markers so named."""
+    usual = float(np.nanmedian(off))
+    for a, b in combinations(range(len(tracks.names)), 2):
+        crossed = np.hypot(
+            np.linalg.norm(tracks.positions[:, a] - modelled[:, b], axis=1),
+            np.linalg.norm(tracks.positions[:, b] - modelled[:, a], axis=1),
+        )
+        straight = np.hypot(off[:, a], off[:, b])
+        rows = np.flatnonzero((crossed < HALF * straight) & (straight > CLEAR * usual))
+        if len(rows) and not named >= {a, b}:
+            named = named | {a, b}
+            first, last = tracks.times[rows[[0, -1]]]
+            _warn(
+                f"{tracks.source}: markers {tracks.names[a]!r} and {tracks.names[b]!r} look "
+                f"swapped in {len(rows)} frames from {first:g} to {last:g} s: exchange them"
+            )
+    return named
+
+
+def _warn(words: str) -> None:
+    """Issue a warning at the line that calls the package."""
+    frame, calls = sys._getframe(1), 2
+    while frame.f_back and frame.f_globals["__name__"].startswith(PACKAGE):
+        frame, calls = frame.f_back, calls + 1
+    warnings.warn(words, DoubtfulMarkers, stacklevel=calls)
