@@ -13,7 +13,8 @@ _HOME = {
     "simulate": "simulation.simulate",
     "Rollouts": "simulation.rollouts",
     "settle": "simulation.settle",
-    **dict.fromkeys(["scenario", "Scenario"], "scenes.simulate"),
+    "scenario": "scenes.simulate",
+    "Scenario": "scenes.scenario",
     **dict.fromkeys(
         ["Damping", "TorqueTable", "TorqueCurve", "NativeTorque", "Phases"],
         "simulation.controllers",

@@ -11,7 +11,7 @@ from .outcome import Files, Outcome
 
 if TYPE_CHECKING:
     from ..motion.trajectory import Trajectory
-    from ..scenes.simulate import Scenario
+    from ..scenes.scenario import Scenario
 
 
 def plan(arguments: argparse.Namespace) -> Outcome:
