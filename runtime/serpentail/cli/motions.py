@@ -109,30 +109,30 @@ def sweep(arguments: argparse.Namespace) -> VerbOutcome:
 
     if arguments.export is not None:
         checked(arguments.export)
-    given = arguments_of(arguments.scene)
+    job = arguments_of(arguments.scene)
     if arguments.view is not None:  # before anything runs
-        points = len(axes_of(given["over"], given.get("points"), given.get("seed", 0)))
+        points = len(axes_of(job["over"], job.get("points"), job.get("seed", 0)))
         checked_row(arguments.row, points)
     if arguments.store is not None:
-        given["store"] = arguments.store
+        job["store"] = arguments.store
     if arguments.status:
-        if not given["store"].exists():
-            raise SweepError(f"store: {given['store']} is not there yet: run it without --status")
-        found = posed(**{name: value for name, value in given.items() if name not in LATER})
+        if not job["store"].exists():
+            raise SweepError(f"store: {job['store']} is not there yet: run it without --status")
+        result = posed(**{name: value for name, value in job.items() if name not in LATER})
     else:
-        found = swept(**given, executor=arguments.executor, retry_failed=arguments.retry_failed)
-    status = found.status()
+        result = swept(**job, executor=arguments.executor, retry_failed=arguments.retry_failed)
+    status = result.status()
     report: dict[str, Any] = {"points": status.points, "done": status.done}
-    report |= {"failed": status.failed, "store": str(given["store"])}
-    text = f"{status}\nstore: {given['store']}"
-    first = next((row for row in found if row["error"]), None) if status.failed else None
-    if found.spent.hung:
-        text += f"\n{found.spent.hung} of them hung, and have no row: the same call runs them again"
+    report |= {"failed": status.failed, "store": str(job["store"])}
+    text = f"{status}\nstore: {job['store']}"
+    first = next((row for row in result if row["error"]), None) if status.failed else None
+    if hung := result.spent.hung:
+        text += f"\n{hung} of them hung, and have no row: the same call runs them again"
     if first is not None:
         report["first_failure"] = {"number": first["number"], "error": first["error"]}
         text += f"\nfirst failure, point {first['number']}: {first['error']}"
     if arguments.export is not None:
-        text += f"\nwritten: {found.save(arguments.export)}"
+        text += f"\nwritten: {result.save(arguments.export)}"
     if arguments.view is not None:
-        text += f"\npage of point {arguments.row}: {found.view(arguments.row, arguments.view)}"
+        text += f"\npage of point {arguments.row}: {result.view(arguments.row, arguments.view)}"
     return VerbOutcome(report, text, status.failed == 0)

@@ -64,24 +64,24 @@ def noise_level(fit: Fit) -> NoiseLevel:
         seen = trial.coordinates
         square += float(linear.residual[:seen] @ linear.residual[:seen])
         rows += seen
-        used += linear.own
+        used += linear.local
         if trial.unknown_torques:
-            part = linear.rows[seen:, : linear.own]
-            used -= float(((part @ own_root(fit, linear, C)) ** 2).sum())
+            part = linear.rows[seen:, : linear.local]
+            used -= float(((part @ local_root(fit, linear, C)) ** 2).sum())
     freedom = max(rows - used, 1.0)
     return NoiseLevel(float(np.sqrt(square / freedom)), freedom)
 
 
-def own_root(fit: Fit, linear: Linear, C: np.ndarray) -> np.ndarray:
-    """Return B, such that B B^T is the covariance of a trial's own columns, with unit noise."""
-    R, own = linear.triangle, linear.own
-    scale = np.linalg.norm(R[:own, :own], axis=0)
+def local_root(fit: Fit, linear: Linear, C: np.ndarray) -> np.ndarray:
+    """Return B, such that B B^T is the covariance of a trial's local columns, with unit noise."""
+    R, local = linear.triangle, linear.local
+    scale = np.linalg.norm(R[:local, :local], axis=0)
     scale[scale == 0] = 1
-    inverse = solve_triangular(R[:own, :own] / scale, np.eye(own)) / scale[:, None]
+    inverse = solve_triangular(R[:local, :local] / scale, np.eye(local)) / scale[:, None]
     values, vectors = np.linalg.eigh(C)
     sizes = fit.problem.unknowns.sizes
     root = sizes[:, None] * vectors * np.sqrt(np.maximum(values, 0))
-    return np.hstack([inverse, inverse @ R[:own, own:-1] @ root])
+    return np.hstack([inverse, inverse @ R[:local, local:-1] @ root])
 
 
 def relative_covariance(fit: Fit) -> np.ndarray:
@@ -164,7 +164,7 @@ def refuse_unseen(fit: Fit) -> None:
     names = ["x", "y", "z", *(f"turn about {axis}" for axis in "xyz")]
     names += [f"tail coordinate {k}" for k in range(model.layout.nt)]
     for trial, linear in zip(fit.problem.trials, fit.linear, strict=True):
-        R = linear.triangle[: linear.own, : linear.own]
+        R = linear.triangle[: linear.local, : linear.local]
         scale = np.linalg.norm(R, axis=0)
         blind = scale == 0
         if not blind.any():

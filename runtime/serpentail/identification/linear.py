@@ -43,7 +43,7 @@ def marker_jacobians(
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """A trial about an iterate: rows (R, C) over its own columns, of the first state and the
+    """A trial about an iterate: rows (R, C) over local columns, of the first state and the
     torques, and over those of the shared unknowns; right-hand side (R,); residuals (R,) that the
     cost is made of; derivatives and defects (K, 2nv) of the mesh.
     """
@@ -53,7 +53,7 @@ class Linear:
     residual: np.ndarray
     derivatives: radau.EndDerivatives
     defects: np.ndarray
-    own: int
+    local: int
 
     @cached_property
     def triangle(self) -> np.ndarray:
@@ -77,32 +77,32 @@ class Linear:
         R = np.linalg.qr(both, mode="r")
         return np.vstack([R, np.zeros((max(size - len(R), 0), size))])
 
-    def own_step(self, shared: np.ndarray) -> np.ndarray:
-        """Return the step of the own columns that belongs to one of the shared unknowns."""
-        R, own = self.triangle, self.own
-        scale = np.linalg.norm(R[:, :own], axis=0)
+    def local_step(self, shared: np.ndarray) -> np.ndarray:
+        """Return the step of the local columns that belongs to one of the shared unknowns."""
+        R, local = self.triangle, self.local
+        scale = np.linalg.norm(R[:, :local], axis=0)
         scale[scale == 0] = 1
-        right = R[:own, -1] - R[:own, own:-1] @ shared
-        square = R[:own, :own] / scale
+        right = R[:local, -1] - R[:local, local:-1] @ shared
+        square = R[:local, :local] / scale
         if np.abs(np.diag(square)).min() > NULL:
             return solve_triangular(square, right) / scale
         return np.linalg.lstsq(square, right, rcond=NULL)[0] / scale
 
-    def change(self, own: np.ndarray, shared: np.ndarray) -> np.ndarray:
+    def change(self, local: np.ndarray, shared: np.ndarray) -> np.ndarray:
         """Return how a step changes the residuals, apart from their sign."""
-        return self.rows @ np.concatenate([own, shared]) + (self.residual - self.right)
+        return self.rows @ np.concatenate([local, shared]) + (self.residual - self.right)
 
-    def state_steps(self, trial: Trial, own: np.ndarray, shared: np.ndarray) -> np.ndarray:
+    def state_steps(self, trial: Trial, local: np.ndarray, shared: np.ndarray) -> np.ndarray:
         """Return the steps (K+1, 2nv) of all states that belong to a step of the columns."""
         by = self.derivatives
         size = by.by_state.shape[1]
         driven = self.defects + by.by_parameters @ shared
         if trial.unknown_torques:
-            torques = own[size:].reshape(len(trial.knots), -1)
+            torques = local[size:].reshape(len(trial.knots), -1)
             ends = np.einsum("keu,ut->ket", trial.shares, torques)
             driven = driven + np.einsum("keat,ket->ka", by.by_torque, ends)
         steps = np.zeros((len(driven) + 1, size))
-        steps[0] = own[:size]
+        steps[0] = local[:size]
         for k, (A, b) in enumerate(zip(by.by_state, driven, strict=True)):
             steps[k + 1] = A @ steps[k] + b
         return steps
@@ -124,8 +124,8 @@ def linearised(
     by_q, by_shared = marker_jacobians(unknowns, model, placed, q)
     seen, W = trial.tracks.seen, 1 / trial.noise
     state, knots = 2 * model.nv, trial.knots.size * model.layout.nt
-    own = state + knots
-    columns = own + len(unknowns.each)
+    local = state + knots
+    columns = local + len(unknowns.each)
     if trial.coordinates * columns > MOST_NUMBERS:
         raise IdentificationError(
             f"data: {int(seen.sum())} positions and {columns} unknowns are too many at once: give "
@@ -141,7 +141,7 @@ def linearised(
             weight = W[f, seen[f], None, None]
             J = (by_q[f, seen[f]] * weight).reshape(-1, model.nv)
             block = J @ G[: model.nv]
-            block[:, own:] += (by_shared[f, seen[f]] * weight).reshape(len(J), -1)
+            block[:, local:] += (by_shared[f, seen[f]] * weight).reshape(len(J), -1)
             rows.append(block)
             shifts.append(J @ c[: model.nv])
         if k < len(trial.spans):
@@ -149,16 +149,16 @@ def linearised(
             G, c = A @ G, A @ c + off[k]
             if knots:
                 both = np.einsum("eu,eat->aut", trial.shares[k], by.by_torque[k])
-                G[:, state:own] += both.reshape(state, knots)
-            G[:, own:] += by.by_parameters[k]
+                G[:, state:local] += both.reshape(state, knots)
+            G[:, local:] += by.by_parameters[k]
     residual = residuals(model, placed, trial, iterate.states)[seen].ravel()
     right = residual - np.concatenate(shifts)
 
     # the prior on the torques
     if knots:
         below = np.zeros((knots, columns))
-        below[:, state:own] = np.kron(trial.prior, np.eye(model.layout.nt))
+        below[:, state:local] = np.kron(trial.prior, np.eye(model.layout.nt))
         rows.append(below)
         believed = -(trial.prior @ iterate.torques).ravel()
         right, residual = np.concatenate([right, believed]), np.concatenate([residual, believed])
-    return Linear(np.vstack(rows), right, residual, by, off, own)
+    return Linear(np.vstack(rows), right, residual, by, off, local)

@@ -9,8 +9,8 @@ from .certainty import (
     NoiseLevel,
     by_prior_alone,
     certainty,
+    local_root,
     noise_level,
-    own_root,
     refuse_unseen,
     relative_covariance,
 )
@@ -94,7 +94,7 @@ def _trials(
         times, known, torques = trial.tracks.times, trial.torques, None
         if isinstance(known, TorquePrior):
             at, u = trial.times[trial.knots], iterate.torques
-            std = np.sqrt((own_root(found, linear, C) ** 2).sum(axis=1))
+            std = np.sqrt((local_root(found, linear, C) ** 2).sum(axis=1))
             std = std[2 * model.nv :].reshape(u.shape)
             torques = EstimatedTorques(at, u, std, u - reach * std, u + reach * std)
             tau = np.stack([np.interp(times, at, row) for row in u.T], axis=-1)

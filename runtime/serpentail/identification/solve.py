@@ -22,7 +22,7 @@ ITERATIONS = 60
 CLOSE = 1e-4  # last step, in standard deviations of the estimates
 ROUNDING = 1e-9  # last step over the size of the data
 ARMIJO, SHORTEST = 1e-4, 1e-6
-KEPT = 0.2  # of the way to a number's bound that a step must leave
+MARGIN = 0.2  # of the way to a number's bound that a step must leave
 PINNED = 1e-3  # of its size: from so near a number that wants below its bound is put there
 
 
@@ -50,10 +50,10 @@ class FitPoint:
 
 @dataclass(frozen=True, eq=False)
 class FitStep:
-    """A step of the shared unknowns (P,), and of each trial's own columns and states (K+1, 2nv)."""
+    """A step of the shared unknowns (P,), and of local columns and states of each trial."""
 
     shared: np.ndarray
-    own: list[np.ndarray]
+    local: list[np.ndarray]
     states: list[np.ndarray]
 
 
@@ -128,7 +128,7 @@ def shared_rows(unknowns: Unknowns, values: np.ndarray, linear: tuple[Linear, ..
     """Return the rows (R, P + 1) of all trials and priors about the shared unknowns, relative to
     their sizes, right-hand side last.
     """
-    rows = np.vstack([each.triangle[each.own : -1, each.own :] for each in linear])
+    rows = np.vstack([each.triangle[each.local : -1, each.local :] for each in linear])
     rows[:, :-1] *= unknowns.sizes
     return np.vstack([rows, unknowns.prior_rows(values)])
 
@@ -148,19 +148,19 @@ def _step(
         determined = s > NULL * max(s[0], 1e-300)
         inner = (U.T @ rows[:, -1])[determined] / s[determined]
         shared[free] = unknowns.sizes[free] * (Vt[determined].T @ inner)
-    own = [each.own_step(shared) for each in linear]
+    local = [each.local_step(shared) for each in linear]
     states = [
         each.state_steps(trial, part, shared)
-        for each, trial, part in zip(linear, problem.trials, own, strict=True)
+        for each, trial, part in zip(linear, problem.trials, local, strict=True)
     ]
-    return FitStep(shared, own, states)
+    return FitStep(shared, local, states)
 
 
 def _length(problem: FitProblem, linear: tuple[Linear, ...], step: FitStep) -> float:
     """Return how far the step moves the model's markers, relative to the limit of convergence."""
     total, rows, square, floor = 0.0, 0, 0.0, 0.0
-    for trial, each, own in zip(problem.trials, linear, step.own, strict=True):
-        change = each.change(own, step.shared)
+    for trial, each, local in zip(problem.trials, linear, step.local, strict=True):
+        change = each.change(local, step.shared)
         total += change @ change
         square += each.residual @ each.residual
         rows += len(change)
@@ -182,8 +182,8 @@ def _longest(unknowns: Unknowns, values: np.ndarray, step: np.ndarray) -> float:
     for each, least, value, change in zip(unknowns.each, unknowns.least, values, step, strict=True):
         room = value - max(least, 0.0)
         if least > -np.inf and change < 0 < room:
-            kept = 0.0 if room <= PINNED * each.size else KEPT
-            most = min(most, (1 - kept) * room / -change)
+            margin = 0.0 if room <= PINNED * each.size else MARGIN
+            most = min(most, (1 - margin) * room / -change)
     return most
 
 
@@ -203,8 +203,8 @@ def _line_search(
     priors = problem.unknowns.prior_rows(point.values)
     slope = -float(priors[:, -1] @ (priors[:, :-1] @ (step.shared / problem.unknowns.sizes)))
     cost = float((priors[:, -1] ** 2).sum())
-    for each, own in zip(linear, step.own, strict=True):
-        slope -= float(each.residual @ each.change(own, step.shared))
+    for each, local in zip(linear, step.local, strict=True):
+        slope -= float(each.residual @ each.change(local, step.shared))
         cost += float(each.residual @ each.residual)
     scales = [1 / np.maximum(np.abs(move).max(axis=0), 1e-12) for move in step.states]
     off = sum(
@@ -230,9 +230,9 @@ def _line_search(
 def _moved(problem: FitProblem, point: FitPoint, step: FitStep, length: float) -> FitPoint:
     """Return the point at some length along a step."""
     iterates = []
-    for iterate, own, move in zip(point.iterates, step.own, step.states, strict=True):
+    for iterate, local, move in zip(point.iterates, step.local, step.states, strict=True):
         states = moved(problem.unknowns.model, iterate.states, length * move)
-        torques = length * own[move.shape[1] :].reshape(iterate.torques.shape)
+        torques = length * local[move.shape[1] :].reshape(iterate.torques.shape)
         iterates.append(iterate.moved(states, iterate.torques + torques))
     return FitPoint(point.values + length * step.shared, tuple(iterates))
 

@@ -136,13 +136,13 @@ def _begin(model: Model, placed: Placements, tracks: MarkerTracks) -> tuple[np.n
     q[:, QUATERNION.start] = 1
     body = world_points(model, placed, q[:1])[0]
     use = tracks.seen & placed.on_torso
-    laid = np.array([off_line(body[here], LINE) for here in use])
+    laid = np.array([off_line(body[markers], LINE) for markers in use])
     if not laid.any():
         use = tracks.seen
-        laid = np.array([off_line(body[here], LINE) for here in use])
+        laid = np.array([off_line(body[markers], LINE) for markers in use])
     for frame in np.flatnonzero(laid):
-        here = use[frame]
-        q[frame, :7] = _laid(body[here], tracks.positions[frame, here])
+        markers = use[frame]
+        q[frame, TORSO_Q] = _laid(body[markers], tracks.positions[frame, markers])
     if laid.any():
         q = interpolated(tracks.times[laid], q[laid], tracks.times)
     return q, laid
@@ -191,14 +191,11 @@ def interpolated(times: np.ndarray, rows: np.ndarray, at: np.ndarray) -> np.ndar
 
 def velocities(model: Model, times: np.ndarray, q: np.ndarray) -> np.ndarray:
     """Return velocities (F, nv) of configurations (F, nq): slopes of local parabolas."""
-    count, none = len(times), np.zeros((1, model.nv))
+    count, states = len(times), np.column_stack([q, np.zeros((len(q), model.nv))])
     v, width = np.zeros((count, model.nv)), min(WINDOW, count)
     for k in range(count):
         first = int(np.clip(k - width // 2, 0, count - width))
-        near = slice(first, first + width)
-        here = np.column_stack([q[k : k + 1], none])
-        there = np.column_stack([q[near], np.repeat(none, width, axis=0)])
-        steps = difference(model, there, np.repeat(here, width, axis=0))[:, : model.nv]
-        t = times[near] - times[k]
-        v[k] = np.linalg.lstsq(np.vander(t, 3), steps, rcond=None)[0][1]
+        near, middle = slice(first, first + width), np.repeat(states[k : k + 1], width, axis=0)
+        steps = difference(model, states[near], middle)[:, : model.nv]
+        v[k] = np.linalg.lstsq(np.vander(times[near] - times[k], 3), steps, rcond=None)[0][1]
     return v

@@ -177,8 +177,8 @@ def unknowns(model: Model, placed: Placements, estimate: Any) -> Unknowns:
     each: list[Unknown] = []
     for name, spread in wanted.items():
         for unknown in _of_name(model, placed, name, spread):
-            taken = [entry for x in each if x.of == unknown.of for entry in x.entries]
-            if not set(taken).isdisjoint(unknown.entries):
+            named = {entry for x in each if x.of == unknown.of for entry in x.entries}
+            if not named.isdisjoint(unknown.entries):
                 raise IdentificationError(f"estimate: {unknown.name} is named twice")
             each.append(unknown)
     if not all(unknown.is_offset for unknown in each) and model.manifest["scene"]["baked"]:

@@ -113,8 +113,10 @@ def scenario_of(model: Model, table: Mapping, parent: Path, phases: Any = ()) ->
     if "reference" in table:
         straight = Reference([0.0, 1.0], np.zeros((2, model.layout.nt)))
         where = "simulate.reference"
-        given = refused.attempt("reference", reference_of, where, model, table["reference"], parent)
-        reference = given or straight
+        reference = refused.attempt(
+            "reference", reference_of, where, model, table["reference"], parent
+        )
+        reference = reference or straight
     law = table.get("controller", {"kind": "none"})
     controller = refused.attempt(
         "controller", controller_of, "simulate.controller", model, law, reference
