@@ -95,8 +95,7 @@ def seen(model, markers, times, states, rng):
     import numpy as np
 
     import serpentail as st
-    from serpentail.identification.placement import placements
-    from serpentail.identification.points import world_points
+    from serpentail.identification.placement import placements, world_points
 
     points = world_points(model, placements(model, markers), states[:, : model.nq])
     points = points + NOISE * rng.standard_normal(points.shape)

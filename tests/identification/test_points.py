@@ -12,8 +12,7 @@ from serpentail.identification import radau_steps as stages
 from serpentail.identification import start as start_room
 from serpentail.identification.inverse import smoothed
 from serpentail.identification.linear import marker_jacobians
-from serpentail.identification.placement import placements
-from serpentail.identification.points import world_points
+from serpentail.identification.placement import placements, world_points
 from serpentail.identification.unknowns import unknowns
 from tests.identification.flights import flown, placed, start, tracks
 from tests.support import zoo

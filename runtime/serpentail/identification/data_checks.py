@@ -15,8 +15,7 @@ from ..basics.attitude import REST
 from ..basics.errors import DoubtfulMarkers, IdentificationError
 from ..model.model import Model
 from .linear import Linear
-from .placement import Placements
-from .points import offset_axes, world_points
+from .placement import Placements, offset_axes, world_points
 from .start import fitted, off_line
 from .tracks import UNITS, MarkerTracks
 from .trial import Iterate, Trial

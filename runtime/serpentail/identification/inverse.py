@@ -21,8 +21,7 @@ from ..model.state_space import product_matrix
 from ..motion.trajectory import Trajectory
 from .data_checks import refuse_scale, refuse_too_few, warn_of_residuals
 from .identify import refuse_unlike
-from .placement import Marker, placements
-from .points import world_points
+from .placement import Marker, placements, world_points
 from .result import trajectory_of
 from .start import configurations
 from .tracks import MarkerTracks

@@ -15,8 +15,7 @@ from scipy.linalg import solve_triangular
 from ..basics.errors import IdentificationError
 from ..model.model import Model
 from . import radau_steps as radau
-from .placement import Placements
-from .points import STEP, marker_points, offset_axes, world_points
+from .placement import STEP, Placements, marker_points, offset_axes, world_points
 from .trial import Iterate, Trial, defects, residuals
 from .unknowns import Unknowns
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..basics.checks import refusal
 from ..basics.errors import IdentificationError
 from ..basics.files import replacing, without_quote, write_csv
 from .c3d import read_c3d
@@ -60,7 +61,7 @@ def read_markers(
     try:
         source = Path(path)
     except TypeError:
-        raise IdentificationError(f"data: value {path!r:.60}: needs the path of a file") from None
+        raise refusal("data", path, "the path of a file", IdentificationError) from None
     reader = READERS.get(source.suffix.lower())
     if reader is None:
         raise IdentificationError(
@@ -132,9 +133,8 @@ def _whole(source: Path, header: dict[str, str], key: str) -> int:
     try:
         return int(header[key])
     except ValueError:
-        raise IdentificationError(
-            f"{source}: {key}: value {header[key]!r:.40}: needs a whole number"
-        ) from None
+        needs = "a whole number"
+        raise refusal(f"{source}: {key}", header[key], needs, IdentificationError) from None
 
 
 def _check_rate(source: Path, times: np.ndarray, stated: str | None) -> None:
@@ -222,7 +222,7 @@ def write_markers(tracks: MarkerTracks, path: str | PathLike[str]) -> Path:
     """
     target = Path(path)
     if target.suffix not in (".trc", ".csv"):
-        raise IdentificationError(f"path: value {str(path)!r}: needs a name ending in .trc or .csv")
+        raise refusal("path", str(path), "a name ending in .trc or .csv", IdentificationError)
     if target.suffix == ".csv":
         rows = zip(tracks.times, tracks.positions, strict=True)
         frames = ([f"{t:.9g}", *_cells(row)] for t, row in rows)

@@ -6,8 +6,7 @@ from serpentail_scene.layout import PER_SEGMENT, QUATERNION, TAIL_Q, TORSO_Q
 
 from ..basics.attitude import sign_continuous
 from ..model.model import Model
-from .placement import Placements
-from .points import marker_points, world_points
+from .placement import Placements, marker_points, world_points
 from .radau_steps import difference, moved
 from .tracks import MarkerTracks
 

@@ -6,8 +6,7 @@ import numpy as np
 
 from ..model.model import Model
 from . import radau_steps as radau
-from .placement import Placements
-from .points import world_points
+from .placement import Placements, world_points
 from .start import interpolated
 from .torques import Known, TorquePrior, knots_of, prior_rows
 from .tracks import MarkerTracks

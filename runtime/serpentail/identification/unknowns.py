@@ -12,8 +12,7 @@ from ..basics.checks import did_you_mean, needed, number, refusal
 from ..basics.errors import IdentificationError, UnlikeBodies, UnusualSize
 from ..model.model import Model
 from ..model.parameters import ellipsoid, flat, independent
-from .placement import Placements
-from .points import STEP
+from .placement import STEP, Placements
 
 MARKER = "marker:"
 SAME = "same"

@@ -13,8 +13,8 @@ from ..basics.checks import (
     Refusals,
     did_you_mean,
     finite_array,
-    none_of,
     number,
+    one_of,
     refusal,
     shown,
 )
@@ -138,9 +138,8 @@ def scenario_of(model: Model, table: Mapping, parent: Path, phases: Any = ()) ->
 
 def _settings(table: Mapping[str, Any], refused: Refusals) -> dict[str, Any]:
     """Return the method and its numbers; refuse those that no method can have."""
-    unknown = none_of("simulate.method", table.get("method", "auto"), ("auto", *SETTINGS))
-    if unknown:
-        refused.add("method", unknown)
+    methods, method = ("auto", *SETTINGS), table.get("method", "auto")
+    refused.attempt("method", one_of, "simulate.method", method, methods, SimulationError)
     for name in NUMBERS:
         if name in table:
             refused.attempt(name, _positive, f"simulate.{name}", table[name])
