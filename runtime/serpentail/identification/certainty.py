@@ -58,10 +58,10 @@ def noise_level(fit: Fit) -> NoiseLevel:
     """Return the level of the noise. Priors take a part of the freedom of their numbers."""
     square, rows, used = 0.0, 0, float((~fit.pinned).sum())
     C = relative_covariance(fit)
-    believed = fit.problem.unknowns.prior_rows(fit.point.values)[:, :-1]
+    believed = fit.unknowns.prior_rows(fit.point.values)[:, :-1]
     used -= float(np.einsum("rp,pq,rq->", believed, C, believed))
-    for trial, linear in zip(fit.problem.trials, fit.linear, strict=True):
-        seen = trial.coordinates
+    for linear in fit.linear:
+        trial, seen = linear.iterate.trial, linear.iterate.trial.coordinates
         square += float(linear.residual[:seen] @ linear.residual[:seen])
         rows += seen
         used += linear.local
@@ -79,7 +79,7 @@ def local_root(fit: Fit, linear: Linear, C: np.ndarray) -> np.ndarray:
     scale[scale == 0] = 1
     inverse = solve_triangular(R[:local, :local] / scale, np.eye(local)) / scale[:, None]
     values, vectors = np.linalg.eigh(C)
-    sizes = fit.problem.unknowns.sizes
+    sizes = fit.unknowns.sizes
     root = sizes[:, None] * vectors * np.sqrt(np.maximum(values, 0))
     return np.hstack([inverse, inverse @ R[:local, local:-1] @ root])
 
@@ -100,7 +100,7 @@ def relative_covariance(fit: Fit) -> np.ndarray:
 
 def _decomposed(fit: Fit, linear: tuple[Linear, ...]) -> tuple[np.ndarray, np.ndarray]:
     """Return singular values (P,) and directions (P, P) of the information on the free unknowns."""
-    rows = shared_rows(fit.problem.unknowns, fit.point.values, linear)[:, :-1][:, ~fit.pinned]
+    rows = shared_rows(fit.unknowns, fit.point.values, linear)[:, :-1][:, ~fit.pinned]
     _, s, Vt = np.linalg.svd(rows, full_matrices=True)
     return np.concatenate([s, np.zeros(len(Vt) - len(s))]), Vt
 
@@ -120,16 +120,16 @@ def certainty(fit: Fit, scale: float = 1.0) -> Certainty:
                 combinations.append(Combination(_parts(fit, direction), std))
         touched = free[(np.abs(Vt[null]) > TOUCHED).any(axis=0)]
         covariance[touched, touched] = np.inf
-    sizes = fit.problem.unknowns.sizes
+    sizes = fit.unknowns.sizes
     return Certainty(covariance * np.outer(sizes, sizes), singular, tuple(combinations))
 
 
 def _parts(fit: Fit, direction: np.ndarray) -> dict[str, float]:
     """Return the parts of a direction by name, relative to the estimates; the largest is 1."""
     free = np.flatnonzero(~fit.pinned)
-    each = [fit.problem.unknowns.each[k] for k in free]
+    each = [fit.unknowns.each[k] for k in free]
     values = np.abs(fit.point.values[free])
-    sizes = fit.problem.unknowns.sizes[free]
+    sizes = fit.unknowns.sizes[free]
     moving = np.array([not x.is_offset for x in each]) & (values > 0)
     shares = direction * np.where(moving, sizes / np.where(moving, values, 1), 1)
     shares = shares / shares[np.abs(shares).argmax()]
@@ -141,12 +141,12 @@ def _parts(fit: Fit, direction: np.ndarray) -> dict[str, float]:
 def by_prior_alone(fit: Fit) -> tuple[Combination, ...]:
     """Return combinations that a much wider prior on the torques leaves undetermined."""
     free = np.flatnonzero(~fit.pinned)
-    if not fit.problem.unknown_torques or not len(free):
+    if not fit.point.unknown_torques or not len(free):
         return ()
     wide = []
-    for trial, linear in zip(fit.problem.trials, fit.linear, strict=True):
+    for linear in fit.linear:
         rows = linear.rows.copy()
-        rows[trial.coordinates :] /= FLAT
+        rows[linear.iterate.trial.coordinates :] /= FLAT
         wide.append(replace(linear, rows=rows))
     C = relative_covariance(fit)[np.ix_(free, free)]
     combinations = []
@@ -160,10 +160,10 @@ def by_prior_alone(fit: Fit) -> tuple[Combination, ...]:
 
 def refuse_unseen(fit: Fit) -> None:
     """IdentificationError if the markers do not determine a rotation or a tail coordinate."""
-    model = fit.problem.unknowns.model
+    model = fit.unknowns.model
     names = ["x", "y", "z", *(f"turn about {axis}" for axis in "xyz")]
     names += [f"tail coordinate {k}" for k in range(model.layout.nt)]
-    for trial, linear in zip(fit.problem.trials, fit.linear, strict=True):
+    for linear in fit.linear:
         R = linear.triangle[: linear.local, : linear.local]
         scale = np.linalg.norm(R, axis=0)
         blind = scale == 0
@@ -173,7 +173,8 @@ def refuse_unseen(fit: Fit) -> None:
             blind = np.concatenate([[False] * 3, std[3 : model.nv] > 1.0])
         open_ones = [name for name, off in zip(names, blind, strict=False) if off]
         if open_ones:
+            source = linear.iterate.trial.tracks.source
             raise IdentificationError(
-                f"data: too few markers in {trial.tracks.source}: they do not determine "
+                f"data: too few markers in {source}: they do not determine "
                 f"{', '.join(open_ones)} to 1 rad: add markers there, or fill their gaps"
             )

@@ -18,7 +18,6 @@ from .linear import Linear
 from .placement import Placements, offset_axes, world_points
 from .start import fitted, off_line
 from .tracks import UNITS, MarkerTracks
-from .trial import Iterate, Trial
 
 PACKAGE = __name__.partition(".")[0] + "."
 
@@ -138,15 +137,14 @@ def warn_of_swaps(
     return best
 
 
-def torques_missing(
-    model: Model, placed: Placements, trial: Trial, iterate: Iterate, linear: Linear
-) -> bool:
+def torques_missing(model: Model, placed: Placements, linear: Linear) -> bool:
     """Tell whether residuals are smooth and grow to the tip, whatever the markers' offsets are.
 
     A marker that is elsewhere than stated leaves residuals that are constant in the axes of its
     offset. A missing torque leaves residuals that change smoothly over time, most of all at the
     tip.
     """
+    iterate, trial = linear.iterate, linear.iterate.trial
     seen, rows = trial.tracks.seen, trial.coordinates
     q = iterate.states[trial.frames, : model.nq]
     axes = offset_axes(model, placed, q) / trial.noise[..., None, None]

@@ -13,10 +13,10 @@ from .certainty import Combination, certainty
 from .identify import check_model
 from .linear import linearised
 from .placement import Marker, placements
-from .solve import Fit, FitPoint, FitProblem
+from .solve import Fit, FitPoint
 from .torques import known_torques
 from .tracks import MarkerTracks
-from .trial import Iterate, Trial, integrated, iterate_through, trial_of
+from .trial import Iterate, iterate_through, trial_of
 from .unknowns import unknowns
 
 LONGEST = 0.005  # s: of the intervals
@@ -124,13 +124,11 @@ def fisher_information(
     states = finite_array("motion", np.column_stack([motion.q, motion.v]), IdentificationError)
     rows = np.stack([np.interp(times, motion.t, column) for column in states.T], axis=1)
     iterate = iterate_through(trial, times, rows, np.zeros((0, model.layout.nt)))
-    flight = _flown(model, trial, iterate)
+    flight = _flown(model, iterate)
 
-    linear = linearised(wanted, model, placed, trial, flight)
-    problem = FitProblem(wanted, (trial,), noise_known=True)
-    point = FitPoint(wanted.start, (flight,))
-    pinned = np.zeros(len(wanted.each), bool)
-    sure = certainty(Fit(problem, point, (linear,), pinned, iterations=0, converged=True))
+    linear = linearised(wanted, model, placed, flight)
+    point, pinned = FitPoint(wanted.start, (flight,)), np.zeros(len(wanted.each), bool)
+    sure = certainty(Fit(wanted, point, (linear,), pinned, iterations=0, converged=True))
     return Information(
         tuple(each.name for each in wanted.each),
         wanted.start,
@@ -140,10 +138,10 @@ def fisher_information(
     )
 
 
-def _flown(model: Model, trial: Trial, iterate: Iterate) -> Iterate:
+def _flown(model: Model, iterate: Iterate) -> Iterate:
     """Return the flight from an iterate's first state; each pass makes one more interval exact."""
     while True:
-        done = integrated(model, trial, iterate)
+        done = iterate.integrated(model)
         if done is None:
             raise IdentificationError("motion: cannot be integrated under its torques")
         after = np.concatenate([done.states[:1], done.ends])

@@ -17,7 +17,7 @@ from .outcome import identification_of
 from .placement import Marker, Placements, placements
 from .refinement import refined
 from .result import Identification
-from .solve import FitPoint, FitProblem
+from .solve import FitPoint
 from .start import motion_shown
 from .torques import Known, TorquePrior, checked_prior, known_torques
 from .tracks import MarkerTracks
@@ -130,23 +130,19 @@ def identify(
     tracks = _tracks_of(data, placed, settings)
     torques = _torques_of(settings.get("torques"), len(tracks), model.layout.nt)
     noises = _noises_of(settings.get("noise"), tracks)
+    noise_known = settings.get("noise") is not None
 
     with Stage("identify", model.name) as stage:
         shown = [_motion_shown(wanted, each) for each in tracks]
-        each = tuple(
-            trial_of(track, noise, torque, LONGEST)
-            for track, noise, torque in zip(tracks, noises, torques, strict=True)
-        )
-        iterates = tuple(
-            iterate_through(
-                trial, trial.tracks.times, states, np.zeros((len(trial.knots), model.layout.nt))
-            )
-            for trial, (states, _) in zip(each, shown, strict=True)
-        )
-        problem = FitProblem(wanted, each, settings.get("noise") is not None)
-        found = refined(problem, FitPoint(wanted.start, iterates), stage)
-    swapped = [pair for _, pair in shown]
-    return identification_of(found, confidence, swapped, time.perf_counter() - began)
+        iterates = []
+        for track, noise, torque, (states, _) in zip(tracks, noises, torques, shown, strict=True):
+            trial = trial_of(track, noise, torque, LONGEST)
+            no_torques = np.zeros((len(trial.knots), model.layout.nt))
+            iterates.append(iterate_through(trial, track.times, states, no_torques))
+        start = FitPoint(wanted.start, tuple(iterates))
+        found = refined(wanted, start, noise_known, stage)
+    swapped, seconds = [pair for _, pair in shown], time.perf_counter() - began
+    return identification_of(found, noise_known, confidence, swapped, seconds)
 
 
 def check_model(model: Any, estimate: Any) -> None:

@@ -16,7 +16,7 @@ from ..basics.errors import IdentificationError
 from ..model.model import Model
 from . import radau_steps as radau
 from .placement import STEP, Placements, marker_points, offset_axes, world_points
-from .trial import Iterate, Trial, defects, residuals
+from .trial import Iterate
 from .unknowns import Unknowns
 
 MOST_NUMBERS = 6e7  # of the linear least squares of a trial
@@ -44,9 +44,10 @@ def marker_jacobians(
 class Linear:
     """A trial about an iterate: rows (R, C) over local columns, of the first state and the
     torques, and over those of the shared unknowns; right-hand side (R,); residuals (R,) that the
-    cost is made of; derivatives and defects (K, 2nv) of the mesh.
+    cost is made of; derivatives and defects (K, 2nv) of the mesh; the number of local columns.
     """
 
+    iterate: Iterate
     rows: np.ndarray
     right: np.ndarray
     residual: np.ndarray
@@ -91,9 +92,9 @@ class Linear:
         """Return how a step changes the residuals, apart from their sign."""
         return self.rows @ np.concatenate([local, shared]) + (self.residual - self.right)
 
-    def state_steps(self, trial: Trial, local: np.ndarray, shared: np.ndarray) -> np.ndarray:
+    def state_steps(self, local: np.ndarray, shared: np.ndarray) -> np.ndarray:
         """Return the steps (K+1, 2nv) of all states that belong to a step of the columns."""
-        by = self.derivatives
+        trial, by = self.iterate.trial, self.derivatives
         size = by.by_state.shape[1]
         driven = self.defects + by.by_parameters @ shared
         if trial.unknown_torques:
@@ -107,18 +108,13 @@ class Linear:
         return steps
 
 
-def linearised(
-    unknowns: Unknowns, model: Model, placed: Placements, trial: Trial, iterate: Iterate
-) -> Linear:
+def linearised(unknowns: Unknowns, model: Model, placed: Placements, iterate: Iterate) -> Linear:
     """Return the linear least squares about an iterate whose intervals are integrated."""
+    trial, by_struct = iterate.trial, unknowns.struct_jacobian(model)
     by = radau.differentiated(
-        model,
-        iterate.intervals(trial),
-        iterate.stages,
-        unknowns.struct_jacobian(model),
-        trial.unknown_torques,
+        model, iterate.intervals, iterate.stages, by_struct, trial.unknown_torques
     )
-    off = defects(model, iterate)
+    off = iterate.defects(model)
     q = iterate.states[trial.frames, : model.nq]
     by_q, by_shared = marker_jacobians(unknowns, model, placed, q)
     seen, W = trial.tracks.seen, 1 / trial.noise
@@ -150,7 +146,7 @@ def linearised(
                 both = np.einsum("eu,eat->aut", trial.shares[k], by.by_torque[k])
                 G[:, state:local] += both.reshape(state, knots)
             G[:, local:] += by.by_parameters[k]
-    residual = residuals(model, placed, trial, iterate.states)[seen].ravel()
+    residual = iterate.residuals(model, placed)[seen].ravel()
     right = residual - np.concatenate(shifts)
 
     # the prior on the torques
@@ -160,4 +156,4 @@ def linearised(
         rows.append(below)
         believed = -(trial.prior @ iterate.torques).ravel()
         right, residual = np.concatenate([right, believed]), np.concatenate([residual, believed])
-    return Linear(np.vstack(rows), right, residual, by, off, local)
+    return Linear(iterate, np.vstack(rows), right, residual, by, off, local)

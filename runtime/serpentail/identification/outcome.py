@@ -6,7 +6,6 @@ import numpy as np
 from scipy.special import ndtri, stdtrit
 
 from .certainty import (
-    NoiseLevel,
     by_prior_alone,
     certainty,
     local_root,
@@ -18,23 +17,27 @@ from .data_checks import torques_missing, warn_of_residuals
 from .result import Estimate, EstimatedTorques, Identification, IdentifiedTrial, trajectory_of
 from .solve import Fit
 from .torques import TorquePrior
-from .trial import modelled_points
 
 
 def identification_of(
-    found: Fit, confidence: float, swapped: list[tuple[int, ...]], seconds: float
+    found: Fit,
+    noise_known: bool,
+    confidence: float,
+    swapped: list[tuple[int, ...]],
+    seconds: float,
 ) -> Identification:
     """Return the result of the best fit, and warn of what fits badly.
 
     swapped: markers of each trial that are known to look swapped.
     """
     refuse_unseen(found)
-    problem, wanted, values = found.problem, found.problem.unknowns, found.point.values
-    level = noise_level(found)
-    reach = _reach(confidence, level, problem.noise_known)
-    scale = 1.0 if problem.noise_known or problem.unknown_torques else level.scale
+    wanted, values, level = found.unknowns, found.point.values, noise_level(found)
+    upper = (1 + confidence) / 2
+    reach = float(ndtri(upper) if noise_known else stdtrit(level.freedom, upper))
+    scale = 1.0 if noise_known or found.point.unknown_torques else level.scale
     sure = certainty(found, scale)
-    noise = float(np.median(np.concatenate([trial.noise.ravel() for trial in problem.trials])))
+    noises = [iterate.trial.noise.ravel() for iterate in found.point.iterates]
+    noise = float(np.median(np.concatenate(noises)))
     return Identification(
         model=wanted.model_at(values),
         placed=wanted.placed_at(values),
@@ -42,7 +45,7 @@ def identification_of(
         covariance=sure.covariance,
         singular_values=sure.singular_values,
         undetermined=(*sure.undetermined, *by_prior_alone(found)),
-        noise=noise if problem.noise_known else noise * level.scale,
+        noise=noise if noise_known else noise * level.scale,
         confidence=confidence,
         trials=_trials(found, reach, swapped),
         iterations=found.iterations,
@@ -51,17 +54,11 @@ def identification_of(
     )
 
 
-def _reach(confidence: float, level: NoiseLevel, noise_known: bool) -> float:
-    """Return the half width of an interval in standard deviations."""
-    upper = (1 + confidence) / 2
-    return float(ndtri(upper) if noise_known else stdtrit(level.freedom, upper))
-
-
 def _estimates(
     found: Fit, covariance: np.ndarray, scale: float, reach: float
 ) -> tuple[Estimate, ...]:
     """Return the shared unknowns with their intervals."""
-    wanted, values = found.problem.unknowns, found.point.values
+    wanted, values = found.unknowns, found.point.values
     std = np.sqrt(np.diag(covariance))
     if found.pinned.any():  # how far up they may be: as if they were free
         free = certainty(replace(found, pinned=np.zeros_like(found.pinned)), scale)
@@ -84,13 +81,12 @@ def _trials(
     found: Fit, reach: float, swapped: list[tuple[int, ...]]
 ) -> tuple[IdentifiedTrial, ...]:
     """Return the results of all trials, and warn of markers and torques that do not fit."""
-    wanted, values = found.problem.unknowns, found.point.values
+    wanted, values = found.unknowns, found.point.values
     model, placed = wanted.model_at(values), wanted.placed_at(values)
     C = relative_covariance(found)
     results = []
-    for trial, iterate, linear, pair in zip(
-        found.problem.trials, found.point.iterates, found.linear, swapped, strict=True
-    ):
+    for iterate, linear, pair in zip(found.point.iterates, found.linear, swapped, strict=True):
+        trial = iterate.trial
         times, known, torques = trial.tracks.times, trial.torques, None
         if isinstance(known, TorquePrior):
             at, u = trial.times[trial.knots], iterate.torques
@@ -101,9 +97,9 @@ def _trials(
             missing = False
         else:
             tau = known(times)
-            missing = torques_missing(model, placed, trial, iterate, linear)
+            missing = torques_missing(model, placed, linear)
         motion = trajectory_of(model, times, iterate.states[trial.frames], tau)
-        modelled = modelled_points(model, placed, trial, iterate.states)
+        modelled = iterate.modelled(model, placed)
         warn_of_residuals(trial.tracks, modelled, missing, pair)
         results.append(IdentifiedTrial(trial.tracks, motion, modelled, torques))
     return tuple(results)

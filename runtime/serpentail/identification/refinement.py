@@ -8,8 +8,9 @@ from ..basics.progress import Stage
 from ..model.model import Model
 from . import radau_steps as radau
 from .certainty import noise_level
-from .solve import Fit, FitPoint, FitProblem, fit
-from .trial import Iterate, Trial, iterate_through, meshed
+from .solve import Fit, FitPoint, fit
+from .trial import Iterate, iterate_through, meshed
+from .unknowns import Unknowns
 
 ROUNDS = 4  # of refinement
 NOISE_ROUNDS, SETTLED = 15, 0.003  # rounds that estimate the noise if there are priors
@@ -18,58 +19,58 @@ ORDER = 6  # of the local error
 MOST = 8  # parts into which one interval is cut at once
 
 
-def refined(problem: FitProblem, start: FitPoint, stage: Stage) -> Fit:
+def refined(unknowns: Unknowns, start: FitPoint, noise_known: bool, stage: Stage) -> Fit:
     """Return the best fit on meshes that are fine enough, with the noise if that is unknown."""
-    found = _with_noise(problem, start, stage)
+    found = _with_noise(unknowns, start, noise_known, stage)
     for _ in range(ROUNDS):
-        problem, point = found.problem, found.point
-        model = problem.unknowns.model_at(point.values)
-        pairs = [*zip(problem.trials, point.iterates, strict=True)]
-        parts = [parts_needed(model, trial, iterate) for trial, iterate in pairs]
+        point = found.point
+        model = unknowns.model_at(point.values)
+        parts = [parts_needed(model, iterate) for iterate in point.iterates]
         if all(part is None for part in parts):
             break
         finer = [
-            pair if part is None else _cut(*pair, part)
-            for pair, part in zip(pairs, parts, strict=True)
+            iterate if part is None else _cut(iterate, part)
+            for iterate, part in zip(point.iterates, parts, strict=True)
         ]
-        trials, iterates = zip(*finer, strict=True)
-        found = _with_noise(
-            replace(problem, trials=trials), FitPoint(point.values, iterates), stage
-        )
+        found = _with_noise(unknowns, FitPoint(point.values, tuple(finer)), noise_known, stage)
     return found
 
 
-def _with_noise(problem: FitProblem, start: FitPoint, stage: Stage) -> Fit:
+def _with_noise(unknowns: Unknowns, start: FitPoint, noise_known: bool, stage: Stage) -> Fit:
     """Return the best fit; with priors, fit and estimate of an unknown noise alternate."""
-    found = fit(problem, start, stage)
-    believed = any(each.spread is not None for each in problem.unknowns.each)
-    if problem.noise_known or not (believed or problem.unknown_torques):
+    found = fit(unknowns, start, stage)
+    believed = any(each.spread is not None for each in unknowns.each)
+    if noise_known or not (believed or start.unknown_torques):
         return found
     for _ in range(NOISE_ROUNDS):
         scale = max(noise_level(found).scale, 1e-6)
-        trials = [replace(trial, noise=trial.noise * scale) for trial in found.problem.trials]
-        found = fit(replace(problem, trials=tuple(trials)), found.point, stage)
+        iterates = [
+            replace(each, trial=replace(each.trial, noise=each.trial.noise * scale))
+            for each in found.point.iterates
+        ]
+        found = fit(unknowns, FitPoint(found.point.values, tuple(iterates)), stage)
         if abs(np.log(scale)) < SETTLED:
             break
     return found
 
 
-def _cut(trial: Trial, iterate: Iterate, parts: np.ndarray) -> tuple[Trial, Iterate]:
-    """Return a trial and its iterate on a mesh whose intervals are cut into parts."""
+def _cut(iterate: Iterate, parts: np.ndarray) -> Iterate:
+    """Return an iterate on a mesh whose intervals are cut into parts."""
+    trial = iterate.trial
     between_frames = [
         int(parts[a:b].max()) * (b - a)
         for a, b in zip(trial.frames[:-1], trial.frames[1:], strict=True)
     ]
     finer = meshed(trial.tracks, trial.noise, trial.torques, np.array(between_frames))
-    return finer, iterate_through(finer, trial.times, iterate.states, iterate.torques)
+    return iterate_through(finer, trial.times, iterate.states, iterate.torques)
 
 
-def parts_needed(model: Model, trial: Trial, iterate: Iterate) -> np.ndarray | None:
+def parts_needed(model: Model, iterate: Iterate) -> np.ndarray | None:
     """Return the number of parts for each interval, (K,); None if no interval must be cut.
 
     The error of an interval is the difference between one step and two half steps.
     """
-    whole = iterate.intervals(trial)
+    trial, whole = iterate.trial, iterate.intervals
     half, begin = whole.spans / 2, whole.begin
     for part in (0, 1):
         torques = _at_nodes(whole.torques, (radau.NODES + part) / 2)

@@ -12,10 +12,9 @@ import numpy as np
 
 from ..basics.errors import IdentificationError, ModelError
 from ..basics.progress import Stage
-from . import trial as trials
 from .linear import NULL, Linear, linearised
 from .radau_steps import moved
-from .trial import Iterate, Trial
+from .trial import Iterate
 from .unknowns import Unknowns
 
 ITERATIONS = 60
@@ -27,25 +26,16 @@ PINNED = 1e-3  # of its size: from so near a number that wants below its bound i
 
 
 @dataclass(frozen=True, eq=False)
-class FitProblem:
-    """What is to be found: shared unknowns, and trials; and whether the noise is known."""
-
-    unknowns: Unknowns
-    trials: tuple[Trial, ...]
-    noise_known: bool
-
-    @property
-    def unknown_torques(self) -> bool:
-        """Whether the torques of any trial are estimated."""
-        return any(trial.unknown_torques for trial in self.trials)
-
-
-@dataclass(frozen=True, eq=False)
 class FitPoint:
     """Values of the shared unknowns (P,) and an iterate of each trial."""
 
     values: np.ndarray
     iterates: tuple[Iterate, ...]
+
+    @property
+    def unknown_torques(self) -> bool:
+        """Whether the torques of any trial are estimated."""
+        return any(iterate.trial.unknown_torques for iterate in self.iterates)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +53,7 @@ class Fit:
     their bounds, iterations, and whether the last step was small.
     """
 
-    problem: FitProblem
+    unknowns: Unknowns
     point: FitPoint
     linear: tuple[Linear, ...]
     pinned: np.ndarray
@@ -71,10 +61,10 @@ class Fit:
     converged: bool
 
 
-def fit(problem: FitProblem, start: FitPoint, stage: Stage) -> Fit:
+def fit(unknowns: Unknowns, start: FitPoint, stage: Stage) -> Fit:
     """Return the best fit near a start; IdentificationError if no step is possible."""
-    pinned = np.zeros(len(problem.unknowns.each), bool)
-    point = _integrated(problem, start)
+    pinned = np.zeros(len(unknowns.each), bool)
+    point = _integrated(unknowns, start)
     if point is None:
         raise IdentificationError(
             "data: the model cannot be integrated from the motion that the markers show: check "
@@ -82,46 +72,42 @@ def fit(problem: FitProblem, start: FitPoint, stage: Stage) -> Fit:
         )
     weight, converged = 1.0, False
     for iteration in range(1, ITERATIONS + 1):
-        linear = _linearised(problem, point)
-        step = _step(problem, point, linear, pinned)
+        linear = _linearised(unknowns, point)
+        step = _step(unknowns, point.values, linear, pinned)
         stage.tell(iteration / ITERATIONS)
-        if _length(problem, linear, step) < 1:
+        if _length(linear, step) < 1:
             converged = True
             break
-        pinned |= _to_pin(problem.unknowns, point, step.shared)
-        advanced, weight = _line_search(problem, point, linear, step, weight)
+        pinned |= _to_pin(unknowns, point.values, step.shared)
+        advanced, weight = _line_search(unknowns, point, linear, step, weight)
         if advanced is None:
             break
         point = advanced
         if pinned.any():
-            values = np.where(pinned, problem.unknowns.least, point.values)
-            point = _integrated(problem, FitPoint(values, point.iterates)) or advanced
-    return Fit(problem, point, linear, pinned, iteration, converged)
+            values = np.where(pinned, unknowns.least, point.values)
+            point = _integrated(unknowns, FitPoint(values, point.iterates)) or advanced
+    return Fit(unknowns, point, linear, pinned, iteration, converged)
 
 
-def _integrated(problem: FitProblem, point: FitPoint) -> FitPoint | None:
+def _integrated(unknowns: Unknowns, point: FitPoint) -> FitPoint | None:
     """Return a point with its intervals integrated; None if that fails."""
     try:
-        model = problem.unknowns.model_at(point.values)
+        model = unknowns.model_at(point.values)
     except ModelError:
         return None
     iterates = []
-    for trial, iterate in zip(problem.trials, point.iterates, strict=True):
-        integrated = trials.integrated(model, trial, iterate)
+    for iterate in point.iterates:
+        integrated = iterate.integrated(model)
         if integrated is None:
             return None
         iterates.append(integrated)
     return FitPoint(point.values, tuple(iterates))
 
 
-def _linearised(problem: FitProblem, point: FitPoint) -> tuple[Linear, ...]:
+def _linearised(unknowns: Unknowns, point: FitPoint) -> tuple[Linear, ...]:
     """Return each trial's linear problem at a point."""
-    unknowns = problem.unknowns
     model, placed = unknowns.model_at(point.values), unknowns.placed_at(point.values)
-    return tuple(
-        linearised(unknowns, model, placed, trial, iterate)
-        for trial, iterate in zip(problem.trials, point.iterates, strict=True)
-    )
+    return tuple(linearised(unknowns, model, placed, iterate) for iterate in point.iterates)
 
 
 def shared_rows(unknowns: Unknowns, values: np.ndarray, linear: tuple[Linear, ...]) -> np.ndarray:
@@ -134,33 +120,29 @@ def shared_rows(unknowns: Unknowns, values: np.ndarray, linear: tuple[Linear, ..
 
 
 def _step(
-    problem: FitProblem, point: FitPoint, linear: tuple[Linear, ...], pinned: np.ndarray
+    unknowns: Unknowns, values: np.ndarray, linear: tuple[Linear, ...], pinned: np.ndarray
 ) -> FitStep:
     """Return the step to the optimum of the linear problems.
 
     Directions that the data do not determine are not changed.
     """
-    unknowns, shared = problem.unknowns, np.zeros(len(pinned))
-    free = np.flatnonzero(~pinned)
+    shared, free = np.zeros(len(pinned)), np.flatnonzero(~pinned)
     if len(free):
-        rows = shared_rows(unknowns, point.values, linear)
+        rows = shared_rows(unknowns, values, linear)
         U, s, Vt = np.linalg.svd(rows[:, free], full_matrices=False)
         determined = s > NULL * max(s[0], 1e-300)
         inner = (U.T @ rows[:, -1])[determined] / s[determined]
         shared[free] = unknowns.sizes[free] * (Vt[determined].T @ inner)
     local = [each.local_step(shared) for each in linear]
-    states = [
-        each.state_steps(trial, part, shared)
-        for each, trial, part in zip(linear, problem.trials, local, strict=True)
-    ]
+    states = [each.state_steps(part, shared) for each, part in zip(linear, local, strict=True)]
     return FitStep(shared, local, states)
 
 
-def _length(problem: FitProblem, linear: tuple[Linear, ...], step: FitStep) -> float:
+def _length(linear: tuple[Linear, ...], step: FitStep) -> float:
     """Return how far the step moves the model's markers, relative to the limit of convergence."""
     total, rows, square, floor = 0.0, 0, 0.0, 0.0
-    for trial, each, local in zip(problem.trials, linear, step.local, strict=True):
-        change = each.change(local, step.shared)
+    for each, local in zip(linear, step.local, strict=True):
+        trial, change = each.iterate.trial, each.change(local, step.shared)
         total += change @ change
         square += each.residual @ each.residual
         rows += len(change)
@@ -169,9 +151,9 @@ def _length(problem: FitProblem, linear: tuple[Linear, ...], step: FitStep) -> f
     return float(np.sqrt(total) / (CLOSE * scale + np.sqrt(floor)))
 
 
-def _to_pin(unknowns: Unknowns, point: FitPoint, step: np.ndarray) -> np.ndarray:
+def _to_pin(unknowns: Unknowns, values: np.ndarray, step: np.ndarray) -> np.ndarray:
     """Tell which numbers are almost at their bounds and want below them."""
-    least, values = unknowns.least, point.values
+    least = unknowns.least
     near = values <= np.maximum(least, 0) + PINNED * unknowns.sizes
     return (least > -np.inf) & near & (values + step < least)
 
@@ -188,7 +170,7 @@ def _longest(unknowns: Unknowns, values: np.ndarray, step: np.ndarray) -> float:
 
 
 def _line_search(
-    problem: FitProblem,
+    unknowns: Unknowns,
     point: FitPoint,
     linear: tuple[Linear, ...],
     step: FitStep,
@@ -200,8 +182,8 @@ def _line_search(
     Eq. 18.36).
     """
     # slope and value of the cost; sizes of the defects, over those of the steps
-    priors = problem.unknowns.prior_rows(point.values)
-    slope = -float(priors[:, -1] @ (priors[:, :-1] @ (step.shared / problem.unknowns.sizes)))
+    priors = unknowns.prior_rows(point.values)
+    slope = -float(priors[:, -1] @ (priors[:, :-1] @ (step.shared / unknowns.sizes)))
     cost = float((priors[:, -1] ** 2).sum())
     for each, local in zip(linear, step.local, strict=True):
         slope -= float(each.residual @ each.change(local, step.shared))
@@ -216,36 +198,33 @@ def _line_search(
     before = cost / 2 + weight * off
     expected = slope - weight * off
 
-    length = _longest(problem.unknowns, point.values, step.shared)
+    length = _longest(unknowns, point.values, step.shared)
     while length > SHORTEST:
-        candidate = _integrated(problem, _moved(problem, point, step, length))
+        candidate = _integrated(unknowns, _moved(unknowns, point, step, length))
         if candidate is not None:
-            after = _merit(problem, candidate, weight, scales)
+            after = _merit(unknowns, candidate, weight, scales)
             if after <= before + ARMIJO * length * expected + 1e-12 * abs(before):
                 return candidate, weight
         length /= 2
     return None, weight
 
 
-def _moved(problem: FitProblem, point: FitPoint, step: FitStep, length: float) -> FitPoint:
+def _moved(unknowns: Unknowns, point: FitPoint, step: FitStep, length: float) -> FitPoint:
     """Return the point at some length along a step."""
     iterates = []
     for iterate, local, move in zip(point.iterates, step.local, step.states, strict=True):
-        states = moved(problem.unknowns.model, iterate.states, length * move)
+        states = moved(unknowns.model, iterate.states, length * move)
         torques = length * local[move.shape[1] :].reshape(iterate.torques.shape)
         iterates.append(iterate.moved(states, iterate.torques + torques))
     return FitPoint(point.values + length * step.shared, tuple(iterates))
 
 
-def _merit(problem: FitProblem, point: FitPoint, weight: float, scales: list[np.ndarray]) -> float:
+def _merit(unknowns: Unknowns, point: FitPoint, weight: float, scales: list[np.ndarray]) -> float:
     """Return the cost and the weighed sizes of the defects at a point."""
-    unknowns = problem.unknowns
     model, placed = unknowns.model_at(point.values), unknowns.placed_at(point.values)
     total = float((unknowns.prior_rows(point.values)[:, -1] ** 2).sum()) / 2
-    for trial, iterate, scale in zip(problem.trials, point.iterates, scales, strict=True):
-        r = trials.residuals(model, placed, trial, iterate.states)
-        total += float((r**2).sum()) / 2
-        believed = trial.prior @ iterate.torques
-        total += float((believed**2).sum()) / 2
-        total += weight * float((np.abs(trials.defects(model, iterate)) * scale).sum())
+    for iterate, scale in zip(point.iterates, scales, strict=True):
+        total += float((iterate.residuals(model, placed) ** 2).sum()) / 2
+        total += float(((iterate.trial.prior @ iterate.torques) ** 2).sum()) / 2
+        total += weight * float((np.abs(iterate.defects(model)) * scale).sum())
     return total

@@ -84,8 +84,9 @@ def meshed(
 
 @dataclass(frozen=True, eq=False)
 class Iterate:
-    """States (K+1, nx), torques at the knots (U, 2m), and stages (K, 3, nx) of the intervals."""
+    """A trial's states (K+1, nx), torques at the knots (U, 2m), stages (K, 3, nx) of intervals."""
 
+    trial: Trial
     states: np.ndarray
     torques: np.ndarray
     stages: np.ndarray
@@ -95,19 +96,39 @@ class Iterate:
         """States (K, nx) in which the intervals end."""
         return self.stages[:, -1]
 
-    def moved(self, states: np.ndarray, torques: np.ndarray) -> "Iterate":
-        """Return other states and torques; stages move with the states."""
-        shift = (states - self.states)[:-1, None]
-        return Iterate(states, torques, self.stages + shift)
-
-    def intervals(self, trial: Trial) -> radau.Intervals:
-        """Return the intervals that begin at these states."""
-        torques = trial.known
+    @property
+    def intervals(self) -> radau.Intervals:
+        """The intervals that begin at these states."""
+        trial, torques = self.trial, self.trial.known
         if trial.unknown_torques:
             ends = np.einsum("keu,ut->ket", trial.shares, self.torques)
             nodes = radau.NODES[:, None]
             torques = (1 - nodes) * ends[:, None, 0] + nodes * ends[:, None, 1]
         return radau.Intervals(trial.spans, self.states[:-1], torques)
+
+    def moved(self, states: np.ndarray, torques: np.ndarray) -> "Iterate":
+        """Return other states and torques; stages move with the states."""
+        shift = (states - self.states)[:-1, None]
+        return Iterate(self.trial, states, torques, self.stages + shift)
+
+    def integrated(self, model: Model) -> "Iterate | None":
+        """Return this with its intervals integrated; None if that fails."""
+        stages = radau.solved(model, self.intervals, self.stages)
+        return None if stages is None else replace(self, stages=stages)
+
+    def defects(self, model: Model) -> np.ndarray:
+        """Return the differences between the ends of intervals and the next states, (K, 2nv)."""
+        return radau.difference(model, self.ends, self.states[1:])
+
+    def modelled(self, model: Model, placed: Placements) -> np.ndarray:
+        """Return the positions of the markers by the model at the frames, (F, M, 3) m."""
+        return world_points(model, placed, self.states[self.trial.frames, : model.nq])
+
+    def residuals(self, model: Model, placed: Placements) -> np.ndarray:
+        """Return seen less modelled positions (F, M, 3), over the noise; 0 in gaps."""
+        tracks, noise = self.trial.tracks, self.trial.noise
+        off = (tracks.positions - self.modelled(model, placed)) / noise[..., None]
+        return np.where(tracks.seen[..., None], off, 0.0)
 
 
 def iterate_through(
@@ -115,29 +136,4 @@ def iterate_through(
 ) -> Iterate:
     """Return an iterate on a trial's mesh through states (F, nx) at some times."""
     mesh = interpolated(times, states, trial.times)
-    return Iterate(mesh, torques, np.repeat(mesh[:-1, None], 3, axis=1))
-
-
-def integrated(model: Model, trial: Trial, iterate: Iterate) -> Iterate | None:
-    """Return the iterate with its intervals integrated; None if that fails."""
-    stages = radau.solved(model, iterate.intervals(trial), iterate.stages)
-    return None if stages is None else replace(iterate, stages=stages)
-
-
-def defects(model: Model, iterate: Iterate) -> np.ndarray:
-    """Return the differences between the ends of the intervals and the next states, (K, 2nv)."""
-    return radau.difference(model, iterate.ends, iterate.states[1:])
-
-
-def residuals(model: Model, placed: Placements, trial: Trial, states: np.ndarray) -> np.ndarray:
-    """Return seen less modelled positions (F, M, 3), over the noise; 0 where none was seen."""
-    modelled = modelled_points(model, placed, trial, states)
-    gap = ~trial.tracks.seen[..., None]
-    return np.where(gap, 0.0, (trial.tracks.positions - modelled) / trial.noise[..., None])
-
-
-def modelled_points(
-    model: Model, placed: Placements, trial: Trial, states: np.ndarray
-) -> np.ndarray:
-    """Return the positions of the markers by the model at the frames, (F, M, 3) m."""
-    return world_points(model, placed, states[trial.frames, : model.nq])
+    return Iterate(trial, mesh, torques, np.repeat(mesh[:-1, None], 3, axis=1))
