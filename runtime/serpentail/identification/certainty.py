@@ -13,7 +13,7 @@ SHARE = 0.05  # of the largest part of a combination: smaller parts are not name
 TOUCHED = 1e-6  # an unknown with this part in an undetermined direction has no interval
 WIDE = 1.0  # relative standard deviation at which a combination counts as undetermined
 FLAT = 1e3  # factor of a wider prior on torques, to find what only the prior determines
-PASSED = 30  # of this factor that a standard deviation grows by where only the prior is known
+PASSED = 30  # a standard deviation that grows by FLAT / PASSED or more is the prior's
 
 
 @dataclass(frozen=True)
@@ -60,6 +60,8 @@ def noise_level(fit: Fit) -> NoiseLevel:
     C = relative_covariance(fit)
     believed = fit.unknowns.prior_rows(fit.point.values)[:, :-1]
     used -= float(np.einsum("rp,pq,rq->", believed, C, believed))
+
+    # each trial's local numbers take freedom, too, but for the part that its prior determines
     for linear in fit.linear:
         trial, seen = linear.iterate.trial, linear.iterate.trial.coordinates
         square += float(linear.residual[:seen] @ linear.residual[:seen])
@@ -118,6 +120,8 @@ def certainty(fit: Fit, scale: float = 1.0) -> Certainty:
             std = np.inf if unknown else float(1 / s)
             if std > WIDE:
                 combinations.append(Combination(_parts(fit, direction), std))
+
+        # what undetermined directions touch has no interval
         touched = free[(np.abs(Vt[null]) > TOUCHED).any(axis=0)]
         covariance[touched, touched] = np.inf
     sizes = fit.unknowns.sizes
@@ -143,6 +147,8 @@ def by_prior_alone(fit: Fit) -> tuple[Combination, ...]:
     free = np.flatnonzero(~fit.pinned)
     if not fit.point.unknown_torques or not len(free):
         return ()
+
+    # the same linear problems under a wider prior
     wide = []
     for linear in fit.linear:
         rows = linear.rows.copy()
@@ -150,9 +156,10 @@ def by_prior_alone(fit: Fit) -> tuple[Combination, ...]:
         wide.append(replace(linear, rows=rows))
     C = relative_covariance(fit)[np.ix_(free, free)]
     combinations = []
+
+    # the prior's width passes on whole where nothing else is known
     for value, direction in zip(*_decomposed(fit, tuple(wide)), strict=True):
         std = float(np.sqrt(direction @ C @ direction))
-        # the prior's width passes on whole where nothing else is known
         if std > 0 and value * std < PASSED / FLAT:
             combinations.append(Combination(_parts(fit, direction), std, by_prior=True))
     return tuple(combinations)

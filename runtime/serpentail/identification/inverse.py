@@ -112,6 +112,8 @@ def joint_torques(
     tracks = tracks.of(placed.names)
     refuse_too_few(tracks, model.nq)
     refuse_scale(model, placed, tracks)
+
+    # configurations, smoothed and differentiated twice
     q = configurations(model, placed, tracks)
     q[:, QUATERNION] = sign_continuous(q[:, QUATERNION])
     q, first, second = smoothed(tracks.times, q, cutoff)
@@ -135,6 +137,7 @@ def smoothed(
     The spline minimises the sum of squared deviations, each weighted by the time between frames,
     plus (2 pi cutoff)^-6 times the integral of the squared third derivative.
     """
+    # B-splines with a knot at each frame
     knots = np.concatenate([[times[0]] * DEGREE, times, [times[-1]] * DEGREE])
     count = len(knots) - DEGREE - 1
     spans = np.gradient(times)
@@ -146,6 +149,8 @@ def smoothed(
     each = BSpline(knots, np.eye(count), DEGREE).derivative(ROUGH)(at)
     W = (half[:, None] * weights).ravel()
     penalty = (each.T * W) @ each * (2 * np.pi * cutoff) ** (-2 * ROUGH)
+
+    # normal equations, whose matrix is banded
     square = (B.T * spans) @ B + penalty
     banded = np.zeros((DEGREE + 1, count))
     for k in range(DEGREE + 1):

@@ -88,7 +88,7 @@ def _trials(
     for iterate, linear, pair in zip(found.point.iterates, found.linear, swapped, strict=True):
         trial = iterate.trial
         times, known, torques = trial.tracks.times, trial.torques, None
-        if isinstance(known, TorquePrior):
+        if isinstance(known, TorquePrior):  # torques at the knots, linear between
             at, u = trial.times[trial.knots], iterate.torques
             std = np.sqrt((local_root(found, linear, C) ** 2).sum(axis=1))
             std = std[2 * model.nv :].reshape(u.shape)

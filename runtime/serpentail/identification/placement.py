@@ -145,10 +145,13 @@ def marker_points(model: Model, placed: Placements, q: np.ndarray) -> tuple[np.n
     derivatives by q in its tangent space (F, M, 3, nv).
     """
     tail, nt = q[:, TAIL_Q], model.layout.nt
+    # at the tail's shape, and beside it in each coordinate
     steps = STEP * np.concatenate([np.zeros((1, nt)), np.eye(nt), -np.eye(nt)])
     places = _in_body(model, (tail + steps[:, None]).reshape(-1, nt), placed)
     body = places.reshape(len(steps), len(q), -1, 3)
     R = rotation_matrix(q[:, QUATERNION])[:, None]
+
+    # shifts, turns of the torso, bends of the tail
     by_q = np.zeros((*body.shape[1:], model.nv))
     by_q[..., :3] = np.eye(3)
     by_q[..., OMEGA] = -R @ np.einsum("fmk,kij->fmij", body[0], CROSS)

@@ -70,6 +70,7 @@ def parts_needed(model: Model, iterate: Iterate) -> np.ndarray | None:
 
     The error of an interval is the difference between one step and two half steps.
     """
+    # two half steps
     trial, whole = iterate.trial, iterate.intervals
     half, begin = whole.spans / 2, whole.begin
     for part in (0, 1):

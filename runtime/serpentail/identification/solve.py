@@ -78,6 +78,8 @@ def fit(unknowns: Unknowns, start: FitPoint, stage: Stage) -> Fit:
         if _length(linear, step) < 1:
             converged = True
             break
+
+        # along the step, with numbers at their bounds pinned there
         pinned |= _to_pin(unknowns, point.values, step.shared)
         advanced, weight = _line_search(unknowns, point, linear, step, weight)
         if advanced is None:
@@ -198,6 +200,7 @@ def _line_search(
     before = cost / 2 + weight * off
     expected = slope - weight * off
 
+    # half as far, until cost and defects have fallen enough
     length = _longest(unknowns, point.values, step.shared)
     while length > SHORTEST:
         candidate = _integrated(unknowns, _moved(unknowns, point, step, length))

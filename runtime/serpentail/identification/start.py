@@ -86,7 +86,8 @@ def fitted(
     def off(points: np.ndarray, rows: np.ndarray) -> np.ndarray:
         return np.where(weight[rows], positions[rows] - points, 0).reshape(len(rows), -1, 1)
 
-    left = np.arange(len(q))  # frames that still move
+    # frames whose step is small drop out; a step that misses is tried again, shorter
+    left = np.arange(len(q))
     misfit = (off(world_points(model, placed, q), left) ** 2).sum(axis=(1, 2))
     for _ in range(ITERATIONS):
         points, by_q = marker_points(model, placed, q[left])
@@ -134,6 +135,8 @@ def _begin(model: Model, placed: Placements, tracks: MarkerTracks) -> tuple[np.n
     q = np.zeros((len(tracks.times), model.nq))
     q[:, QUATERNION.start] = 1
     body = world_points(model, placed, q[:1])[0]
+
+    # on the torso alone if any frame allows it
     use = tracks.seen & placed.on_torso
     laid = np.array([off_line(body[markers], LINE) for markers in use])
     if not laid.any():

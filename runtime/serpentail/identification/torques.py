@@ -109,7 +109,7 @@ def _called(function: Callable[[float], Any], nt: int) -> Known:
 
 
 def knots_of(times: np.ndarray, prior: TorquePrior) -> np.ndarray:
-    """Return indices of the mesh's times that are knots, about a quarter of the time apart."""
+    """Return indices of the mesh's times that are knots, about an eighth of the time apart."""
     spans = max(int(np.ceil((times[-1] - times[0]) * PER_TIME / float(prior.time))), 1)
     even = np.linspace(times[0], times[-1], spans + 1)
     return np.unique(np.abs(times[:, None] - even).argmin(axis=0))

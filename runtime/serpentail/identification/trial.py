@@ -61,6 +61,7 @@ def meshed(
     tracks: MarkerTracks, noise: np.ndarray, torques: Known | TorquePrior, parts: np.ndarray
 ) -> Trial:
     """Return a trial with as many intervals between frames as ``parts`` (F-1,) says."""
+    # the mesh, with each frame at one of its points
     pieces = [
         np.linspace(a, b, n, endpoint=False)
         for a, b, n in zip(tracks.times[:-1], tracks.times[1:], parts, strict=True)
@@ -68,6 +69,8 @@ def meshed(
     times = np.concatenate([*pieces, tracks.times[-1:]])
     frames = np.concatenate([[0], np.cumsum(parts)])
     count = len(times) - 1
+
+    # unknown torques are linear between knots at frames: a hat function for each knot
     if isinstance(torques, TorquePrior):
         knots = frames[knots_of(tracks.times, torques)]
         hats = np.stack(

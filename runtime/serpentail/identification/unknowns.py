@@ -96,15 +96,9 @@ class Unknowns:
 
     def prior_rows(self, values: np.ndarray) -> np.ndarray:
         """Return the rows (R, P + 1) of the priors over relative changes, right-hand side last."""
-        believed = [
-            (k, each.size / each.spread, (each.start - values[k]) / each.spread)
-            for k, each in enumerate(self.each)
-            if each.spread is not None
-        ]
-        rows = np.zeros((len(believed), len(self.each) + 1))
-        for row, (k, weight, off) in zip(rows, believed, strict=True):
-            row[k], row[-1] = weight, off
-        return rows
+        spread = np.array([np.inf if each.spread is None else each.spread for each in self.each])
+        rows = np.column_stack([np.diag(self.sizes / spread), (self.start - values) / spread])
+        return rows[np.isfinite(spread)]
 
     def struct_jacobian(self, model: Model) -> np.ndarray:
         """Return d(parameter struct) / d(unknowns), (scalars, P), at a model's parameters."""
@@ -146,14 +140,13 @@ def _with(values: np.ndarray, entries: tuple[int, ...], value: float) -> Any:
 
 
 def _struct_direction(model: Model, unknown: Unknown) -> np.ndarray:
-    """Return how the parameter struct moves with a number; link_inertia may follow from it."""
+    """Return how the parameter struct moves with a number, by a complex step."""
     values: dict[str, Any] = dict(model.parameters)
     moved = np.array(values[unknown.of], complex)
-    if moved.ndim:
-        moved[list(unknown.entries)] += 1j * TINY
-    else:
-        moved = moved + 1j * TINY
+    moved[list(unknown.entries) if moved.ndim else ...] += 1j * TINY
     values[unknown.of] = moved
+
+    # the inertia of links that are ellipsoids follows from their other parameters
     if "link_radius" in values:
         pieces = int(np.sum(model.joints_each))
         values["link_inertia"] = np.array(ellipsoid(values, pieces))

@@ -134,6 +134,7 @@ class Sequence:
         for phase in self.phases:
             controller, plan, landing = phase.controller, None, None
             try:
+                # what acts: the controller, or the plan for the state in which the phase begins
                 if phase.plan:
                     angles = self._last_angles(phase, moves)
                     flight = planned_flight(self.model, phase, (start.q, start.v), angles)
@@ -148,6 +149,8 @@ class Sequence:
             except KeyboardInterrupt as stop:
                 vars(stop)["motion"] = motion_until(parts, getattr(stop, "motion", None))
                 raise
+
+            # the next phase begins where this one ends
             parts.append(motion)
             end = float(motion.t[-1])
             runs.append(PhaseRun(phase.name, start.time, end, ended_by, plan))
@@ -191,7 +194,7 @@ class Sequence:
             return motion
 
         end = start.time + phase.duration
-        if phase.until == AIRBORNE:
+        if phase.until == AIRBORNE:  # found in samples of a first run
             clear = _clear(run(end, output_step=phase.duration / SAMPLES), phase.clearance)
             return run(clear or end), AIRBORNE if clear else "duration"
         events = phase.stop_at(self.model)
