@@ -49,7 +49,7 @@ def identification_times(folder: Path) -> list[dict]:
     found = st.identify(wrong, tracks, markers, NAMES)
     ours = np.array([each.value for each in found.parameters])
     rows = [_row("ours", time.process_time() - begun, found.iterations, ours)]
-    first = motion_shown(wrong, placements(wrong, markers), tracks)
+    first = motion_shown(placements(wrong, markers), tracks)
     for exact in (False, True):
         rows.append(midpoint(model, (times, seen, first), list(torso.values()), exact))
     return rows

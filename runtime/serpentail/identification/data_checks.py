@@ -13,7 +13,6 @@ from serpentail_scene.layout import TAIL_Q
 
 from ..basics.attitude import REST
 from ..basics.errors import DoubtfulMarkers, IdentificationError
-from ..model.model import Model
 from .linear import Linear
 from .placement import Placements, offset_axes, world_points
 from .start import fitted, off_line
@@ -56,16 +55,14 @@ def refuse_too_few(tracks: MarkerTracks, nq: int) -> None:
     )
 
 
-def refuse_scale(
-    model: Model, placed: Placements, tracks: MarkerTracks, moving: Collection[int] = ()
-) -> None:
+def refuse_scale(placed: Placements, tracks: MarkerTracks, moving: Collection[int] = ()) -> None:
     """IdentificationError if markers are apart by another order of magnitude than their places.
 
     Those on the torso are compared, the median of all pairs and frames; if there are too few, all
     markers with a straight tail. moving: markers whose places are estimated.
     """
-    straight = np.concatenate([REST, np.zeros(model.layout.nt)])
-    body = world_points(model, placed, straight[None])[0]
+    straight = np.concatenate([REST, np.zeros(placed.model.layout.nt)])
+    body = world_points(placed, straight[None])[0]
     fixed = np.array([k not in moving for k in range(len(body))])
     for use, most in ((fixed & placed.on_torso, RIGID), (fixed, BENDABLE)):
         ratios = [
@@ -93,15 +90,13 @@ def _of_scale(tracks: MarkerTracks, ratio: float) -> str:
     )
 
 
-def warn_of_swaps(
-    model: Model, placed: Placements, tracks: MarkerTracks, q: np.ndarray
-) -> tuple[int, ...]:
+def warn_of_swaps(placed: Placements, tracks: MarkerTracks, q: np.ndarray) -> tuple[int, ...]:
     """Warn of two markers whose exchange makes frames fit much better; return them."""
     seen = tracks.seen.sum(axis=1)
     rows = np.flatnonzero(seen == seen.max())
     positions = tracks.positions[rows]
-    misfits = fitted(model, placed, positions, q[rows])[1]
-    loose = np.flatnonzero(misfits >= LOOSE * float(model.parameters["tail_length"]))
+    misfits = fitted(placed, positions, q[rows])[1]
+    loose = np.flatnonzero(misfits >= LOOSE * float(placed.model.parameters["tail_length"]))
     if not len(loose):
         return ()
 
@@ -114,7 +109,7 @@ def warn_of_swaps(
         straight[:, TAIL_Q] = 0
         begin = np.concatenate([q[rows[frames]]] * len(pairs) + [straight] * len(pairs))
         both = np.tile(changed.reshape(-1, *positions.shape[1:]), (2, 1, 1))
-        return fitted(model, placed, both, begin)[1].reshape(2, len(pairs), -1).min(axis=0)
+        return fitted(placed, both, begin)[1].reshape(2, len(pairs), -1).min(axis=0)
 
     # the pair that mends some frames best, and then how many it mends
     few = loose[np.linspace(0, len(loose) - 1, min(FRAMES, len(loose))).astype(int)]
@@ -137,7 +132,7 @@ def warn_of_swaps(
     return best
 
 
-def torques_missing(model: Model, placed: Placements, linear: Linear) -> bool:
+def torques_missing(placed: Placements, linear: Linear) -> bool:
     """Tell whether residuals are smooth and grow to the tip, whatever the markers' offsets are.
 
     A marker that is elsewhere than stated leaves residuals that are constant in the axes of its
@@ -146,8 +141,8 @@ def torques_missing(model: Model, placed: Placements, linear: Linear) -> bool:
     """
     iterate, trial = linear.iterate, linear.iterate.trial
     seen, rows = trial.tracks.seen, trial.coordinates
-    q = iterate.states[trial.frames, : model.nq]
-    axes = offset_axes(model, placed, q) / trial.noise[..., None, None]
+    q = iterate.states[trial.frames, : placed.model.nq]
+    axes = offset_axes(placed, q) / trial.noise[..., None, None]
 
     # what is left of the residuals with offsets of all markers as further columns
     markers = seen.shape[1]

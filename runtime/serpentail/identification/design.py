@@ -110,7 +110,7 @@ def fisher_information(
     if not isinstance(motion, Trajectory) or motion.q.shape[1] != model.nq or len(motion.t) < 2:
         raise refusal("motion", motion, "a Trajectory of this model", IdentificationError)
     placed = placements(model, markers)
-    wanted = unknowns(model, placed, estimate)
+    wanted = unknowns(placed, estimate)
     if not wanted.each:
         raise IdentificationError("estimate: none: name the parameters that matter")
     count = int(np.floor((motion.t[-1] - motion.t[0]) * rate * (1 + 1e-12))) + 1
@@ -126,7 +126,7 @@ def fisher_information(
     iterate = iterate_through(trial, times, rows, np.zeros((0, model.layout.nt)))
     flight = _flown(model, iterate)
 
-    linear = linearised(wanted, model, placed, flight)
+    linear = linearised(wanted, placed, flight)
     point, pinned = FitPoint(wanted.start, (flight,)), np.zeros(len(wanted.each), bool)
     sure = certainty(Fit(wanted, point, (linear,), pinned, iterations=0, converged=True))
     return Information(

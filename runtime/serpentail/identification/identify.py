@@ -126,7 +126,7 @@ def identify(
         raise refusal("confidence", confidence, "a number below 1", IdentificationError)
     check_model(model, estimate)
     placed = placements(model, markers)
-    wanted = unknowns(model, placed, estimate)
+    wanted = unknowns(placed, estimate)
     tracks = _tracks_of(data, placed, settings)
     torques = _torques_of(settings.get("torques"), len(tracks), model.layout.nt)
     noises = _noises_of(settings.get("noise"), tracks)
@@ -141,8 +141,8 @@ def identify(
             iterates.append(iterate_through(trial, track.times, states, no_torques))
         start = FitPoint(wanted.start, tuple(iterates))
         found = refined(wanted, start, noise_known, stage)
-    swapped, seconds = [pair for _, pair in shown], time.perf_counter() - began
-    return identification_of(found, noise_known, confidence, swapped, seconds)
+    swapped = [pair for _, pair in shown]
+    return identification_of(found, noise_known, confidence, swapped, began)
 
 
 def check_model(model: Any, estimate: Any) -> None:
@@ -213,8 +213,8 @@ def _motion_shown(wanted: Unknowns, tracks: MarkerTracks) -> tuple[np.ndarray, t
 
     IdentificationError if they are too few, or of another scale.
     """
-    model, placed = wanted.model, wanted.placed
-    refuse_too_few(tracks, model.nq)
-    refuse_scale(model, placed, tracks, {marker for marker, _, _ in wanted.offsets()})
-    states = motion_shown(model, placed, tracks)
-    return states, warn_of_swaps(model, placed, tracks, states[:, : model.nq])
+    placed, nq = wanted.placed, wanted.model.nq
+    refuse_too_few(tracks, nq)
+    refuse_scale(placed, tracks, {marker for marker, _, _ in wanted.offsets()})
+    states = motion_shown(placed, tracks)
+    return states, warn_of_swaps(placed, tracks, states[:, :nq])

@@ -111,17 +111,17 @@ def joint_torques(
         )
     tracks = tracks.of(placed.names)
     refuse_too_few(tracks, model.nq)
-    refuse_scale(model, placed, tracks)
+    refuse_scale(placed, tracks)
 
     # configurations, smoothed and differentiated twice
-    q = configurations(model, placed, tracks)
+    q = configurations(placed, tracks)
     q[:, QUATERNION] = sign_continuous(q[:, QUATERNION])
     q, first, second = smoothed(tracks.times, q, cutoff)
     v, v_dot = rates(q, first, second)
     q[:, QUATERNION] /= np.linalg.norm(q[:, QUATERNION], axis=1, keepdims=True)
     force = model.inverse_dynamics(q, v, v_dot)
     tau = force[:, TAIL_V]
-    modelled = world_points(model, placed, q)
+    modelled = world_points(placed, q)
     warn_of_residuals(tracks, modelled)
     motion = trajectory_of(model, tracks.times, np.column_stack([q, v]), tau)
     return JointTorques(

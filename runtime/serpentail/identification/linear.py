@@ -13,7 +13,6 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from ..basics.errors import IdentificationError
-from ..model.model import Model
 from . import radau_steps as radau
 from .placement import STEP, Placements, marker_points, offset_axes, world_points
 from .trial import Iterate
@@ -25,16 +24,16 @@ NULL = 1e-9  # directions with smaller singular values (relative) are undetermin
 
 
 def marker_jacobians(
-    unknowns: Unknowns, model: Model, placed: Placements, q: np.ndarray
+    unknowns: Unknowns, placed: Placements, q: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return derivatives (F, M, 3, nv), (F, M, 3, P) of the markers by q's tangent and unknowns."""
-    points, by_q = marker_points(model, placed, q)
+    points, by_q = marker_points(placed, q)
     by_shared = np.zeros((*points.shape, len(unknowns.each)))
-    for k, neighbours in unknowns.neighbours(model).items():
-        above, below = (world_points(each, placed, q) for each in neighbours)
+    for k, neighbours in unknowns.neighbours(placed).items():
+        above, below = (world_points(each, q) for each in neighbours)
         by_shared[..., k] = (above - below) / (2 * STEP * unknowns.sizes[k])
     if offsets := unknowns.offsets():
-        axes = offset_axes(model, placed, q)
+        axes = offset_axes(placed, q)
         for marker, axis, k in offsets:
             by_shared[:, marker, :, k] = axes[:, marker, :, axis]
     return by_q, by_shared
@@ -108,15 +107,16 @@ class Linear:
         return steps
 
 
-def linearised(unknowns: Unknowns, model: Model, placed: Placements, iterate: Iterate) -> Linear:
+def linearised(unknowns: Unknowns, placed: Placements, iterate: Iterate) -> Linear:
     """Return the linear least squares about an iterate whose intervals are integrated."""
+    model = placed.model
     trial, by_struct = iterate.trial, unknowns.struct_jacobian(model)
     by = radau.differentiated(
         model, iterate.intervals, iterate.stages, by_struct, trial.unknown_torques
     )
     off = iterate.defects(model)
     q = iterate.states[trial.frames, : model.nq]
-    by_q, by_shared = marker_jacobians(unknowns, model, placed, q)
+    by_q, by_shared = marker_jacobians(unknowns, placed, q)
     seen, W = trial.tracks.seen, 1 / trial.noise
     state, knots = 2 * model.nv, trial.knots.size * model.layout.nt
     local = state + knots
@@ -146,7 +146,7 @@ def linearised(unknowns: Unknowns, model: Model, placed: Placements, iterate: It
                 both = np.einsum("eu,eat->aut", trial.shares[k], by.by_torque[k])
                 G[:, state:local] += both.reshape(state, knots)
             G[:, local:] += by.by_parameters[k]
-    residual = iterate.residuals(model, placed)[seen].ravel()
+    residual = iterate.residuals(placed)[seen].ravel()
     right = residual - np.concatenate(shifts)
 
     # the prior on the torques

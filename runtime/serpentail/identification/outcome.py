@@ -1,5 +1,6 @@
 """Makes the result of the best fit: estimates with intervals, motions and torques."""
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from .certainty import (
     relative_covariance,
 )
 from .data_checks import torques_missing, warn_of_residuals
+from .placement import Placements
 from .result import Estimate, EstimatedTorques, Identification, IdentifiedTrial, trajectory_of
 from .solve import Fit
 from .torques import TorquePrior
@@ -24,14 +26,14 @@ def identification_of(
     noise_known: bool,
     confidence: float,
     swapped: list[tuple[int, ...]],
-    seconds: float,
+    began: float,
 ) -> Identification:
     """Return the result of the best fit, and warn of what fits badly.
 
-    swapped: markers of each trial that are known to look swapped.
+    swapped: markers of each trial that are known to look swapped; began: on the clock (s).
     """
     refuse_unseen(found)
-    wanted, values, level = found.unknowns, found.point.values, noise_level(found)
+    placed, level = found.unknowns.placed_at(found.point.values), noise_level(found)
     upper = (1 + confidence) / 2
     reach = float(ndtri(upper) if noise_known else stdtrit(level.freedom, upper))
     scale = 1.0 if noise_known or found.point.unknown_torques else level.scale
@@ -39,18 +41,18 @@ def identification_of(
     noises = [iterate.trial.noise.ravel() for iterate in found.point.iterates]
     noise = float(np.median(np.concatenate(noises)))
     return Identification(
-        model=wanted.model_at(values),
-        placed=wanted.placed_at(values),
+        model=placed.model,
+        placed=placed,
         parameters=_estimates(found, sure.covariance, scale, reach),
         covariance=sure.covariance,
         singular_values=sure.singular_values,
         undetermined=(*sure.undetermined, *by_prior_alone(found)),
         noise=noise if noise_known else noise * level.scale,
         confidence=confidence,
-        trials=_trials(found, reach, swapped),
+        trials=_trials(found, placed, reach, swapped),
         iterations=found.iterations,
         success=found.converged,
-        seconds=seconds,
+        seconds=time.perf_counter() - began,
     )
 
 
@@ -78,13 +80,10 @@ def _estimates(
 
 
 def _trials(
-    found: Fit, reach: float, swapped: list[tuple[int, ...]]
+    found: Fit, placed: Placements, reach: float, swapped: list[tuple[int, ...]]
 ) -> tuple[IdentifiedTrial, ...]:
     """Return the results of all trials, and warn of markers and torques that do not fit."""
-    wanted, values = found.unknowns, found.point.values
-    model, placed = wanted.model_at(values), wanted.placed_at(values)
-    C = relative_covariance(found)
-    results = []
+    model, C, results = placed.model, relative_covariance(found), []
     for iterate, linear, pair in zip(found.point.iterates, found.linear, swapped, strict=True):
         trial = iterate.trial
         times, known, torques = trial.tracks.times, trial.torques, None
@@ -97,9 +96,9 @@ def _trials(
             missing = False
         else:
             tau = known(times)
-            missing = torques_missing(model, placed, linear)
+            missing = torques_missing(placed, linear)
         motion = trajectory_of(model, times, iterate.states[trial.frames], tau)
-        modelled = iterate.modelled(model, placed)
+        modelled = iterate.modelled(placed)
         warn_of_residuals(trial.tracks, modelled, missing, pair)
         results.append(IdentifiedTrial(trial.tracks, motion, modelled, torques))
     return tuple(results)

@@ -20,7 +20,6 @@ from serpentail_scene.layout import OMEGA, PER_SEGMENT, QUATERNION, TAIL_Q, TAIL
 from ..basics.attitude import REST, Entries, from_angles, product, rotation_matrix
 from ..basics.checks import finite_array, number, numbers, refusal
 from ..basics.errors import IdentificationError
-from ..model.kernel import Kernel
 from ..model.model import Model
 from ..model.polar import polar_to_bend
 
@@ -76,11 +75,12 @@ class Pieces:
 
 @dataclass(frozen=True, eq=False)
 class Placements:
-    """M markers on the pieces of a tail.
+    """M markers on a model.
 
     names; piece (M,), -1 for the torso; fraction of the piece (M,); offset from there (M, 3), m.
     """
 
+    model: Model
     names: tuple[str, ...]
     piece: np.ndarray
     fraction: np.ndarray
@@ -112,9 +112,8 @@ def placements(model: Model, markers: Any) -> Placements:
 
     placed = [_placed(str(name), marker, along) for name, marker in markers.items()]
     piece, fraction, offset = zip(*placed, strict=True)
-    return Placements(
-        tuple(map(str, markers)), np.array(piece), np.array(fraction), np.array(offset), pieces
-    )
+    columns = np.array(piece), np.array(fraction), np.array(offset)
+    return Placements(model, tuple(map(str, markers)), *columns, pieces)
 
 
 def _placed(name: str, marker: Any, ends: np.ndarray) -> tuple[int, float, np.ndarray]:
@@ -140,19 +139,19 @@ def _three(field: str, value: Any) -> np.ndarray:
     return numbers(field, value, 3, IdentificationError)
 
 
-def marker_points(model: Model, placed: Placements, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def marker_points(placed: Placements, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return markers at configurations (F, nq): points (F, M, 3) m in the world, and their
     derivatives by q in its tangent space (F, M, 3, nv).
     """
-    tail, nt = q[:, TAIL_Q], model.layout.nt
+    tail, nt = q[:, TAIL_Q], placed.model.layout.nt
     # at the tail's shape, and beside it in each coordinate
     steps = STEP * np.concatenate([np.zeros((1, nt)), np.eye(nt), -np.eye(nt)])
-    places = _in_body(model, (tail + steps[:, None]).reshape(-1, nt), placed)
+    places = _in_body(placed, (tail + steps[:, None]).reshape(-1, nt))
     body = places.reshape(len(steps), len(q), -1, 3)
     R = rotation_matrix(q[:, QUATERNION])[:, None]
 
     # shifts, turns of the torso, bends of the tail
-    by_q = np.zeros((*body.shape[1:], model.nv))
+    by_q = np.zeros((*body.shape[1:], placed.model.nv))
     by_q[..., :3] = np.eye(3)
     by_q[..., OMEGA] = -R @ np.einsum("fmk,kij->fmij", body[0], CROSS)
     slopes = (body[1 : nt + 1] - body[nt + 1 :]) / (2 * STEP)
@@ -160,10 +159,10 @@ def marker_points(model: Model, placed: Placements, q: np.ndarray) -> tuple[np.n
     return _in_world(q, R, body[0]), by_q
 
 
-def world_points(model: Model, placed: Placements, q: np.ndarray) -> np.ndarray:
+def world_points(placed: Placements, q: np.ndarray) -> np.ndarray:
     """Return markers at configurations (F, nq), (F, M, 3) m."""
     R = rotation_matrix(q[:, QUATERNION])[:, None]
-    return _in_world(q, R, _in_body(model, q[:, TAIL_Q], placed))
+    return _in_world(q, R, _in_body(placed, q[:, TAIL_Q]))
 
 
 def _in_world(q: np.ndarray, R: np.ndarray, body: np.ndarray) -> np.ndarray:
@@ -171,20 +170,20 @@ def _in_world(q: np.ndarray, R: np.ndarray, body: np.ndarray) -> np.ndarray:
     return q[:, None, :3] + (R @ body[..., None])[..., 0]
 
 
-def offset_axes(model: Model, placed: Placements, q: np.ndarray) -> np.ndarray:
+def offset_axes(placed: Placements, q: np.ndarray) -> np.ndarray:
     """Return the axes (F, M, 3, 3) of offsets in the world at configurations (F, nq)."""
     R = rotation_matrix(q[:, QUATERNION])[:, None]
-    return R @ _axes(model, q[:, TAIL_Q], placed)
+    return R @ _axes(placed, q[:, TAIL_Q])
 
 
-def _axes(model: Model, tail: np.ndarray, placed: Placements) -> np.ndarray:
+def _axes(placed: Placements, tail: np.ndarray) -> np.ndarray:
     """Return the axes (F, M, 3, 3) of offsets in B at tail coordinates (F, 2m)."""
-    if model.kernel("tail_points").polar:
+    if placed.model.kernel("tail_points").polar:
         pairs = polar_to_bend(tail[:, ::PER_SEGMENT], tail[:, 1::PER_SEGMENT])[:2]
         tail = np.stack(pairs, axis=-1).reshape(tail.shape)
     quaternions = np.zeros((len(tail), len(placed.names), 4))
     quaternions[..., 0] = 1
-    frame: Entries = from_angles(np.array(model.parameters.get("mount_angles", (0.0, 0, 0))))
+    frame: Entries = from_angles(np.array(placed.model.parameters.get("mount_angles", (0.0, 0, 0))))
     for k in range(placed.piece.max() + 1):
         i = PER_SEGMENT * placed.pieces.segment[k]
         turn = partial(_turn, placed.pieces.arc[k], tail[:, i], tail[:, i + 1])
@@ -195,12 +194,12 @@ def _axes(model: Model, tail: np.ndarray, placed: Placements) -> np.ndarray:
     return rotation_matrix(quaternions)
 
 
-def _in_body(model: Model, tail: np.ndarray, placed: Placements) -> np.ndarray:
+def _in_body(placed: Placements, tail: np.ndarray) -> np.ndarray:
     """Return markers in B (F, M, 3) m at tail coordinates (F, 2m)."""
-    places = _centre_line(model.kernel("tail_points"), tail, placed)
+    places = _centre_line(placed, tail)
     if not placed.offset[~placed.on_torso].any():
         return places + placed.offset
-    return places + (_axes(model, tail, placed) @ placed.offset[..., None])[..., 0]
+    return places + (_axes(placed, tail) @ placed.offset[..., None])[..., 0]
 
 
 def _turn(arc: bool, first: np.ndarray, second: np.ndarray, fraction: float) -> list[np.ndarray]:
@@ -216,9 +215,10 @@ def _turn(arc: bool, first: np.ndarray, second: np.ndarray, fraction: float) -> 
     return [c1 * c2, s1 * c2, -s1 * s2, c1 * s2]
 
 
-def _centre_line(kernel: Kernel, tail: np.ndarray, placed: Placements) -> np.ndarray:
+def _centre_line(placed: Placements, tail: np.ndarray) -> np.ndarray:
     """Return places on the centre line in B (N, M, 3), m; of markers on the torso 0."""
-    pieces, each = placed.pieces, np.zeros(len(placed.names), int)
+    kernel, pieces = placed.model.kernel("tail_points"), placed.pieces
+    each = np.zeros(len(placed.names), int)
     scale = [np.ones(tail.shape[1])]
     # for each place within an arc, a tail of which this arc is bent less
     for marker, (k, x) in enumerate(zip(placed.piece, placed.fraction, strict=True)):
@@ -265,4 +265,4 @@ def marker_positions(model: Model, q: ArrayLike, markers: Mapping[str, Marker]) 
     rows = finite_array("q", q, IdentificationError)
     if rows.ndim != 2 or rows.shape[1] != model.nq:
         raise IdentificationError(f"q has shape {rows.shape}: needs (F, {model.nq})")
-    return world_points(model, placements(model, markers), rows)
+    return world_points(placements(model, markers), rows)

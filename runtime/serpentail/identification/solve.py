@@ -108,8 +108,8 @@ def _integrated(unknowns: Unknowns, point: FitPoint) -> FitPoint | None:
 
 def _linearised(unknowns: Unknowns, point: FitPoint) -> tuple[Linear, ...]:
     """Return each trial's linear problem at a point."""
-    model, placed = unknowns.model_at(point.values), unknowns.placed_at(point.values)
-    return tuple(linearised(unknowns, model, placed, iterate) for iterate in point.iterates)
+    placed = unknowns.placed_at(point.values)
+    return tuple(linearised(unknowns, placed, iterate) for iterate in point.iterates)
 
 
 def shared_rows(unknowns: Unknowns, values: np.ndarray, linear: tuple[Linear, ...]) -> np.ndarray:
@@ -224,10 +224,10 @@ def _moved(unknowns: Unknowns, point: FitPoint, step: FitStep, length: float) ->
 
 def _merit(unknowns: Unknowns, point: FitPoint, weight: float, scales: list[np.ndarray]) -> float:
     """Return the cost and the weighed sizes of the defects at a point."""
-    model, placed = unknowns.model_at(point.values), unknowns.placed_at(point.values)
+    placed = unknowns.placed_at(point.values)
     total = float((unknowns.prior_rows(point.values)[:, -1] ** 2).sum()) / 2
     for iterate, scale in zip(point.iterates, scales, strict=True):
-        total += float((iterate.residuals(model, placed) ** 2).sum()) / 2
+        total += float((iterate.residuals(placed) ** 2).sum()) / 2
         total += float(((iterate.trial.prior @ iterate.torques) ** 2).sum()) / 2
-        total += weight * float((np.abs(iterate.defects(model)) * scale).sum())
+        total += weight * float((np.abs(iterate.defects(placed.model)) * scale).sum())
     return total

@@ -22,25 +22,25 @@ WINDOW = 7  # frames of a local parabola
 FAR = 4.0  # times the usual misfit: other frames do not begin from such a frame
 
 
-def motion_shown(model: Model, placed: Placements, tracks: MarkerTracks) -> np.ndarray:
+def motion_shown(placed: Placements, tracks: MarkerTracks) -> np.ndarray:
     """Return states (F, nx) at the frames: fitted configurations, velocities by parabolas."""
-    q = configurations(model, placed, tracks)
-    return np.column_stack([q, velocities(model, tracks.times, q)])
+    q = configurations(placed, tracks)
+    return np.column_stack([q, velocities(placed.model, tracks.times, q)])
 
 
-def configurations(model: Model, placed: Placements, tracks: MarkerTracks) -> np.ndarray:
+def configurations(placed: Placements, tracks: MarkerTracks) -> np.ndarray:
     """Return configurations (F, nq) that fit the markers of each frame, between others in gaps.
 
     All frames are fitted side by side. Where a tail is bent so far that two shapes fit, a frame
     continues its neighbour, outward from the frame whose tail is straightest.
     """
-    begun, laid = _begin(model, placed, tracks)
+    begun, laid = _begin(placed, tracks)
     q = begun.copy()
     shown = tracks.seen.mean(axis=1)
     rows = np.flatnonzero(shown >= min(ENOUGH, shown.max()))
     positions = tracks.positions[rows]
-    q[rows], misfit = fitted(model, placed, positions, q[rows])
-    usual = max(FAR * np.median(misfit), TIGHT * float(model.parameters["tail_length"]))
+    q[rows], misfit = fitted(placed, positions, q[rows])
+    usual = max(FAR * np.median(misfit), TIGHT * float(placed.model.parameters["tail_length"]))
     fits = misfit <= usual
     bent = np.abs(q[rows][:, TAIL_Q]).max(axis=1)
     anchor = int(np.where(fits & laid[rows], bent, np.inf).argmin())
@@ -54,7 +54,7 @@ def configurations(model: Model, placed: Placements, tracks: MarkerTracks) -> np
             if not fits[k] or _apart(current, last, torso_laid) > APART:
                 torso = (begun[rows[k]] if torso_laid else last)[TORSO_Q]
                 begin = np.concatenate([torso, last[TAIL_Q]])[None]
-                (current,), off = fitted(model, placed, positions[k : k + 1], begin)
+                (current,), off = fitted(placed, positions[k : k + 1], begin)
                 fits[k] = off[0] <= usual
             sound[k] = fits[k] and (torso_laid or _apart(current, last, torso_laid) <= APART)
             q[rows[k]] = current
@@ -71,13 +71,14 @@ def _apart(q: np.ndarray, other: np.ndarray, torso_laid: bool) -> float:
 
 
 def fitted(
-    model: Model, placed: Placements, positions: np.ndarray, begin: np.ndarray
+    placed: Placements, positions: np.ndarray, begin: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return configurations (F, nq) that fit positions (F, M, 3), and misfits (F,) m.
 
     They begin at given ones. Levenberg-Marquardt steps of all frames side by side; a small weight
     holds rotations where they are.
     """
+    model = placed.model
     nv, reach = model.nv, float(model.parameters["tail_length"])
     weight = np.isfinite(positions).all(axis=2)[..., None]
     q, ridge = within(model, begin), np.full(len(begin), RIDGE)
@@ -88,15 +89,15 @@ def fitted(
 
     # frames whose step is small drop out; a step that misses is tried again, shorter
     left = np.arange(len(q))
-    misfit = (off(world_points(model, placed, q), left) ** 2).sum(axis=(1, 2))
+    misfit = (off(world_points(placed, q), left) ** 2).sum(axis=(1, 2))
     for _ in range(ITERATIONS):
-        points, by_q = marker_points(model, placed, q[left])
+        points, by_q = marker_points(placed, q[left])
         J = np.where(weight[left, ..., None], by_q, 0).reshape(len(left), -1, nv)
         back = np.swapaxes(J, 1, 2)
         square = back @ J + ridge[left, None, None] * hold
         step = np.linalg.solve(square, back @ off(points, left))[..., 0]
         new = turned(model, q[left], step)
-        after = (off(world_points(model, placed, new), left) ** 2).sum(axis=(1, 2))
+        after = (off(world_points(placed, new), left) ** 2).sum(axis=(1, 2))
         better = after <= misfit[left]
         q[left[better]], misfit[left[better]] = new[better], after[better]
         ridge[left] = np.where(better, np.maximum(ridge[left] / 4, RIDGE**2), ridge[left] * 8)
@@ -126,15 +127,15 @@ def within(model: Model, q: np.ndarray) -> np.ndarray:
     return q
 
 
-def _begin(model: Model, placed: Placements, tracks: MarkerTracks) -> tuple[np.ndarray, np.ndarray]:
+def _begin(placed: Placements, tracks: MarkerTracks) -> tuple[np.ndarray, np.ndarray]:
     """Return configurations (F, nq) with a straight tail, and which frames' torsos are laid (F,).
 
     A torso is laid on three of its markers or more; if no frame shows these, on all markers. The
     frames between are interpolated, those before and after are like the nearest.
     """
-    q = np.zeros((len(tracks.times), model.nq))
+    q = np.zeros((len(tracks.times), placed.model.nq))
     q[:, QUATERNION.start] = 1
-    body = world_points(model, placed, q[:1])[0]
+    body = world_points(placed, q[:1])[0]
 
     # on the torso alone if any frame allows it
     use = tracks.seen & placed.on_torso

@@ -123,14 +123,14 @@ class Iterate:
         """Return the differences between the ends of intervals and the next states, (K, 2nv)."""
         return radau.difference(model, self.ends, self.states[1:])
 
-    def modelled(self, model: Model, placed: Placements) -> np.ndarray:
+    def modelled(self, placed: Placements) -> np.ndarray:
         """Return the positions of the markers by the model at the frames, (F, M, 3) m."""
-        return world_points(model, placed, self.states[self.trial.frames, : model.nq])
+        return world_points(placed, self.states[self.trial.frames, : placed.model.nq])
 
-    def residuals(self, model: Model, placed: Placements) -> np.ndarray:
+    def residuals(self, placed: Placements) -> np.ndarray:
         """Return seen less modelled positions (F, M, 3), over the noise; 0 in gaps."""
         tracks, noise = self.trial.tracks, self.trial.noise
-        off = (tracks.positions - self.modelled(model, placed)) / noise[..., None]
+        off = (tracks.positions - self.modelled(placed)) / noise[..., None]
         return np.where(tracks.seen[..., None], off, 0.0)
 
 

@@ -47,9 +47,13 @@ class Unknown:
 class Unknowns:
     """All estimated numbers of a model and its markers."""
 
-    model: Model
     placed: Placements
     each: tuple[Unknown, ...]
+
+    @property
+    def model(self) -> Model:
+        """The model to begin with."""
+        return self.placed.model
 
     @property
     def start(self) -> np.ndarray:
@@ -80,11 +84,11 @@ class Unknowns:
         return _changed(self.model, changes) if changes else self.model
 
     def placed_at(self, values: np.ndarray) -> Placements:
-        """Return the markers with these offsets."""
+        """Return the markers with these offsets, on the model with these parameters."""
         offset = self.placed.offset.copy()
         for marker, axis, k in self.offsets():
             offset[marker, axis] = values[k]
-        return replace(self.placed, offset=offset)
+        return replace(self.placed, model=self.model_at(values), offset=offset)
 
     def offsets(self) -> list[tuple[int, int, int]]:
         """Return marker, axis and index of each number that is an offset."""
@@ -108,18 +112,17 @@ class Unknowns:
                 jacobian[:, k] = _struct_direction(model, each)
         return jacobian
 
-    def neighbours(self, model: Model) -> dict[int, list[Model]]:
-        """Return the models a small step above and below, by index of what moves the tail."""
-        models: dict[int, list[Model]] = {}
+    def neighbours(self, placed: Placements) -> dict[int, list[Placements]]:
+        """Return the markers a small step above and below, by index of what moves the tail."""
+        model, steps = placed.model, dict[int, list[Placements]]()
         for k, each in enumerate(self.each):
             if each.of in GEOMETRY:
                 values = np.array(model.parameters[each.of], float)
                 value = np.atleast_1d(values)[each.entries[0]]
                 ends = (value + STEP * each.size, value - STEP * each.size)
-                models[k] = [
-                    _changed(model, {each.of: _with(values, each.entries, end)}) for end in ends
-                ]
-        return models
+                changes = [{each.of: _with(values, each.entries, end)} for end in ends]
+                steps[k] = [replace(placed, model=_changed(model, change)) for change in changes]
+        return steps
 
 
 def _changed(model: Model, changes: dict[str, Any]) -> Model:
@@ -154,7 +157,7 @@ def _struct_direction(model: Model, unknown: Unknown) -> np.ndarray:
     return np.array(flat(model.manifest, as_tuples)).imag / TINY
 
 
-def unknowns(model: Model, placed: Placements, estimate: Any) -> Unknowns:
+def unknowns(placed: Placements, estimate: Any) -> Unknowns:
     """Return what is to be estimated; IdentificationError with each wrong name.
 
     estimate: names, or name -> spread of a prior about the first value.
@@ -168,25 +171,27 @@ def unknowns(model: Model, placed: Placements, estimate: Any) -> Unknowns:
         raise refusal("estimate", estimate, needs, IdentificationError)
     each: list[Unknown] = []
     for name, spread in wanted.items():
-        for unknown in _of_name(model, placed, name, spread):
+        for unknown in _of_name(placed, name, spread):
             named = {entry for x in each if x.of == unknown.of for entry in x.entries}
             if not named.isdisjoint(unknown.entries):
                 raise IdentificationError(f"estimate: {unknown.name} is named twice")
             each.append(unknown)
+    model = placed.model
     if not all(unknown.is_offset for unknown in each) and model.manifest["scene"]["baked"]:
         raise IdentificationError(
             f"estimate: the parameters are baked into {model.name}: set `baked = false` in its "
             "scene and generate it again"
         )
-    return Unknowns(model, placed, tuple(each))
+    return Unknowns(placed, tuple(each))
 
 
-def _of_name(model: Model, placed: Placements, name: Any, spread: Any) -> list[Unknown]:
+def _of_name(placed: Placements, name: Any, spread: Any) -> list[Unknown]:
     """Return the unknowns that a name stands for."""
     if spread is not None:
         spread = number(f"estimate.{name}", spread, IdentificationError, above=0)
     if isinstance(name, str) and name.startswith(MARKER):
-        return _of_marker(model, placed, name, spread)
+        return _of_marker(placed, name, spread)
+    model = placed.model
     fields = independent(model.manifest, model.parameters)
     match = NAME.fullmatch(name) if isinstance(name, str) else None
     if match is None or match[1] not in fields:
@@ -223,14 +228,14 @@ def _entries(
     return [(f"{name}[{k}]", (k,)) for k in range(len(values))]
 
 
-def _of_marker(model: Model, placed: Placements, name: str, spread: float | None) -> list[Unknown]:
+def _of_marker(placed: Placements, name: str, spread: float | None) -> list[Unknown]:
     """Return the three offsets of a marker."""
     marker = name[len(MARKER) :]
     if marker not in placed.names:
         remedy = did_you_mean(marker, placed.names) or f"there are {', '.join(placed.names)}"
         raise IdentificationError(f"estimate: {name}: no such marker; {remedy}")
     offset = placed.offset[placed.names.index(marker)]
-    size = 0.1 * float(model.parameters["tail_length"])
+    size = 0.1 * float(placed.model.parameters["tail_length"])
     return [
         Unknown(f"{name}.{axis}", "m", name, (k,), float(offset[k]), size, spread)
         for k, axis in enumerate("xyz")
