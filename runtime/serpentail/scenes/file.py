@@ -19,17 +19,8 @@ from .keys import Key, read, sized
 
 # keys of a scene that its generated code depends on, and that a folder is compared by
 MADE_OF = (
-    "kind",
-    "segments",
-    "links",
-    "samples",
-    "contacts",
-    "friction",
-    "bend_range",
-    "coordinates",
-    "taper",
-    "base",
-    "weightless",
+    *("kind", "segments", "links", "samples", "contacts", "friction", "bend_range"),
+    *("coordinates", "taper", "base", "weightless"),
 )
 # tables of verbs, and the keys that each needs
 NEEDS = {
