@@ -21,7 +21,7 @@ import numpy as np
 import serpentail as st
 from examples.studies import identification as study
 from serpentail.identification.placement import placements
-from serpentail.identification.start import motion_shown, on_mesh
+from serpentail.identification.start import interpolated, motion_shown
 
 NAMES = ("tail_mass", "tail_length", "tail_stiffness[same]", "tail_damping[same]")
 BEGIN = np.array([4.2e-3, 0.185, 3e-3, 3e-5])
@@ -49,7 +49,7 @@ def identification_times(folder: Path) -> list[dict]:
     found = st.identify(wrong, tracks, markers, NAMES)
     ours = np.array([each.value for each in found.parameters])
     rows = [_row("ours", time.process_time() - begun, found.iterations, ours)]
-    first = motion_shown(wrong, placements(wrong, markers), tracks)
+    first = motion_shown(placements(wrong, markers), tracks)
     for exact in (False, True):
         rows.append(midpoint(model, (times, seen, first), list(torso.values()), exact))
     return rows
@@ -95,7 +95,7 @@ def midpoint(model: st.Model, data: tuple, torso: list, exact: bool) -> dict:
         "print_time": False,
     }
     solver = ca.nlpsol("solver", "ipopt", program, options)
-    guess = on_mesh(model, first, times, mesh)
+    guess = interpolated(times, first, mesh)
     done = solver(x0=np.concatenate([np.ones(4), guess.ravel()]), lbg=0, ubg=0)
     values = done["x"].full().ravel()[:4] * BEGIN
     count = solver.stats()["iter_count"]

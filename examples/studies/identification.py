@@ -95,10 +95,8 @@ def seen(model, markers, times, states, rng):
     import numpy as np
 
     import serpentail as st
-    from serpentail.identification.placement import placements
-    from serpentail.identification.points import world_points
 
-    points = world_points(model, placements(model, markers), states[:, : model.nq])
+    points = st.marker_positions(model, states[:, : model.nq], markers)
     points = points + NOISE * rng.standard_normal(points.shape)
     points[rng.random(points.shape[:2]) < GAPS] = np.nan
     return st.marker_tracks(times, points, list(markers), unit="m")
@@ -156,7 +154,7 @@ def found_names(model, markers, names):
     from serpentail.identification.placement import placements
     from serpentail.identification.unknowns import unknowns
 
-    return unknowns(model, placements(model, markers), names).each
+    return unknowns(placements(model, markers), names).each
 
 
 def judged(rows: list[dict], names: list[str], model) -> dict:

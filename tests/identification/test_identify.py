@@ -7,8 +7,8 @@ import pytest
 from scipy.stats import binom, chi2
 
 import serpentail as st
-from serpentail.identification import torques as room
 from serpentail.identification.result import trajectory_of
+from serpentail.identification.torques import known_torques, prior_rows
 from tests.identification.flights import elastic, flown, placed, seen, start, tracks
 from tests.support import zoo
 from tests.support.rows import row
@@ -114,12 +114,12 @@ def test_known_torques_may_be_numbers_samples_functions_or_motions():
     wanted, times = np.outer(1 + TIMES, torque), np.reshape(TIMES[:30], (10, 3))
     motion = trajectory_of(model, TIMES, np.tile(start(model), (len(TIMES), 1)), wanted)
     for known in ((TIMES, wanted), lambda t: (1 + t) * torque, motion):
-        found = room.known_torques(known, 2)(times)
+        found = known_torques(known, 2)(times)
         np.testing.assert_allclose(found[3, 2], wanted[11], rtol=1e-12)
     for known, value in ((torque, torque), (None, 0 * torque)):
-        assert (room.known_torques(known, 2)(times) == value).all()
+        assert (known_torques(known, 2)(times) == value).all()
     times = np.array([0.0, 0.01, 0.05, 0.06, 0.2])
-    W = room.prior_rows(times, st.TorquePrior(std=2e-3, time=0.03))
+    W = prior_rows(times, st.TorquePrior(std=2e-3, time=0.03))
     correlated = 2e-3**2 * np.exp(-np.abs(times[:, None] - times) / 0.03)
     np.testing.assert_allclose(np.linalg.inv(W.T @ W), correlated, rtol=1e-12)
 

@@ -8,12 +8,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import serpentail as st
-from serpentail.identification import radau_steps as stages
-from serpentail.identification import start as start_room
+from serpentail.identification import radau_steps as radau
 from serpentail.identification.inverse import smoothed
-from serpentail.identification.placement import placements
-from serpentail.identification.points import world_points
-from serpentail.identification.trial import marker_jacobians
+from serpentail.identification.linear import marker_jacobians
+from serpentail.identification.placement import placements, world_points
+from serpentail.identification.start import turned
 from serpentail.identification.unknowns import unknowns
 from tests.identification.flights import flown, placed, start, tracks
 from tests.support import zoo
@@ -175,29 +174,29 @@ def test_derivatives_of_markers_are_central_differences():
         lengths = [each for each in ("link_lengths", "arc_lengths") if each in model.parameters]
         wanted = [*(lengths or ["tail_length"]), "tail_mount", "marker:p0.6", "torso_mass"]
         wanted += ["mount_angles"] * ("mount_angles" in model.parameters)
-        unknown = unknowns(model, places, wanted)
-        by_q, by = marker_jacobians(unknown, model, places, q)
+        unknown = unknowns(places, wanted)
+        by_q, by = marker_jacobians(unknown, places, q)
 
         def at(values, unknown=unknown, q=q):
-            return world_points(unknown.model_at(values), unknown.placed_at(values), q)
+            return world_points(unknown.placed_at(values), q)
 
         steps = h * np.eye(len(unknown.start))
         slopes = [(at(unknown.start + x) - at(unknown.start - x)) / (2 * h) for x in steps]
         np.testing.assert_allclose(by, np.stack(slopes, axis=-1), atol=1e-8, err_msg=name)
-        turned = [
-            world_points(model, places, start_room.turned(model, q, np.tile(sign * x, (len(q), 1))))
+        points = [
+            world_points(places, turned(model, q, np.tile(sign * x, (len(q), 1))))
             for x in h * np.eye(model.nv)
             for sign in (1, -1)
         ]
-        slopes = (np.array(turned[::2]) - turned[1::2]) / (2 * h)
+        slopes = (np.array(points[::2]) - points[1::2]) / (2 * h)
         np.testing.assert_allclose(by_q, np.moveaxis(slopes, 0, -1), atol=1e-8, err_msg=name)
 
 
 def interval(model, x, torques, span=0.004):
-    nodes = stages.NODES[:, None]
+    nodes = radau.NODES[:, None]
     over = ((1 - nodes) * torques[0] + nodes * torques[1])[None]
-    guess = np.tile(x, (1, 3, 1))
-    return stages.solved(model, np.array([span]), x[None], over, guess)[0], over
+    one = radau.Intervals(np.array([span]), x[None], over)
+    return radau.solved(model, one, np.tile(x, (1, 3, 1)))[0], one
 
 
 @pytest.mark.parametrize("name", ["m1_n3", "elastic", "arcs2", "elastic_arcs"])
@@ -207,17 +206,17 @@ def test_intervals_end_as_by_scipy_and_their_derivatives_are_central_differences
     torques, span = 1e-3 * np.random.default_rng(0).standard_normal((2, nt)), 0.001
     flight = flown(model, np.array([0, span]), x, lambda t: [1 - t / span, t / span] @ torques)
     ours = interval(model, x, torques, span)[0][-1]
-    assert np.abs(stages.difference(model, ours, flight[-1])).max() < 1e-7 or name == "elastic_arcs"
-    X, over = interval(model, x, torques)
-    parts = X[None], np.eye(len(model.parameter_vector)), True
-    found = stages.differentiated(model, np.array([0.004]), x[None], over, parts)
+    assert np.abs(radau.difference(model, ours, flight[-1])).max() < 1e-7 or name == "elastic_arcs"
+    X, one = interval(model, x, torques)
+    by_struct = np.eye(len(model.parameter_vector))
+    found = radau.differentiated(model, one, X[None], by_struct, unknown_torques=True)
 
     def change(h, end_at):
         ahead, behind = (interval(*end_at(sign * h))[0][-1] for sign in (1, -1))
-        return stages.difference(model, ahead, behind) / (2 * h)
+        return radau.difference(model, ahead, behind) / (2 * h)
 
     for k, unit in enumerate(np.eye(2 * model.nv)):
-        wanted = change(1e-6, lambda h, u=unit: (model, stages.moved(model, x, h * u), torques))
+        wanted = change(1e-6, lambda h, u=unit: (model, radau.moved(model, x, h * u), torques))
         np.testing.assert_allclose(found.by_state[0, :, k], wanted, atol=2e-6, rtol=2e-6)
     for unit in np.eye(2 * nt).reshape(-1, 2, nt):
         wanted = change(1e-5, lambda h, u=unit: (model, x, torques + h * u))

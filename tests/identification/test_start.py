@@ -30,7 +30,7 @@ def test_the_torso_may_be_hidden_in_the_first_frames():
         names = list(TORSO) if seed % 2 else rng.choice(list(TORSO), 2 + seed % 4 // 2, False)
         data = tracks(model, TIMES, states, 5e-4, seed=seed, gaps=0.1)
         data = hidden(data, names, slice(1 + seed % 6))
-        shown = motion_shown(model, placements(model, placed(model)), data)
+        shown = motion_shown(placements(model, placed(model)), data)
         with row(seed):
             assert turned_by(shown, states).max() < 45
             assert np.abs(shown[:, 7 : model.nq] - states[:, 7 : model.nq]).max() < 0.7

@@ -12,7 +12,7 @@ import pytest
 
 import serpentail as st
 from serpentail.planning.problem import checked_goal
-from serpentail.sequence.ballistic import landing_time
+from serpentail.sequence.flight import landing_time
 from tests.support import zoo
 from tests.support.rows import row
 

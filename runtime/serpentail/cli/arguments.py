@@ -28,64 +28,42 @@ def _of_scenes(verbs: argparse._SubParsersAction) -> None:
     """Add the verbs about scene files."""
     verbs.add_parser("examples", help="list the scenes that come with the package")
     new = verbs.add_parser("new", help="write a commented scene file, ready to simulate")
-    new.add_argument("file", help="the file to write, such as rat.toml")
-    new.add_argument(
-        "--example", metavar="NAME", help="copy this example; other options are ignored"
-    )
-    new.add_argument("--tail", default="articulated", choices=["articulated", "continuum"])
-    new.add_argument("--segments", type=int, default=1, help="number m of segments, by default 1")
-    new.add_argument(
-        "--links",
-        type=int,
-        help="number n of links in each segment of an articulated tail, by default 3",
-    )
-    new.add_argument(
-        "--contacts",
-        nargs="+",
-        default=[],
-        choices=["feet", "tail", "torso"],
-        help="what can touch the ground; without it the animal flies",
-    )
+    add = new.add_argument
+    add("file", help="the file to write, such as rat.toml")
+    add("--example", metavar="NAME", help="copy this example; other options are ignored")
+    add("--tail", default="articulated", choices=["articulated", "continuum"])
+    add("--segments", type=int, default=1, help="number m of segments, by default 1")
+    links = "number n of links in each segment of an articulated tail, by default 3"
+    add("--links", type=int, help=links)
+    touch = "what can touch the ground; without it the animal flies"
+    add("--contacts", nargs="+", default=[], choices=["feet", "tail", "torso"], help=touch)
     verbs.add_parser("schema", help="print the JSON Schema of scene files, for editors")
-    verbs.add_parser(
-        "generate",
-        help="write the C and CasADi of a scene to generated/: see generate --help",
-        add_help=False,
-    )
+    text = "write the C and CasADi of a scene to generated/: see generate --help"
+    verbs.add_parser("generate", help=text, add_help=False)
 
 
 def _of_motions(verbs: argparse._SubParsersAction) -> None:
     """Add the verbs that make motions, or show them."""
-    simulate = verbs.add_parser(
-        "simulate", help="simulate the motion of a scene's table [simulate]"
-    )
-    _add_scene(simulate, "scenes/kick.toml")
+    text = "simulate the motion of a scene's table [simulate]"
+    simulate = _scene_verb(verbs, "simulate", "scenes/kick.toml", text)
+    text = "a new value of a parameter (mu=0.5) or of a key of [simulate] (duration=2, "
+    text += "start.height=0.1)"
     simulate.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        dest="changes",
-        help=(
-            "a new value of a parameter (mu=0.5) or of a key of "
-            "[simulate] (duration=2, start.height=0.1)"
-        ),
+        "--set", action="append", default=[], metavar="NAME=VALUE", dest="changes", help=text
     )
     film = "draw it to this file: .mp4 or .gif (film), .png, .svg or .pdf (filmstrip), .html (page)"
     simulate.add_argument("--film", help=film)
-    words = "estimate the error of each number: the motion is made again, less exactly"
-    simulate.add_argument("--errors", action="store_true", help=words)
-    plan = verbs.add_parser("plan", help="plan the motion of a scene's table [plan]")
-    _add_scene(plan, "scenes/righting_m1_n3.toml")
-    words = "estimate parameters and torques from marker tracks, as the table [identify] says"
-    identify = verbs.add_parser("identify", help=words)
-    _add_scene(identify, "scenes/elastic_tail.toml")
+    text = "estimate the error of each number: the motion is made again, less exactly"
+    simulate.add_argument("--errors", action="store_true", help=text)
+    text = "plan the motion of a scene's table [plan]"
+    plan = _scene_verb(verbs, "plan", "scenes/righting_m1_n3.toml", text)
+    text = "estimate parameters and torques from marker tracks, as the table [identify] says"
+    identify = _scene_verb(verbs, "identify", "scenes/elastic_tail.toml", text)
     identify.add_argument("data", nargs="+", help="trials: .trc, .csv or .c3d files of markers")
     for verb in (plan, simulate, identify):
         verb.add_argument("--save", help="write the motion to this .npz, .csv or .nc file")
-        verb.add_argument(
-            "--view", metavar="PAGE", help="write a page that shows it to this .html file"
-        )
+        page = "write a page that shows it to this .html file"
+        verb.add_argument("--view", metavar="PAGE", help=page)
     _add_sweep(verbs)
     view = verbs.add_parser("view", help="show saved motions in a page, over each other")
     view.add_argument("files", nargs="+", help="what --save wrote: .npz files")
@@ -93,29 +71,29 @@ def _of_motions(verbs: argparse._SubParsersAction) -> None:
     view.add_argument("--output", help="the page, by default the first file's name with .html")
 
 
-def _add_sweep(verbs: argparse._SubParsersAction) -> None:
-    """Add the verb that makes many runs."""
-    told = "make the runs of a scene's table [sweep]; the same command resumes where it stopped"
-    sweep = verbs.add_parser("sweep", help=told)
-    sweep.add_argument("scene", help="a scene file with a table [sweep], such as study.toml")
-    sweep.add_argument("--store", type=Path, metavar="FOLDER", help="folder for the rows")
-    where = "processes:4, dask (on this machine), dask:tcp://host:8786 or dask:scheduler.json"
-    sweep.add_argument("--executor", metavar="WHERE", help=f"{where}; by default processes")
-    sweep.add_argument(
-        "--status", action="store_true", help="report how far it is, and run nothing"
-    )
-    sweep.add_argument("--retry-failed", action="store_true", help="run failed points again")
-    sweep.add_argument("--export", metavar="FILE", help="write rows to a .parquet, .csv, .nc file")
-    sweep.add_argument(
-        "--row", type=int, default=0, metavar="K", help="the point that --view shows"
-    )
-    sweep.add_argument("--view", metavar="PAGE", help="show a point's motion in this .html file")
-
-
-def _add_scene(verb: argparse.ArgumentParser, example: str) -> None:
-    """Let a verb take a scene and its folder."""
+def _scene_verb(
+    verbs: argparse._SubParsersAction, name: str, example: str, text: str
+) -> argparse.ArgumentParser:
+    """Add a verb that takes a scene and the folder of its model."""
+    verb: argparse.ArgumentParser = verbs.add_parser(name, help=text)
     verb.add_argument("scene", help=f"a scene file, such as {example}, or the name of an example")
     verb.add_argument("--folder", help=FOLDER)
+    return verb
+
+
+def _add_sweep(verbs: argparse._SubParsersAction) -> None:
+    """Add the verb that makes many runs."""
+    text = "make the runs of a scene's table [sweep]; the same command resumes where it stopped"
+    add = verbs.add_parser("sweep", help=text).add_argument
+    add("scene", help="a scene file with a table [sweep], such as study.toml")
+    add("--store", type=Path, metavar="FOLDER", help="folder for the rows")
+    place = "processes:4, dask (on this machine), dask:tcp://host:8786 or dask:scheduler.json"
+    add("--executor", metavar="WHERE", help=f"{place}; by default processes")
+    add("--status", action="store_true", help="report how far it is, and run nothing")
+    add("--retry-failed", action="store_true", help="run failed points again")
+    add("--export", metavar="FILE", help="write rows to a .parquet, .csv, .nc file")
+    add("--row", type=int, default=0, metavar="K", help="the point that --view shows")
+    add("--view", metavar="PAGE", help="show a point's motion in this .html file")
 
 
 def _of_models(verbs: argparse._SubParsersAction) -> None:

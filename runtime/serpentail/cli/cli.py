@@ -13,15 +13,13 @@ try:
     from ..basics.errors import SerpentailError
     from ..basics.progress import progress
     from .arguments import parser
-    from .files import refuse_targets, write
-    from .outcome import Outcome, tell
+    from .outcome import VerbOutcome, print_report, refuse_targets, write
 except KeyboardInterrupt:  # these take longer than Python itself
     sys.exit(INTERRUPTED)
 
 ROOMS = {  # modules, each with a function of the name of each verb
     "scenes": ("examples", "new", "generate", "schema", "completion"),
-    "motions": ("simulate", "plan", "identify", "view"),
-    "sweeps": ("sweep",),
+    "motions": ("simulate", "plan", "identify", "sweep", "view"),
     "models": ("info", "verify", "export", "cache"),
 }
 
@@ -50,7 +48,7 @@ def done(arguments: argparse.Namespace) -> int:
     except OSError as error:  # a path that the system refuses, a disk that is full
         print(f"{arguments.verb}: {error!s:.300}", file=sys.stderr)
         return 2
-    return outcome if isinstance(outcome, int) else told(arguments, outcome)
+    return outcome if isinstance(outcome, int) else finished(arguments, outcome)
 
 
 def arguments_of(argv: list[str] | None) -> argparse.Namespace:
@@ -68,17 +66,17 @@ def tell_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     print(f"serpentail: warning: {message}", file=sys.stderr)
 
 
-def run(arguments: argparse.Namespace) -> Outcome | int:
+def run(arguments: argparse.Namespace) -> VerbOutcome | int:
     """Return the outcome of a verb; the status if the verb prints its own output."""
     (room,) = (room for room, verbs in ROOMS.items() if arguments.verb in verbs)
     module = import_module(f".{room}", __package__)
-    outcome: Outcome | int = getattr(module, arguments.verb)(arguments)
+    outcome: VerbOutcome | int = getattr(module, arguments.verb)(arguments)
     return outcome
 
 
-def told(arguments: argparse.Namespace, outcome: Outcome) -> int:
+def finished(arguments: argparse.Namespace, outcome: VerbOutcome) -> int:
     """Print a report, write the files that were asked for, and return the status."""
-    tell(json.dumps(outcome.report) if getattr(arguments, "json", None) else outcome.text)
+    print_report(json.dumps(outcome.report) if getattr(arguments, "json", None) else outcome.text)
     written = [write(arguments, *entry) for entry in outcome.files.items()]
     if outcome.report.get("stopped") == "interrupt":
         print("serpentail: interrupted; this is the result until then", file=sys.stderr)

@@ -5,19 +5,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..motion.table import as_text
-from .outcome import Outcome
+from .outcome import VerbOutcome
 
 if TYPE_CHECKING:
     from ..model.model import Model
 
 
-def info(arguments: argparse.Namespace) -> Outcome:
+def info(arguments: argparse.Namespace) -> VerbOutcome:
     """Return a description of a model."""
     from ..model.info import described
     from ..model.info import info as report
 
     model = model_of(arguments.model)
-    return Outcome(report(model), described(model))
+    return VerbOutcome(report(model), described(model))
 
 
 def model_of(place: str) -> "Model":
@@ -32,17 +32,19 @@ def model_of(place: str) -> "Model":
     return build(place) if scene else load(place)
 
 
-def verify(arguments: argparse.Namespace) -> Outcome:
+def verify(arguments: argparse.Namespace) -> VerbOutcome:
     """Return which laws a model obeys, and whether it obeys all of them."""
-    from ..verification.report import as_text as told
+    from ..verification.report import as_text as laws_text
     from ..verification.report import laws, summary
 
     model = model_of(arguments.model)
     checks = laws(model)
-    return Outcome(summary(model, checks), told(model, checks), all(c.passed for c in checks))
+    return VerbOutcome(
+        summary(model, checks), laws_text(model, checks), all(c.passed for c in checks)
+    )
 
 
-def export(arguments: argparse.Namespace) -> Outcome:
+def export(arguments: argparse.Namespace) -> VerbOutcome:
     """Write a model to a file for another tool, and return its path."""
     from ..bridges.exporting.export import checked_path
     from ..bridges.exporting.export import export as written
@@ -50,10 +52,10 @@ def export(arguments: argparse.Namespace) -> Outcome:
     if arguments.output is not None:
         checked_path(arguments.kind, arguments.output)  # before the work
     path = written(model_of(arguments.model), arguments.kind, arguments.output)
-    return Outcome({"file": str(path)}, str(path))
+    return VerbOutcome({"file": str(path)}, str(path))
 
 
-def cache(arguments: argparse.Namespace) -> Outcome:
+def cache(arguments: argparse.Namespace) -> VerbOutcome:
     """Return what the cache of compiled models holds; empty it first if asked to."""
     from ..compiling.cache import cache_folder
     from ..compiling.cache_limit import contents, empty
@@ -62,4 +64,4 @@ def cache(arguments: argparse.Namespace) -> Outcome:
     if arguments.clean:
         empty(folder)
     report = contents(folder)
-    return Outcome(report, as_text(report))
+    return VerbOutcome(report, as_text(report))

@@ -7,10 +7,10 @@ from pathlib import Path
 
 from ..basics.errors import SerpentailError
 from ..basics.files import replacing
-from .outcome import Outcome
+from .outcome import VerbOutcome
 
 
-def examples(arguments: argparse.Namespace) -> Outcome:
+def examples(arguments: argparse.Namespace) -> VerbOutcome:
     """Return the scenes that come with the package."""
     from serpentail_scene.source import tables_of
 
@@ -21,10 +21,10 @@ def examples(arguments: argparse.Namespace) -> Outcome:
         tables = tables_of(path)
         verbs = [verb for verb in ("simulate", "plan", "identify") if verb in tables]
         lines.append(f"{name:<30}{found[name]} ({', '.join(verbs) or 'model only'})")
-    return Outcome(found, "\n".join(lines))
+    return VerbOutcome(found, "\n".join(lines))
 
 
-def new(arguments: argparse.Namespace) -> Outcome:
+def new(arguments: argparse.Namespace) -> VerbOutcome:
     """Write a scene file: of options, or a copy of an example."""
     from ..building.examples import scene_path
     from ..building.new_scene import new_scene
@@ -41,7 +41,7 @@ def new(arguments: argparse.Namespace) -> Outcome:
         text = new_scene(**{name: getattr(arguments, name) for name in options})
     with replacing(path) as part:
         part.write_text(text, encoding="utf-8")
-    return Outcome({"scene": str(path)}, f"{path}: try `serpentail simulate {path}`")
+    return VerbOutcome({"scene": str(path)}, f"{path}: try `serpentail simulate {path}`")
 
 
 def generate(arguments: argparse.Namespace) -> int:
@@ -54,18 +54,18 @@ def generate(arguments: argparse.Namespace) -> int:
     return subprocess.run([*command(), *words], check=False).returncode
 
 
-def schema(arguments: argparse.Namespace) -> Outcome:
+def schema(arguments: argparse.Namespace) -> VerbOutcome:
     """Return the JSON Schema of scene files, for editors."""
     from ..scenes.schema import scene_schema
 
     found = scene_schema()
-    return Outcome(found, json.dumps(found, indent=1))
+    return VerbOutcome(found, json.dumps(found, indent=1))
 
 
-def completion(arguments: argparse.Namespace) -> Outcome:
+def completion(arguments: argparse.Namespace) -> VerbOutcome:
     """Return the script by which a shell completes the command line."""
     from ..basics.extras import needed
     from .arguments import parser
 
     script = needed("shtab", "completion").complete(parser(), arguments.shell)
-    return Outcome({"script": script}, script)
+    return VerbOutcome({"script": script}, script)

@@ -12,6 +12,7 @@ from ..basics.checks import one_line
 from ..basics.errors import IdentificationError
 from ..basics.extras import needed
 from ..compiling.commands import inherited
+from .tracks import RawTracks
 
 CHILD = Path(__file__).with_name("c3d_child.py")
 MEMORY = (2**30, 64)  # bytes that a read may use: at least, and for each byte of the file
@@ -21,26 +22,26 @@ WAIT = 6  # s for each s of processor time: the machine may be busy
 REMEDY = "export it again, or save it as TRC or CSV"
 
 
-def read_c3d(source: Path) -> tuple[np.ndarray, np.ndarray, list[str], str | None]:
-    """Return times, positions, names and unit of a file; nan for markers that were not seen.
+def read_c3d(source: Path) -> RawTracks:
+    """Return the tracks of a file; nan for markers that were not seen.
 
     IdentificationError if it cannot be read, ExtraMissing without ezc3d.
     """
     line, _, numbers = _answer(source).partition(b"\n")
     try:
-        told = json.loads(line)
-        if "missing" in told:
+        answer = json.loads(line)
+        if "missing" in answer:
             needed("ezc3d", "c3d")
-        if "error" in told:
-            raise ValueError(told["error"])
-        positions = np.frombuffer(numbers, "<f8").reshape(told["shape"])
-        rate, first = told["rate"], told["first"]
+        if "error" in answer:
+            raise ValueError(answer["error"])
+        positions = np.frombuffer(numbers, "<f8").reshape(answer["shape"])
+        rate, first = answer["rate"], answer["first"]
         if not 0 < rate < np.inf:
             raise ValueError(f"POINT:RATE is {rate}")
     except ValueError as error:
         raise _refused(source, str(error)) from None
     times = (first + np.arange(len(positions))) / rate
-    return times, positions, told["names"][: positions.shape[1]], told["unit"]
+    return RawTracks(times, positions, answer["names"][: positions.shape[1]], answer["unit"])
 
 
 def _answer(source: Path) -> bytes:
@@ -62,13 +63,10 @@ def _answer(source: Path) -> bytes:
     except subprocess.TimeoutExpired:
         raise _refused(source, f"no answer in {WAIT * seconds} s") from None
     if done.returncode:
-        raise _refused(source, f"reading it ended with {_end(done.returncode)}")
+        status = done.returncode
+        end = signal.Signals(-status).name if status < 0 else f"status {status}"
+        raise _refused(source, f"reading it ended with {end}")
     return done.stdout
-
-
-def _end(status: int) -> str:
-    """Return how a process ended."""
-    return signal.Signals(-status).name if status < 0 else f"status {status}"
 
 
 def _refused(source: Path, reason: str) -> IdentificationError:

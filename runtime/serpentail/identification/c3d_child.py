@@ -34,7 +34,7 @@ def main(path: str, memory: int, seconds: int, answer: BinaryIO) -> None:
         point = content["parameters"]["POINT"]
         positions = np.moveaxis(content["data"]["points"][:3], [0, 1, 2], [2, 1, 0])
         units = point["UNITS"]["value"]
-        told = {
+        summary = {
             "names": [str(name).strip() for name in point["LABELS"]["value"]],
             "rate": float(point["RATE"]["value"][0]),
             "unit": str(units[0]) if units else None,
@@ -44,13 +44,13 @@ def main(path: str, memory: int, seconds: int, answer: BinaryIO) -> None:
     except Exception as error:  # ezc3d raises errors of many kinds for damaged files
         tell(answer, {"error": f"{type(error).__name__}: {error!s:.100}"})
         return
-    tell(answer, told)
+    tell(answer, summary)
     answer.write(np.ascontiguousarray(positions, "<f8").data)
 
 
-def tell(answer: BinaryIO, told: dict[str, Any]) -> None:
+def tell(answer: BinaryIO, summary: dict[str, Any]) -> None:
     """Write a line of JSON."""
-    answer.write(json.dumps(told).encode() + b"\n")
+    answer.write(json.dumps(summary).encode() + b"\n")
 
 
 if __name__ == "__main__":

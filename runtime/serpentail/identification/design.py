@@ -11,13 +11,12 @@ from ..model.model import Model
 from ..motion.trajectory import Trajectory
 from .certainty import Combination, certainty
 from .identify import check_model
+from .linear import linearised
 from .placement import Marker, placements
-from .point import Point
-from .search import first_iterate
-from .solve import Fit, triangle
+from .solve import Fit, FitPoint
 from .torques import known_torques
 from .tracks import MarkerTracks
-from .trial import Iterate, Trial, linearised, solved, trial_of
+from .trial import Iterate, iterate_through, trial_of
 from .unknowns import unknowns
 
 LONGEST = 0.005  # s: of the intervals
@@ -111,7 +110,7 @@ def fisher_information(
     if not isinstance(motion, Trajectory) or motion.q.shape[1] != model.nq or len(motion.t) < 2:
         raise refusal("motion", motion, "a Trajectory of this model", IdentificationError)
     placed = placements(model, markers)
-    wanted = unknowns(model, placed, estimate)
+    wanted = unknowns(placed, estimate)
     if not wanted.each:
         raise IdentificationError("estimate: none: name the parameters that matter")
     count = int(np.floor((motion.t[-1] - motion.t[0]) * rate * (1 + 1e-12))) + 1
@@ -119,28 +118,17 @@ def fisher_information(
     if count < 4:
         raise IdentificationError(f"rate: value {rate:g}: gives {count} frames: needs 4 or more")
     # frames in which every marker is seen, and the states that the torques lead to
-    nothing = np.zeros((count, len(placed.names), 3))
-    tracks = MarkerTracks(times, nothing, placed.names, "design")
-    trial = trial_of(
-        tracks,
-        np.full(tracks.seen.shape, noise),
-        known_torques(motion, model.layout.nt),
-        (model.layout.nt, LONGEST),
-    )
+    tracks = MarkerTracks(times, np.zeros((count, len(placed.names), 3)), placed.names, "design")
+    noises = np.full(tracks.seen.shape, noise)
+    trial = trial_of(tracks, noises, known_torques(motion, model.layout.nt), LONGEST)
     states = finite_array("motion", np.column_stack([motion.q, motion.v]), IdentificationError)
     rows = np.stack([np.interp(times, motion.t, column) for column in states.T], axis=1)
-    iterate = first_iterate(model, trial, rows)
-    done = _flown(model, trial, iterate)
-    linear = linearised(wanted, model, placed, trial, done)
-    fit = Fit(
-        Point(wanted.start, (done,)),
-        (linear,),
-        (triangle(linear.rows, linear.right),),
-        np.zeros(len(wanted.each), bool),
-        0,
-        True,
-    )
-    sure = certainty(wanted, fit, (1.0, np.inf))
+    iterate = iterate_through(trial, times, rows, np.zeros((0, model.layout.nt)))
+    flight = _flown(model, iterate)
+
+    linear = linearised(wanted, placed, flight)
+    point, pinned = FitPoint(wanted.start, (flight,)), np.zeros(len(wanted.each), bool)
+    sure = certainty(Fit(wanted, point, (linear,), pinned, iterations=0, converged=True))
     return Information(
         tuple(each.name for each in wanted.each),
         wanted.start,
@@ -150,13 +138,13 @@ def fisher_information(
     )
 
 
-def _flown(model: Model, trial: Trial, iterate: Iterate) -> Iterate:
+def _flown(model: Model, iterate: Iterate) -> Iterate:
     """Return the flight from an iterate's first state; each pass makes one more interval exact."""
     while True:
-        done = solved(model, trial, iterate)
+        done = iterate.integrated(model)
         if done is None:
             raise IdentificationError("motion: cannot be integrated under its torques")
         after = np.concatenate([done.states[:1], done.ends])
         if np.allclose(after, done.states, rtol=1e-9, atol=1e-11):
             return done
-        iterate = done.followed(after)
+        iterate = done.moved(after, done.torques)

@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Mapping, Sequence
-from functools import partial
 from os import PathLike
 from typing import Any, TypedDict, Unpack
 
@@ -12,17 +11,17 @@ from ..basics.checks import number, refusal
 from ..basics.errors import IdentificationError, ModelError
 from ..basics.progress import Stage
 from ..model.model import Model
-from . import trial as trials
-from .marker_swaps import refuse_scale, refuse_too_few, tell_of_swaps
-from .outcome import told
+from .data_checks import refuse_scale, refuse_too_few, warn_of_swaps
+from .marker_files import read_markers
+from .outcome import identification_of
 from .placement import Marker, Placements, placements
-from .point import Point
-from .readers import read_markers
+from .refinement import refined
 from .result import Identification
-from .search import Task, first_iterate, refined
+from .solve import FitPoint
 from .start import motion_shown
 from .torques import Known, TorquePrior, checked_prior, known_torques
 from .tracks import MarkerTracks
+from .trial import iterate_through, trial_of
 from .unknowns import Unknowns, unknowns
 
 LONGEST = 0.01  # s: of the intervals of the first mesh
@@ -34,7 +33,7 @@ FUNCTIONS = (
 Data = MarkerTracks | str | PathLike[str]
 
 
-class Settings(TypedDict, total=False):
+class IdentifySettings(TypedDict, total=False):
     """Settings of ``identify`` besides the model, the data, the markers and the unknowns."""
 
     torques: Any
@@ -50,7 +49,7 @@ def identify(
     data: Data | Sequence[Data],
     markers: Mapping[str, Marker],
     estimate: Sequence[str] | Mapping[str, float | None] = (),
-    **settings: Unpack[Settings],
+    **settings: Unpack[IdentifySettings],
 ) -> Identification:
     """Find the motion, torques and parameters that fit marker tracks in flight best.
 
@@ -114,7 +113,7 @@ def identify(
     >>> print(found.table)  # doctest: +SKIP
     """
     began = time.perf_counter()
-    known = set(Settings.__annotations__)
+    known = IdentifySettings.__annotations__
     for name in settings:
         if name not in known:
             raise IdentificationError(
@@ -127,26 +126,23 @@ def identify(
         raise refusal("confidence", confidence, "a number below 1", IdentificationError)
     check_model(model, estimate)
     placed = placements(model, markers)
-    wanted = unknowns(model, placed, estimate)
-    tracks = tracks_of(data, placed, settings)
-    torques = torques_of(settings.get("torques"), len(tracks), model.layout.nt)
-    noises, noise_known = noises_of(settings.get("noise"), tracks)
+    wanted = unknowns(placed, estimate)
+    tracks = _tracks_of(data, placed, settings)
+    torques = _torques_of(settings.get("torques"), len(tracks), model.layout.nt)
+    noises = _noises_of(settings.get("noise"), tracks)
+    noise_known = settings.get("noise") is not None
+
     with Stage("identify", model.name) as stage:
-        begun = [*map(partial(begin, wanted), tracks)]  # no frame between, for places of warnings
-        each = tuple(
-            trials.trial_of(track, noise, torque, (model.layout.nt, LONGEST))
-            for track, noise, torque in zip(tracks, noises, torques, strict=True)
-        )
-        task = Task(wanted, each, torques, noise_known)
-        start = Point(
-            wanted.start,
-            tuple(
-                first_iterate(model, trial, states)
-                for trial, (states, _) in zip(each, begun, strict=True)
-            ),
-        )
-        task, found = refined(task, start, stage)
-    return told(task, found, confidence, (began, [swapped for _, swapped in begun]))
+        shown = [_motion_shown(wanted, each) for each in tracks]
+        iterates = []
+        for track, noise, torque, (states, _) in zip(tracks, noises, torques, shown, strict=True):
+            trial = trial_of(track, noise, torque, LONGEST)
+            no_torques = np.zeros((len(trial.knots), model.layout.nt))
+            iterates.append(iterate_through(trial, track.times, states, no_torques))
+        start = FitPoint(wanted.start, tuple(iterates))
+        found = refined(wanted, start, noise_known, stage)
+    swapped = [pair for _, pair in shown]
+    return identification_of(found, noise_known, confidence, swapped, began)
 
 
 def check_model(model: Any, estimate: Any) -> None:
@@ -170,35 +166,34 @@ def refuse_unlike(model: Model, who: str) -> None:
         raise ModelError(f'{who}: {model.name} has real = "float": generate it with "double"')
 
 
-def tracks_of(data: Any, placed: Placements, settings: Mapping[str, Any]) -> list[MarkerTracks]:
+def _tracks_of(data: Any, placed: Placements, settings: IdentifySettings) -> list[MarkerTracks]:
     """Return the tracks of the placed markers of each trial."""
     listed = list(data) if isinstance(data, list | tuple) else [data]
     if not listed:
         raise IdentificationError("data: none: needs marker tracks, or files of them")
-    how = {name: settings[name] for name in ("axes", "zeros") if name in settings}
-    found = [
+    how: dict[str, Any] = {name: settings[name] for name in ("axes", "zeros") if name in settings}
+    tracks = [
         each if isinstance(each, MarkerTracks) else read_markers(each, settings.get("unit"), **how)
         for each in listed
     ]
-    return [each.of(placed.names) for each in found]
+    return [each.of(placed.names) for each in tracks]
 
 
-def torques_of(torques: Any, count: int, nt: int) -> tuple[Known | TorquePrior, ...]:
+def _torques_of(torques: Any, count: int, nt: int) -> list[Known | TorquePrior]:
     """Return the known torques, or their prior, for each trial."""
     several = isinstance(torques, list) and any(not np.isscalar(each) for each in torques)
     if several and len(torques) != count:
         raise IdentificationError(f"torques: {len(torques)} entries: needs one of {count} trials")
-    listed = torques if several else [torques] * count
-    return tuple(
+    return [
         checked_prior(each) if isinstance(each, TorquePrior) else known_torques(each, nt)
-        for each in listed
-    )
+        for each in (torques if several else [torques] * count)
+    ]
 
 
-def noises_of(noise: Any, tracks: list[MarkerTracks]) -> tuple[list[np.ndarray], bool]:
-    """Return the noise (F, M) of each trial, m, and whether it is known."""
+def _noises_of(noise: Any, tracks: list[MarkerTracks]) -> list[np.ndarray]:
+    """Return the noise (F, M) of each trial, m: of the markers, or to begin with."""
     if noise is None:
-        return [np.full(each.seen.shape, FIRST_NOISE) for each in tracks], False
+        return [np.full(each.seen.shape, FIRST_NOISE) for each in tracks]
     names = tracks[0].names
     values = noise if isinstance(noise, Mapping) else dict.fromkeys(names, noise)
     lacking = [name for name in names if name not in values]
@@ -206,20 +201,20 @@ def noises_of(noise: Any, tracks: list[MarkerTracks]) -> tuple[list[np.ndarray],
         raise IdentificationError(
             f"noise: no value for {lacking[0]!r}: give one for each marker (m)"
         )
-    each = [
+    row = [
         number(f"noise.{name}", values[name], IdentificationError, above=0, most=1.0)
         for name in names
     ]
-    return [np.broadcast_to(np.array(each), track.seen.shape) for track in tracks], True
+    return [np.broadcast_to(np.array(row), each.seen.shape) for each in tracks]
 
 
-def begin(wanted: Unknowns, tracks: MarkerTracks) -> tuple[np.ndarray, tuple[int, ...]]:
+def _motion_shown(wanted: Unknowns, tracks: MarkerTracks) -> tuple[np.ndarray, tuple[int, ...]]:
     """Return the states (F, nx) that a trial's markers show, and markers that look swapped.
 
     IdentificationError if they are too few, or of another scale.
     """
-    model, placed = wanted.model, wanted.placed
-    refuse_too_few(placed, tracks, model.nq)
-    refuse_scale(model, placed, tracks, {marker for marker, _, _ in wanted.offsets()})
-    states = motion_shown(model, placed, tracks)
-    return states, tell_of_swaps(model, placed, tracks, states[:, : model.nq])
+    placed, nq = wanted.placed, wanted.model.nq
+    refuse_too_few(tracks, nq)
+    refuse_scale(placed, tracks, {marker for marker, _, _ in wanted.offsets()})
+    states = motion_shown(placed, tracks)
+    return states, warn_of_swaps(placed, tracks, states[:, :nq])

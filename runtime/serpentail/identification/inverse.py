@@ -11,7 +11,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 from scipy.linalg import solveh_banded
 
-from serpentail_scene.layout import QUATERNION
+from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, VELOCITY
 
 from ..basics.attitude import sign_continuous
 from ..basics.checks import number
@@ -19,10 +19,9 @@ from ..basics.errors import IdentificationError
 from ..model.model import Model
 from ..model.state_space import product_matrix
 from ..motion.trajectory import Trajectory
+from .data_checks import refuse_scale, refuse_too_few, warn_of_residuals
 from .identify import refuse_unlike
-from .marker_swaps import refuse_scale, refuse_too_few, tell_of_residuals
-from .placement import Marker, placements
-from .points import world_points
+from .placement import Marker, placements, world_points
 from .result import trajectory_of
 from .start import configurations
 from .tracks import MarkerTracks
@@ -111,20 +110,22 @@ def joint_torques(
             f"tracks: type {type(tracks).__name__}: needs what read_markers returns"
         )
     tracks = tracks.of(placed.names)
-    refuse_too_few(placed, tracks, model.nq)
-    refuse_scale(model, placed, tracks)
-    q = configurations(model, placed, tracks)
+    refuse_too_few(tracks, model.nq)
+    refuse_scale(placed, tracks)
+
+    # configurations, smoothed and differentiated twice
+    q = configurations(placed, tracks)
     q[:, QUATERNION] = sign_continuous(q[:, QUATERNION])
     q, first, second = smoothed(tracks.times, q, cutoff)
     v, v_dot = rates(q, first, second)
     q[:, QUATERNION] /= np.linalg.norm(q[:, QUATERNION], axis=1, keepdims=True)
     force = model.inverse_dynamics(q, v, v_dot)
-    tau = force[:, 6:]
-    modelled = world_points(model, placed, q)
-    tell_of_residuals(tracks, modelled)
+    tau = force[:, TAIL_V]
+    modelled = world_points(placed, q)
+    warn_of_residuals(tracks, modelled)
     motion = trajectory_of(model, tracks.times, np.column_stack([q, v]), tau)
     return JointTorques(
-        tracks.times, tau, tau * v[:, 6:], force[:, :3], force[:, 3:6], motion, modelled
+        tracks.times, tau, tau * v[:, TAIL_V], force[:, VELOCITY], force[:, OMEGA], motion, modelled
     )
 
 
@@ -136,6 +137,7 @@ def smoothed(
     The spline minimises the sum of squared deviations, each weighted by the time between frames,
     plus (2 pi cutoff)^-6 times the integral of the squared third derivative.
     """
+    # B-splines with a knot at each frame
     knots = np.concatenate([[times[0]] * DEGREE, times, [times[-1]] * DEGREE])
     count = len(knots) - DEGREE - 1
     spans = np.gradient(times)
@@ -147,6 +149,8 @@ def smoothed(
     each = BSpline(knots, np.eye(count), DEGREE).derivative(ROUGH)(at)
     W = (half[:, None] * weights).ravel()
     penalty = (each.T * W) @ each * (2 * np.pi * cutoff) ** (-2 * ROUGH)
+
+    # normal equations, whose matrix is banded
     square = (B.T * spans) @ B + penalty
     banded = np.zeros((DEGREE + 1, count))
     for k in range(DEGREE + 1):
@@ -169,6 +173,6 @@ def rates(q: np.ndarray, first: np.ndarray, second: np.ndarray) -> tuple[np.ndar
     omega = 2 * vector(Q, Q1) / square
     growth = 2 * (Q * Q1).sum(axis=1, keepdims=True) / square
     omega_dot = 2 * (vector(Q, Q2) + vector(Q1, Q1)) / square - growth * omega
-    v = np.concatenate([first[:, :3], omega, first[:, 7:]], axis=1)
-    v_dot = np.concatenate([second[:, :3], omega_dot, second[:, 7:]], axis=1)
+    v = np.concatenate([first[:, POSITION], omega, first[:, TAIL_Q]], axis=1)
+    v_dot = np.concatenate([second[:, POSITION], omega_dot, second[:, TAIL_Q]], axis=1)
     return v, v_dot

@@ -28,45 +28,44 @@ TOLERANCE = 1e-11  # of the last Newton step, over the sizes of the states
 
 
 @dataclass(frozen=True, eq=False)
-class Steps:
-    """Results of K intervals: stages (K, 3, nx), and derivatives of their ends in tangent numbers.
+class Intervals:
+    """K intervals: spans (K,) s, states at the beginning (K, nx), torques at stages (K, 3, 2m)."""
 
-    The derivatives are with respect to the states at the beginning (K, 2nv, 2nv), the torques at
-    both ends (K, 2, 2nv, 2m) and the parameters (K, 2nv, P).
+    spans: np.ndarray
+    begin: np.ndarray
+    torques: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class EndDerivatives:
+    """Derivatives of the ends of K intervals, in tangent numbers.
+
+    They are with respect to the states at the beginning (K, 2nv, 2nv), the torques at both ends
+    (K, 2, 2nv, 2m) and the parameters (K, 2nv, P).
     """
 
-    stages: np.ndarray
     by_state: np.ndarray
     by_torque: np.ndarray
     by_parameters: np.ndarray
 
-    @property
-    def ends(self) -> np.ndarray:
-        """States at the ends (K, nx)."""
-        return self.stages[:, -1]
 
-
-def solved(
-    model: Model, spans: np.ndarray, begin: np.ndarray, torques: np.ndarray, guess: np.ndarray
-) -> np.ndarray | None:
-    """Return the stages (K, 3, nx) of intervals of spans (K,) s that begin at states (K, nx).
-
-    torques (K, 3, 2m): at the stages.  guess (K, 3, nx).  None if Newton's method fails.
-    """
-    count, nx = begin.shape
+def solved(model: Model, intervals: Intervals, guess: np.ndarray) -> np.ndarray | None:
+    """Return the stages (K, 3, nx) of intervals from a guess; None if Newton's method fails."""
+    begin, spans = intervals.begin, intervals.spans
+    nx = begin.shape[1]
     X, scale = guess.copy(), 1 + np.abs(begin).max(axis=0)
-    left = np.arange(count)  # intervals that are not solved yet
+    left = np.arange(len(begin))  # intervals that are not solved yet
     for _ in range(ITERATIONS):
-        here, h = X[left], spans[left, None, None]
-        flat, u = here.reshape(-1, nx), torques[left].reshape(len(left) * 3, -1)
-        f = model.x_dot(flat, u).reshape(here.shape)
+        stages, h = X[left], spans[left, None, None]
+        flat, u = stages.reshape(-1, nx), intervals.torques[left].reshape(len(left) * 3, -1)
+        f = model.x_dot(flat, u).reshape(stages.shape)
         if not np.isfinite(f).all():
             return None
-        residual = here - begin[left, None] - h * (WEIGHTS @ f)
-        J = model.x_dot_derivatives(flat, u)[0].reshape(*here.shape, nx)
+        residual = stages - begin[left, None] - h * (WEIGHTS @ f)
+        J = model.x_dot_derivatives(flat, u)[0].reshape(*stages.shape, nx)
         step = np.linalg.solve(_matrix(J, spans[left]), residual.reshape(len(left), -1, 1))
-        X[left] = here - step.reshape(here.shape)
-        size = np.abs(step.reshape(here.shape) / scale).max(axis=(1, 2))
+        X[left] = stages - step.reshape(stages.shape)
+        size = np.abs(step.reshape(stages.shape) / scale).max(axis=(1, 2))
         if not np.isfinite(size).all():
             return None
         left = left[size > TOLERANCE]
@@ -87,22 +86,26 @@ def _matrix(J: np.ndarray, spans: np.ndarray) -> np.ndarray:
 
 
 def differentiated(
-    model: Model, spans: np.ndarray, begin: np.ndarray, torques: np.ndarray, parts: tuple
-) -> Steps:
-    """Return solved intervals with their derivatives.
+    model: Model,
+    intervals: Intervals,
+    stages: np.ndarray,
+    by_unknowns: np.ndarray,
+    unknown_torques: bool,
+) -> EndDerivatives:
+    """Return the derivatives of solved intervals.
 
-    parts: stages as ``solved`` returns them; d(parameter struct) / d(unknowns); whether the torques
-    are unknown.
+    by_unknowns: d(parameter struct) / d(unknowns); unknown_torques: whether to differentiate by the
+    torques, too.
     """
-    stages, by_unknowns, unknown_torques = parts
-    count, nx = begin.shape
-    nq, nt = model.nq, model.layout.nt
-    flat, u = stages.reshape(-1, nx), torques.reshape(count * 3, -1)
+    count, nx = intervals.begin.shape
+    nq, nt, tangent = model.nq, model.layout.nt, 2 * model.nv
+    flat, u = stages.reshape(-1, nx), intervals.torques.reshape(count * 3, -1)
     J, B = model.x_dot_derivatives(flat, u)
     J, B = J.reshape(count, 3, nx, nx), B.reshape(count, 3, nx, nt)
+
     # right-hand sides: a state at the beginning, torques at both ends, parameters
-    sides = [np.broadcast_to(tangents(model, begin)[:, None], (count, 3, nx, 2 * model.nv))]
-    weighted = spans[:, None, None, None] * WEIGHTS
+    sides = [np.broadcast_to(tangents(model, intervals.begin)[:, None], (count, 3, nx, tangent))]
+    weighted = intervals.spans[:, None, None, None] * WEIGHTS
     if unknown_torques:
         for share in (1 - NODES, NODES):
             sides.append(np.einsum("kij,j,kjab->kiab", weighted[:, 0], share, B))
@@ -112,28 +115,20 @@ def differentiated(
         side = np.zeros((count, 3, nx, by_unknowns.shape[1]))
         side[:, :, nq:] = np.einsum("kij,kjab->kiab", weighted[:, 0], C)
         sides.append(side)
-    side = np.concatenate(sides, axis=-1)
-    found = np.linalg.solve(_matrix(J, spans), side.reshape(count, 3 * nx, -1))
-    last = cotangents(model, stages[:, -1]) @ found[:, -nx:]
-    return _split(last, model, (count, by_unknowns, unknown_torques), stages)
+    right = np.concatenate(sides, axis=-1).reshape(count, 3 * nx, -1)
+    by_side = np.linalg.solve(_matrix(J, intervals.spans), right)
+    last = cotangents(model, stages[:, -1]) @ by_side[:, -nx:]
 
-
-def _split(
-    last: np.ndarray, model: Model, sizes: tuple[int, np.ndarray, bool], stages: np.ndarray
-) -> Steps:
-    """Return derivatives of the ends, split by their arguments."""
-    count, by_unknowns, unknown_torques = sizes
-    states, nt = 2 * model.nv, model.layout.nt
-    by_torque = np.zeros((count, 2, states, nt))
-    by_parameters = np.zeros((count, states, by_unknowns.shape[1]))
-    at = states
+    # split by argument
+    torques = 2 * nt if unknown_torques else 0
+    by_torque = np.zeros((count, 2, tangent, nt))
+    by_parameters = np.zeros((count, tangent, by_unknowns.shape[1]))
     if unknown_torques:
-        by_torque[:, 0] = last[..., at : at + nt]
-        by_torque[:, 1] = last[..., at + nt : at + 2 * nt]
-        at += 2 * nt
+        by_torque[:, 0] = last[..., tangent : tangent + nt]
+        by_torque[:, 1] = last[..., tangent + nt : tangent + torques]
     if by_unknowns.any():
-        by_parameters = last[..., at:]
-    return Steps(stages, last[..., :states], by_torque, by_parameters)
+        by_parameters = last[..., tangent + torques :]
+    return EndDerivatives(last[..., :tangent], by_torque, by_parameters)
 
 
 def tangents(model: Model, x: np.ndarray) -> np.ndarray:

@@ -7,14 +7,95 @@ from typing import Any
 
 import numpy as np
 
+from serpentail_scene.layout import TAIL_V
+
+from ..basics.checks import refusal
 from ..basics.errors import IdentificationError
+from ..basics.short_repr import brief
 from ..model.model import Model
 from ..motion.origin import origin
 from ..motion.table import as_text
 from ..motion.trajectory import Trajectory
 from .certainty import Combination
-from .estimates import Estimate, IdentifiedTrial
 from .placement import Placements
+from .tracks import MarkerTracks
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One estimated number with its standard deviation and interval.
+
+    begin: the value at the start of the search; at_bound: the value went to its lower bound, 0 or
+    almost 0.
+    """
+
+    name: str
+    value: float
+    std: float
+    low: float
+    high: float
+    unit: str
+    begin: float
+    at_bound: bool = False
+
+    @property
+    def row(self) -> dict[str, Any]:
+        """The estimate, ready for JSON; null in place of numbers that are not determined."""
+        row = {"value": self.value, "std": self.std, "low": self.low, "high": self.high}
+        finite = {name: x if np.isfinite(x) else None for name, x in row.items()}
+        return finite | {"unit": self.unit, "begin": self.begin, "at_bound": self.at_bound}
+
+    def __str__(self) -> str:
+        value = f"{self.name} = {self.value:.6g} {self.unit}".rstrip()
+        if np.isinf(self.high - self.low):
+            return f"{value}, not determined"
+        return f"{value}, from {self.low:.6g} to {self.high:.6g}"
+
+
+@dataclass(frozen=True, eq=False)
+class EstimatedTorques:
+    """Torques at the knots of a trial; ``torques[k]`` is that of tail coordinate k, (U,).
+
+    times (U,) s; values, standard deviations, and interval limits low and high (U, 2m) N m.
+    """
+
+    times: np.ndarray
+    values: np.ndarray
+    std: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+    def __getitem__(self, coordinate: int) -> np.ndarray:
+        """Return the values of a tail coordinate (U,); IndexError if there is none."""
+        return self.values[:, coordinate]
+
+    __repr__ = brief
+
+
+@dataclass(frozen=True, eq=False)
+class IdentifiedTrial:
+    """One trial of an identification.
+
+    tracks: what was seen; trajectory: the motion at its frames; modelled (F, M, 3): positions of
+    the markers by the model (m, world); torques: if they were estimated.
+    """
+
+    tracks: MarkerTracks
+    trajectory: Trajectory
+    modelled: np.ndarray
+    torques: EstimatedTorques | None
+
+    __repr__ = brief
+
+    @property
+    def residuals(self) -> np.ndarray:
+        """Seen less modelled positions, (F, M, 3), m; nan in gaps."""
+        return self.tracks.positions - self.modelled
+
+    @property
+    def power(self) -> np.ndarray:
+        """Power of each torque, (F, 2m), W: torque times the rate of its tail coordinate."""
+        return self.trajectory.tau * self.trajectory.v[:, TAIL_V]
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,26 +164,27 @@ class Identification:
     @property
     def report(self) -> dict[str, Any]:
         """JSON-ready summary; intervals that the data do not determine are null."""
-        told: dict[str, Any] = {
+        report: dict[str, Any] = {
             "success": self.success,
             "iterations": self.iterations,
             "seconds": self.seconds,
             "noise_m": self.noise,
             "confidence": self.confidence,
-            "parameters": {each.name: _row(each) for each in self.parameters},
+            "parameters": {each.name: each.row for each in self.parameters},
             "undetermined": [str(each) for each in self.undetermined],
             "rms_m": {},
         }
         for k, trial in enumerate(self.trials):
             rms = np.sqrt(np.nanmean(np.sum(trial.residuals**2, axis=2), axis=0))
             name = "rms_m" if len(self.trials) == 1 else f"rms_m of trial {k + 1}"
-            told[name] = dict(zip(trial.tracks.names, rms.tolist(), strict=True))
+            report[name] = dict(zip(trial.tracks.names, rms.tolist(), strict=True))
             if trial.torques is not None:
-                told.setdefault("peak_torque_Nm", []).append(
-                    float(np.abs(trial.trajectory.tau).max())
-                )
-                told.setdefault("peak_power_W", []).append(float(np.abs(trial.power).max()))
-        return {name: value for name, value in told.items() if value != {}}
+                for name, values in (
+                    ("peak_torque_Nm", trial.trajectory.tau),
+                    ("peak_power_W", trial.power),
+                ):
+                    report.setdefault(name, []).append(float(np.abs(values).max()))
+        return {name: value for name, value in report.items() if value != {}}
 
     @property
     def table(self) -> str:
@@ -146,7 +228,9 @@ class Identification:
         """
         from ..show.pictures.residuals import residual_figure
 
-        chosen = self._trial(trial)
+        if not isinstance(trial, int) or not 0 <= trial < len(self.trials):
+            raise refusal("trial", trial, f"0 to {len(self.trials) - 1}", IdentificationError)
+        chosen = self.trials[trial]
         bands = chosen.torques
         return residual_figure(
             chosen.trajectory,
@@ -175,25 +259,11 @@ class Identification:
         """
         from ..show.page.view import view
 
-        names = None
-        if len(self.trials) > 1:
-            names = [f"trial {k + 1}" for k in range(len(self.trials))]
+        several = len(self.trials) > 1
+        names = [f"trial {k + 1}" for k in range(len(self.trials))] if several else None
         motions = [trial.trajectory for trial in self.trials]
         seen = [trial.tracks.positions for trial in self.trials]
         return view(motions, path, names=names, markers=seen)
-
-    def _trial(self, k: Any) -> IdentifiedTrial:
-        """Return a trial by its index."""
-        if not isinstance(k, int) or not 0 <= k < len(self.trials):
-            raise IdentificationError(f"trial: value {k!r}: needs 0 to {len(self.trials) - 1}")
-        return self.trials[k]
-
-
-def _row(each: Estimate) -> dict[str, Any]:
-    """Return an estimate, ready for JSON."""
-    row = {"value": each.value, "std": each.std, "low": each.low, "high": each.high}
-    finite = {name: x if np.isfinite(x) else None for name, x in row.items()}
-    return finite | {"unit": each.unit, "begin": each.begin, "at_bound": each.at_bound}
 
 
 def trajectory_of(

@@ -2,47 +2,69 @@
 
 Every iteration linearises all trials, eliminates the states and torques of each by an orthogonal
 decomposition, and solves for the unknowns that they share. The remaining rows of the decompositions
-give the information about the shared unknowns.
+give the information about the shared unknowns. Along a step, cost and defects must fall together,
+and positive numbers stay positive.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
-from ..basics.errors import IdentificationError
+from ..basics.errors import IdentificationError, ModelError
 from ..basics.progress import Stage
-from . import trial as trials
-from .descent import search, to_pin
-from .point import Point, integrated, prior_rows
-from .trial import Linear, Trial
+from .linear import NULL, Linear, linearised
+from .radau_steps import moved
+from .trial import Iterate
 from .unknowns import Unknowns
 
 ITERATIONS = 60
 CLOSE = 1e-4  # last step, in standard deviations of the estimates
 ROUNDING = 1e-9  # last step over the size of the data
-NULL = 1e-9  # directions with smaller singular values (relative) are undetermined
-DEPENDENT = 1e-5  # of a column's length that is left: below, columns depend on each other
+ARMIJO, SHORTEST = 1e-4, 1e-6
+MARGIN = 0.2  # of the way to a number's bound that a step must leave
+PINNED = 1e-3  # of its size: from so near a number that wants below its bound is put there
+
+
+@dataclass(frozen=True, eq=False)
+class FitPoint:
+    """Values of the shared unknowns (P,) and an iterate of each trial."""
+
+    values: np.ndarray
+    iterates: tuple[Iterate, ...]
+
+    @property
+    def unknown_torques(self) -> bool:
+        """Whether the torques of any trial are estimated."""
+        return any(iterate.trial.unknown_torques for iterate in self.iterates)
+
+
+@dataclass(frozen=True, eq=False)
+class FitStep:
+    """A step of the shared unknowns (P,), and of local columns and states of each trial."""
+
+    shared: np.ndarray
+    local: list[np.ndarray]
+    states: list[np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Where the search ended: the point, linear problems there, the triangles (C, C) of each trial,
-    which unknowns are at their bounds, iterations, and whether the last step was small.
+    """Where the search ended: the point, each trial's linear problem there, which unknowns are at
+    their bounds, iterations, and whether the last step was small.
     """
 
-    point: Point
+    unknowns: Unknowns
+    point: FitPoint
     linear: tuple[Linear, ...]
-    triangles: tuple[np.ndarray, ...]
     pinned: np.ndarray
     iterations: int
     converged: bool
 
 
-def fit(unknowns: Unknowns, each: tuple[Trial, ...], start: Point, stage: Stage | None) -> Fit:
+def fit(unknowns: Unknowns, start: FitPoint, stage: Stage) -> Fit:
     """Return the best fit near a start; IdentificationError if no step is possible."""
     pinned = np.zeros(len(unknowns.each), bool)
-    point = integrated(unknowns, each, start)
+    point = _integrated(unknowns, start)
     if point is None:
         raise IdentificationError(
             "data: the model cannot be integrated from the motion that the markers show: check "
@@ -50,114 +72,162 @@ def fit(unknowns: Unknowns, each: tuple[Trial, ...], start: Point, stage: Stage 
         )
     weight, converged = 1.0, False
     for iteration in range(1, ITERATIONS + 1):
-        linear, triangles = _decomposed(unknowns, each, point)
-        step, steps = _step(unknowns, point, triangles, pinned)
-        length = _change(each, linear, step, steps)
-        if stage is not None:
-            stage.tell(iteration / ITERATIONS)
-        if length < 1:
+        linear = _linearised(unknowns, point)
+        step = _step(unknowns, point.values, linear, pinned)
+        stage.tell(iteration / ITERATIONS)
+        if _length(linear, step) < 1:
             converged = True
             break
-        pinned |= to_pin(unknowns, point, step)
-        advanced, weight = search(unknowns, each, (point, linear, weight), (step, steps))
+
+        # along the step, with numbers at their bounds pinned there
+        pinned |= _to_pin(unknowns, point.values, step.shared)
+        advanced, weight = _line_search(unknowns, point, linear, step, weight)
         if advanced is None:
             break
         point = advanced
         if pinned.any():
-            point = Point(np.where(pinned, unknowns.least, point.values), point.iterates)
-            point = integrated(unknowns, each, point) or advanced
-    return Fit(point, linear, triangles, pinned, iteration, converged)
+            values = np.where(pinned, unknowns.least, point.values)
+            point = _integrated(unknowns, FitPoint(values, point.iterates)) or advanced
+    return Fit(unknowns, point, linear, pinned, iteration, converged)
 
 
-def _decomposed(
-    unknowns: Unknowns, each: tuple[Trial, ...], point: Point
-) -> tuple[tuple[Linear, ...], tuple[np.ndarray, ...]]:
-    """Return each trial's linear problem, and its triangular factor with the right-hand side."""
-    model, placed = unknowns.model_at(point.values), unknowns.placed_at(point.values)
-    linear = tuple(
-        trials.linearised(unknowns, model, placed, trial, iterate)
-        for trial, iterate in zip(each, point.iterates, strict=True)
-    )
-    return linear, tuple(triangle(each.rows, each.right) for each in linear)
+def _integrated(unknowns: Unknowns, point: FitPoint) -> FitPoint | None:
+    """Return a point with its intervals integrated; None if that fails."""
+    try:
+        model = unknowns.model_at(point.values)
+    except ModelError:
+        return None
+    iterates = []
+    for iterate in point.iterates:
+        integrated = iterate.integrated(model)
+        if integrated is None:
+            return None
+        iterates.append(integrated)
+    return FitPoint(point.values, tuple(iterates))
 
 
-def triangle(rows: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Return R (C+1, C+1) of the decomposition of [rows, right]; rows of zeros where few are.
+def _linearised(unknowns: Unknowns, point: FitPoint) -> tuple[Linear, ...]:
+    """Return each trial's linear problem at a point."""
+    placed = unknowns.placed_at(point.values)
+    return tuple(linearised(unknowns, placed, iterate) for iterate in point.iterates)
 
-    Two Cholesky decompositions are as accurate as Householder's (Yamamoto et al., 2015) and take a
-    tenth of the time, unless columns almost depend on each other.
+
+def shared_rows(unknowns: Unknowns, values: np.ndarray, linear: tuple[Linear, ...]) -> np.ndarray:
+    """Return the rows (R, P + 1) of all trials and priors about the shared unknowns, relative to
+    their sizes, right-hand side last.
     """
-    both = np.column_stack([rows, right])
-    size = both.shape[1]
-    scale = np.linalg.norm(both, axis=0)
-    if len(both) > size and scale.all():
-        Q = both / scale
-        try:
-            first = np.linalg.cholesky(Q.T @ Q).T
-            diagonal = np.diag(first)
-            if diagonal.min() > DEPENDENT:
-                Q = solve_triangular(first, Q.T, trans="T").T
-                return np.linalg.cholesky(Q.T @ Q).T @ first * scale
-        except np.linalg.LinAlgError:  # dependent columns
-            pass
-    R = np.linalg.qr(both, mode="r")
-    return np.vstack([R, np.zeros((max(size - len(R), 0), size))])
-
-
-def shared_rows(unknowns: Unknowns, triangles: tuple[np.ndarray, ...]) -> np.ndarray:
-    """Return the rows (R, P + 1) of all trials about the shared unknowns, right-hand side last.
-
-    The unknowns are divided by their sizes.
-    """
-    count = len(unknowns.each)
-    rows = np.vstack([R[-1 - count : -1, -1 - count :] for R in triangles])
-    rows[:, :count] *= unknowns.sizes
-    return rows
+    rows = np.vstack([each.triangle[each.local : -1, each.local :] for each in linear])
+    rows[:, :-1] *= unknowns.sizes
+    return np.vstack([rows, unknowns.prior_rows(values)])
 
 
 def _step(
-    unknowns: Unknowns, point: Point, triangles: tuple[np.ndarray, ...], pinned: np.ndarray
-) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Return the step of the shared unknowns, and of each trial's own.
+    unknowns: Unknowns, values: np.ndarray, linear: tuple[Linear, ...], pinned: np.ndarray
+) -> FitStep:
+    """Return the step to the optimum of the linear problems.
 
     Directions that the data do not determine are not changed.
     """
-    count, step = len(unknowns.each), np.zeros(len(unknowns.each))
-    free = np.flatnonzero(~pinned)
+    shared, free = np.zeros(len(pinned)), np.flatnonzero(~pinned)
     if len(free):
-        rows = np.vstack([shared_rows(unknowns, triangles), prior_rows(unknowns, point.values)])
+        rows = shared_rows(unknowns, values, linear)
         U, s, Vt = np.linalg.svd(rows[:, free], full_matrices=False)
-        told = s > NULL * max(s[0], 1e-300)
-        inner = (U.T @ rows[:, -1])[told] / s[told]
-        step[free] = unknowns.sizes[free] * (Vt[told].T @ inner)
-    return step, [own_step(R, count, step) for R in triangles]
+        determined = s > NULL * max(s[0], 1e-300)
+        inner = (U.T @ rows[:, -1])[determined] / s[determined]
+        shared[free] = unknowns.sizes[free] * (Vt[determined].T @ inner)
+    local = [each.local_step(shared) for each in linear]
+    states = [each.state_steps(part, shared) for each, part in zip(linear, local, strict=True)]
+    return FitStep(shared, local, states)
 
 
-def own_step(R: np.ndarray, count: int, step: np.ndarray) -> np.ndarray:
-    """Return the step of a trial's own columns that belongs to one of the shared unknowns."""
-    own = len(R) - 1 - count
-    scale = np.linalg.norm(R[:, :own], axis=0)
-    scale[scale == 0] = 1
-    right = R[:own, -1] - R[:own, own:-1] @ step
-    square = R[:own, :own] / scale
-    if np.abs(np.diag(square)).min() > NULL:
-        return solve_triangular(square, right) / scale
-    return np.linalg.lstsq(square, right, rcond=NULL)[0] / scale
-
-
-def _change(
-    each: tuple[Trial, ...],
-    linear: tuple[Linear, ...],
-    step: np.ndarray,
-    steps: list[np.ndarray],
-) -> float:
+def _length(linear: tuple[Linear, ...], step: FitStep) -> float:
     """Return how far the step moves the model's markers, relative to the limit of convergence."""
     total, rows, square, floor = 0.0, 0, 0.0, 0.0
-    for trial, of_trial, own in zip(each, linear, steps, strict=True):
-        change = of_trial.rows @ np.concatenate([own, step]) + of_trial.residual - of_trial.right
+    for each, local in zip(linear, step.local, strict=True):
+        trial, change = each.iterate.trial, each.change(local, step.shared)
         total += change @ change
-        square += of_trial.residual @ of_trial.residual
+        square += each.residual @ each.residual
         rows += len(change)
         floor += (ROUNDING * np.nanmax(np.abs(trial.tracks.positions)) / trial.noise.min()) ** 2
     scale = np.sqrt(square / max(rows, 1))
     return float(np.sqrt(total) / (CLOSE * scale + np.sqrt(floor)))
+
+
+def _to_pin(unknowns: Unknowns, values: np.ndarray, step: np.ndarray) -> np.ndarray:
+    """Tell which numbers are almost at their bounds and want below them."""
+    least = unknowns.least
+    near = values <= np.maximum(least, 0) + PINNED * unknowns.sizes
+    return (least > -np.inf) & near & (values + step < least)
+
+
+def _longest(unknowns: Unknowns, values: np.ndarray, step: np.ndarray) -> float:
+    """Return how much of a step leaves numbers above their bounds."""
+    most = 1.0
+    for each, least, value, change in zip(unknowns.each, unknowns.least, values, step, strict=True):
+        room = value - max(least, 0.0)
+        if least > -np.inf and change < 0 < room:
+            margin = 0.0 if room <= PINNED * each.size else MARGIN
+            most = min(most, (1 - margin) * room / -change)
+    return most
+
+
+def _line_search(
+    unknowns: Unknowns,
+    point: FitPoint,
+    linear: tuple[Linear, ...],
+    step: FitStep,
+    weight: float,
+) -> tuple[FitPoint | None, float]:
+    """Return the point along a step that lowers cost and defects together, and their weight.
+
+    The weight of the defects' sizes is large enough for the step to go down (Nocedal and Wright,
+    Eq. 18.36).
+    """
+    # slope and value of the cost; sizes of the defects, over those of the steps
+    priors = unknowns.prior_rows(point.values)
+    slope = -float(priors[:, -1] @ (priors[:, :-1] @ (step.shared / unknowns.sizes)))
+    cost = float((priors[:, -1] ** 2).sum())
+    for each, local in zip(linear, step.local, strict=True):
+        slope -= float(each.residual @ each.change(local, step.shared))
+        cost += float(each.residual @ each.residual)
+    scales = [1 / np.maximum(np.abs(move).max(axis=0), 1e-12) for move in step.states]
+    off = sum(
+        float((np.abs(each.defects) * scale).sum())
+        for each, scale in zip(linear, scales, strict=True)
+    )
+    if off > 0:
+        weight = max(weight, 2 * max(slope, 0.0) / off)
+    before = cost / 2 + weight * off
+    expected = slope - weight * off
+
+    # half as far, until cost and defects have fallen enough
+    length = _longest(unknowns, point.values, step.shared)
+    while length > SHORTEST:
+        candidate = _integrated(unknowns, _moved(unknowns, point, step, length))
+        if candidate is not None:
+            after = _merit(unknowns, candidate, weight, scales)
+            if after <= before + ARMIJO * length * expected + 1e-12 * abs(before):
+                return candidate, weight
+        length /= 2
+    return None, weight
+
+
+def _moved(unknowns: Unknowns, point: FitPoint, step: FitStep, length: float) -> FitPoint:
+    """Return the point at some length along a step."""
+    iterates = []
+    for iterate, local, move in zip(point.iterates, step.local, step.states, strict=True):
+        states = moved(unknowns.model, iterate.states, length * move)
+        torques = length * local[move.shape[1] :].reshape(iterate.torques.shape)
+        iterates.append(iterate.moved(states, iterate.torques + torques))
+    return FitPoint(point.values + length * step.shared, tuple(iterates))
+
+
+def _merit(unknowns: Unknowns, point: FitPoint, weight: float, scales: list[np.ndarray]) -> float:
+    """Return the cost and the weighed sizes of the defects at a point."""
+    placed = unknowns.placed_at(point.values)
+    total = float((unknowns.prior_rows(point.values)[:, -1] ** 2).sum()) / 2
+    for iterate, scale in zip(point.iterates, scales, strict=True):
+        total += float((iterate.residuals(placed) ** 2).sum()) / 2
+        total += float(((iterate.trial.prior @ iterate.torques) ** 2).sum()) / 2
+        total += weight * float((np.abs(iterate.defects(placed.model)) * scale).sum())
+    return total

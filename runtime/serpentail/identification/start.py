@@ -6,8 +6,7 @@ from serpentail_scene.layout import PER_SEGMENT, QUATERNION, TAIL_Q, TORSO_Q
 
 from ..basics.attitude import sign_continuous
 from ..model.model import Model
-from .placement import Placements
-from .points import marker_points, world_points
+from .placement import Placements, marker_points, world_points
 from .radau_steps import difference, moved
 from .tracks import MarkerTracks
 
@@ -23,58 +22,63 @@ WINDOW = 7  # frames of a local parabola
 FAR = 4.0  # times the usual misfit: other frames do not begin from such a frame
 
 
-def motion_shown(model: Model, placed: Placements, tracks: MarkerTracks) -> np.ndarray:
+def motion_shown(placed: Placements, tracks: MarkerTracks) -> np.ndarray:
     """Return states (F, nx) at the frames: fitted configurations, velocities by parabolas."""
-    q = configurations(model, placed, tracks)
-    return np.column_stack([q, velocities(model, tracks.times, q)])
+    q = configurations(placed, tracks)
+    return np.column_stack([q, velocities(placed.model, tracks.times, q)])
 
 
-def configurations(model: Model, placed: Placements, tracks: MarkerTracks) -> np.ndarray:
+def configurations(placed: Placements, tracks: MarkerTracks) -> np.ndarray:
     """Return configurations (F, nq) that fit the markers of each frame, between others in gaps.
 
     All frames are fitted side by side. Where a tail is bent so far that two shapes fit, a frame
     continues its neighbour, outward from the frame whose tail is straightest.
     """
-    begun, laid = _begin(model, placed, tracks)
+    begun, laid = _begin(placed, tracks)
     q = begun.copy()
-    rows = np.flatnonzero(tracks.seen.mean(axis=1) >= min(ENOUGH, tracks.seen.mean(axis=1).max()))
+    shown = tracks.seen.mean(axis=1)
+    rows = np.flatnonzero(shown >= min(ENOUGH, shown.max()))
     positions = tracks.positions[rows]
-    q[rows], misfit = fitted(model, placed, positions, q[rows])
-    usual = max(FAR * np.median(misfit), TIGHT * float(model.parameters["tail_length"]))
-    fine = misfit <= usual
-    straightest = np.abs(q[rows][:, TAIL_Q]).max(axis=1)
-    anchor = int(np.where(fine & laid[rows], straightest, np.inf).argmin())
-    kept = np.ones(len(rows), bool)
+    q[rows], misfit = fitted(placed, positions, q[rows])
+    usual = max(FAR * np.median(misfit), TIGHT * float(placed.model.parameters["tail_length"]))
+    fits = misfit <= usual
+    bent = np.abs(q[rows][:, TAIL_Q]).max(axis=1)
+    anchor = int(np.where(fits & laid[rows], bent, np.inf).argmin())
+
+    # from the anchor outward, a frame that is far from its neighbour is fitted again from there
+    sound = np.ones(len(rows), bool)
     for way in (range(anchor + 1, len(rows)), range(anchor - 1, -1, -1)):
         last = q[rows[anchor]]
         for k in way:
-            here, known = q[rows[k]], laid[rows[k]]
-            if not fine[k] or _apart(here, last, known) > APART:
-                torso = (begun[rows[k]] if known else last)[TORSO_Q]
+            current, torso_laid = q[rows[k]], laid[rows[k]]
+            if not fits[k] or _apart(current, last, torso_laid) > APART:
+                torso = (begun[rows[k]] if torso_laid else last)[TORSO_Q]
                 begin = np.concatenate([torso, last[TAIL_Q]])[None]
-                (here,), off = fitted(model, placed, positions[k : k + 1], begin)
-                fine[k] = off[0] <= usual
-            kept[k] = fine[k] and (known or _apart(here, last, known) <= APART)
-            q[rows[k]] = here
-            last = here if kept[k] else last
-    return _between(tracks.times, q, rows[kept])
+                (current,), off = fitted(placed, positions[k : k + 1], begin)
+                fits[k] = off[0] <= usual
+            sound[k] = fits[k] and (torso_laid or _apart(current, last, torso_laid) <= APART)
+            q[rows[k]] = current
+            last = current if sound[k] else last
+    frames = rows[sound]
+    return interpolated(tracks.times[frames], q[frames], tracks.times)
 
 
-def _apart(q: np.ndarray, other: np.ndarray, known: bool) -> float:
-    """Return how far configurations (nq,) differ, rad: in the tail; unless known, in the torso."""
+def _apart(q: np.ndarray, other: np.ndarray, torso_laid: bool) -> float:
+    """Return how far configurations (nq,) differ, rad: in the tail; unless laid, in the torso."""
     off = float(np.abs(q - other)[TAIL_Q].max())
     cosine = min(abs(float(q[QUATERNION] @ other[QUATERNION])), 1.0)
-    return off if known else max(off, 2 * np.arccos(cosine))
+    return off if torso_laid else max(off, 2 * np.arccos(cosine))
 
 
 def fitted(
-    model: Model, placed: Placements, positions: np.ndarray, begin: np.ndarray
+    placed: Placements, positions: np.ndarray, begin: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return configurations (F, nq) that fit positions (F, M, 3), and misfits (F,) m.
 
     They begin at given ones. Levenberg-Marquardt steps of all frames side by side; a small weight
     holds rotations where they are.
     """
+    model = placed.model
     nv, reach = model.nv, float(model.parameters["tail_length"])
     weight = np.isfinite(positions).all(axis=2)[..., None]
     q, ridge = within(model, begin), np.full(len(begin), RIDGE)
@@ -83,16 +87,17 @@ def fitted(
     def off(points: np.ndarray, rows: np.ndarray) -> np.ndarray:
         return np.where(weight[rows], positions[rows] - points, 0).reshape(len(rows), -1, 1)
 
-    left = np.arange(len(q))  # frames that still move
-    misfit = (off(world_points(model, placed, q), left) ** 2).sum(axis=(1, 2))
+    # frames whose step is small drop out; a step that misses is tried again, shorter
+    left = np.arange(len(q))
+    misfit = (off(world_points(placed, q), left) ** 2).sum(axis=(1, 2))
     for _ in range(ITERATIONS):
-        points, by_q = marker_points(model, placed, q[left])
+        points, by_q = marker_points(placed, q[left])
         J = np.where(weight[left, ..., None], by_q, 0).reshape(len(left), -1, nv)
         back = np.swapaxes(J, 1, 2)
         square = back @ J + ridge[left, None, None] * hold
         step = np.linalg.solve(square, back @ off(points, left))[..., 0]
         new = turned(model, q[left], step)
-        after = (off(world_points(model, placed, new), left) ** 2).sum(axis=(1, 2))
+        after = (off(world_points(placed, new), left) ** 2).sum(axis=(1, 2))
         better = after <= misfit[left]
         q[left[better]], misfit[left[better]] = new[better], after[better]
         ridge[left] = np.where(better, np.maximum(ridge[left] / 4, RIDGE**2), ridge[left] * 8)
@@ -122,32 +127,38 @@ def within(model: Model, q: np.ndarray) -> np.ndarray:
     return q
 
 
-def _begin(model: Model, placed: Placements, tracks: MarkerTracks) -> tuple[np.ndarray, np.ndarray]:
+def _begin(placed: Placements, tracks: MarkerTracks) -> tuple[np.ndarray, np.ndarray]:
     """Return configurations (F, nq) with a straight tail, and which frames' torsos are laid (F,).
 
     A torso is laid on three of its markers or more; if no frame shows these, on all markers. The
     frames between are interpolated, those before and after are like the nearest.
     """
-    q = np.zeros((len(tracks.times), model.nq))
+    q = np.zeros((len(tracks.times), placed.model.nq))
     q[:, QUATERNION.start] = 1
-    body = world_points(model, placed, q[:1])[0]
+    body = world_points(placed, q[:1])[0]
+
+    # on the torso alone if any frame allows it
     use = tracks.seen & placed.on_torso
-    laid = np.array([_spread(body[here]) for here in use])
+    laid = np.array([off_line(body[markers], LINE) for markers in use])
     if not laid.any():
         use = tracks.seen
-        laid = np.array([_spread(body[here]) for here in use])
+        laid = np.array([off_line(body[markers], LINE) for markers in use])
     for frame in np.flatnonzero(laid):
-        here = use[frame]
-        q[frame, :7] = _laid(body[here], tracks.positions[frame, here])
-    return (_between(tracks.times, q, np.flatnonzero(laid)) if laid.any() else q), laid
+        markers = use[frame]
+        q[frame, TORSO_Q] = _laid(body[markers], tracks.positions[frame, markers])
+    if laid.any():
+        q = interpolated(tracks.times[laid], q[laid], tracks.times)
+    return q, laid
 
 
-def _spread(points: np.ndarray) -> bool:
-    """Tell whether points (K, 3) give an attitude: three or more that are not on a line."""
+def off_line(points: np.ndarray, least: float) -> bool:
+    """Tell whether points (K, 3) give an attitude: three or more, and wider than ``least`` times
+    the line that they are near.
+    """
     if len(points) < 3:
         return False
     sizes = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    return bool(sizes[1] > LINE * sizes[0])
+    return bool(sizes[1] > least * sizes[0])
 
 
 def _laid(body: np.ndarray, world: np.ndarray) -> np.ndarray:
@@ -172,36 +183,22 @@ def quaternion_of(R: np.ndarray) -> np.ndarray:
     return np.linalg.eigh(K)[1][:, -1]
 
 
-def _between(times: np.ndarray, q: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Return configurations in which frames with too few markers are interpolated."""
-    q = q.copy()
-    kept = q[rows]
-    kept[:, QUATERNION] = sign_continuous(kept[:, QUATERNION])
-    for k in range(q.shape[1]):
-        q[:, k] = np.interp(times, times[rows], kept[:, k])
-    q[:, QUATERNION] /= np.linalg.norm(q[:, QUATERNION], axis=1, keepdims=True)
-    return q
+def interpolated(times: np.ndarray, rows: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Return states or configurations at times, between those (F, nx) of frames."""
+    rows = rows.copy()
+    rows[:, QUATERNION] = sign_continuous(rows[:, QUATERNION])
+    between = np.stack([np.interp(at, times, column) for column in rows.T], axis=1)
+    between[:, QUATERNION] /= np.linalg.norm(between[:, QUATERNION], axis=1, keepdims=True)
+    return between
 
 
 def velocities(model: Model, times: np.ndarray, q: np.ndarray) -> np.ndarray:
     """Return velocities (F, nv) of configurations (F, nq): slopes of local parabolas."""
-    count, none = len(times), np.zeros((1, model.nv))
+    count, states = len(times), np.column_stack([q, np.zeros((len(q), model.nv))])
     v, width = np.zeros((count, model.nv)), min(WINDOW, count)
     for k in range(count):
         first = int(np.clip(k - width // 2, 0, count - width))
-        near = slice(first, first + width)
-        here = np.column_stack([q[k : k + 1], none])
-        there = np.column_stack([q[near], np.repeat(none, width, axis=0)])
-        steps = difference(model, there, np.repeat(here, width, axis=0))[:, : model.nv]
-        t = times[near] - times[k]
-        v[k] = np.linalg.lstsq(np.vander(t, 3), steps, rcond=None)[0][1]
+        near, middle = slice(first, first + width), np.repeat(states[k : k + 1], width, axis=0)
+        steps = difference(model, states[near], middle)[:, : model.nv]
+        v[k] = np.linalg.lstsq(np.vander(times[near] - times[k], 3), steps, rcond=None)[0][1]
     return v
-
-
-def on_mesh(model: Model, frames: np.ndarray, times: np.ndarray, mesh: np.ndarray) -> np.ndarray:
-    """Return states (K+1, nx) at a mesh, interpolated from those of frames at times."""
-    states = frames.copy()
-    states[:, QUATERNION] = sign_continuous(states[:, QUATERNION])
-    found = np.stack([np.interp(mesh, times, column) for column in states.T], axis=1)
-    found[:, QUATERNION] /= np.linalg.norm(found[:, QUATERNION], axis=1, keepdims=True)
-    return found

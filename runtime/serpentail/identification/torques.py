@@ -40,12 +40,11 @@ class TorquePrior:
 
 def checked_prior(prior: TorquePrior) -> TorquePrior:
     """Return a prior in N m and s; IdentificationError otherwise."""
-    fields, error = {"std": "N m", "time": "s"}, IdentificationError
-    std, time = (
-        number(f"torques.{name}", measured(f"torques.{name}", value, unit, error), error, above=0)
-        for (name, unit), value in zip(fields.items(), (prior.std, prior.time), strict=True)
-    )
-    return TorquePrior(std, time)
+    error, values = IdentificationError, []
+    for name, value, unit in (("std", prior.std, "N m"), ("time", prior.time, "s")):
+        field = f"torques.{name}"
+        values.append(number(field, measured(field, value, unit, error), error, above=0))
+    return TorquePrior(*values)
 
 
 Known = Callable[[np.ndarray], np.ndarray]  # times (...) -> torques (..., 2m)
@@ -98,19 +97,19 @@ def _called(function: Callable[[float], Any], nt: int) -> Known:
     """Return torques of a user's function, checked."""
 
     def torque(times: np.ndarray) -> np.ndarray:
-        found = np.zeros((times.size, nt))
+        rows = np.zeros((times.size, nt))
         for k, t in enumerate(times.ravel()):
             value = finite_array(f"torques({t:g})", function(float(t)), IdentificationError)
             if value.shape != (nt,):
                 raise IdentificationError(f"torques({t:g}) has shape {value.shape}, not ({nt},)")
-            found[k] = value
-        return found.reshape(*times.shape, nt)
+            rows[k] = value
+        return rows.reshape(*times.shape, nt)
 
     return torque
 
 
 def knots_of(times: np.ndarray, prior: TorquePrior) -> np.ndarray:
-    """Return indices of the mesh's times that are knots, about a quarter of the time apart."""
+    """Return indices of the mesh's times that are knots, about an eighth of the time apart."""
     spans = max(int(np.ceil((times[-1] - times[0]) * PER_TIME / float(prior.time))), 1)
     even = np.linspace(times[0], times[-1], spans + 1)
     return np.unique(np.abs(times[:, None] - even).argmin(axis=0))

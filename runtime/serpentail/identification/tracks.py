@@ -1,5 +1,6 @@
 """``MarkerTracks``: positions of markers over time, nan if a marker was not seen."""
 
+import re
 import warnings
 from collections import Counter
 from collections.abc import Sequence
@@ -19,6 +20,7 @@ from ..motion.account import framed
 
 UNITS: dict[str, Fraction] = MEASURES["m"][1]
 ZEROS = ("refuse", "gap")
+AXES = "^(-?[xyz]){3}$"
 FEWEST = 4  # frames
 FARTHEST = 1e6  # m from the origin, in any recording
 LATEST = 1e12  # s: times since 1970, and more
@@ -140,53 +142,61 @@ def marker_tracks(
     >>> tracks.positions[0, 0].tolist()
     [0.001, 0.001, 0.001]
     """
-    return checked_tracks(times, positions, names, (unit, axes, zeros), "arrays")
+    return checked_tracks(RawTracks(times, positions, names, unit), axes, zeros, "arrays")
 
 
-def checked_tracks(
-    times: Any, positions: Any, names: Any, how: tuple[Any, Any, Any], source: str
-) -> MarkerTracks:
-    """Return tracks of arrays after checking them; how: unit, axes, zeros; source: for errors."""
-    unit, axes, zeros = how
-    unit = checked_unit(unit, source)
-    t = checked_times(times, source)
-    names = checked_names(names, source)
-    where = real_array(f"{source}: positions", positions, IdentificationError)
-    if where.shape != (len(t), len(names), 3):
+@dataclass(frozen=True, eq=False)
+class RawTracks:
+    """Marker tracks as a user or a file states them, before they are checked."""
+
+    times: Any
+    positions: Any
+    names: Any
+    unit: Any
+
+
+def checked_tracks(raw: RawTracks, axes: Any, zeros: Any, source: str) -> MarkerTracks:
+    """Return tracks in m and in world axes after checking them; source: for messages."""
+    unit = checked_unit(raw.unit, source)
+    times = _checked_times(raw.times, source)
+    names = _checked_names(raw.names, source)
+    positions = real_array(f"{source}: positions", raw.positions, IdentificationError)
+    if positions.shape != (len(times), len(names), 3):
         raise IdentificationError(
-            f"{source}: positions have shape {where.shape}: needs ({len(t)}, {len(names)}, 3), "
-            "of times, names and x, y, z"
+            f"{source}: positions have shape {positions.shape}: needs "
+            f"({len(times)}, {len(names)}, 3), of times, names and x, y, z"
         )
-    if np.isinf(where).any():
+    if np.isinf(positions).any():
         raise IdentificationError(f"{source}: positions: a value is infinite: use nan for a gap")
     one_of("zeros", zeros, ZEROS, IdentificationError)
-    where = without_zeros(where, names, zeros, source)
-    columns, signs = checked_axes(axes)
-    where = where[..., columns] * signs * float(UNITS[unit])
-    part = np.isfinite(where)
-    where = np.where(part.all(axis=2, keepdims=True), where, np.nan)
-    unseen = [name for k, name in enumerate(names) if not part[:, k].all(axis=-1).any()]
+    positions = _without_zeros(positions, names, zeros, source)
+    columns, signs = _checked_axes(axes)
+    positions = positions[..., columns] * signs * float(UNITS[unit])
+
+    # a marker with one coordinate missing was not seen
+    seen = np.isfinite(positions).all(axis=2)
+    positions = np.where(seen[..., None], positions, np.nan)
+    unseen = [names[k] for k in np.flatnonzero(~seen.any(axis=0))]
     if unseen:
         raise IdentificationError(f"{source}: never seen: {', '.join(unseen)}: leave these out")
-    far, line = _farthest(where, names, source)
-    if far > FARTHEST:
-        raise IdentificationError(line)
-    if far > LARGEST["m"][0]:
-        warnings.warn(line, UnusualSize, stacklevel=3)
-    return MarkerTracks(t, where, names, source, unit)
+    _refuse_far(positions, names, source)
+    return MarkerTracks(times, positions, names, source, unit)
 
 
-def _farthest(where: np.ndarray, names: Sequence[str], source: str) -> tuple[float, str]:
-    """Return the largest coordinate (m), and a line that says it is beyond what is usual."""
-    reach = np.abs(where)
-    place = np.unravel_index(np.nanargmax(reach), where.shape)
-    frame, marker, axis = map(int, place)
-    field = f"{source}: marker {shown(names[marker])}, frame {frame} (from 0), {'xyz'[axis]}"
+def _refuse_far(positions: np.ndarray, names: Sequence[str], source: str) -> None:
+    """Refuse a coordinate (m) that no recording has, and warn of one that is unusual."""
+    place = np.unravel_index(np.nanargmax(np.abs(positions)), positions.shape)
+    value, (frame, marker, axis) = float(positions[place]), map(int, place)
+    if abs(value) <= LARGEST["m"][0]:
+        return
     line = (
-        f"{field}: value {where[place]:.6g} m: beyond {LARGEST['m'][1]}, which no recording has: "
+        f"{source}: marker {shown(names[marker])}, frame {frame} (from 0), {'xyz'[axis]}: "
+        f"value {value:.6g} m: beyond {LARGEST['m'][1]}, which no recording has: "
         'give the right unit, such as unit="mm", or nan for a gap'
     )
-    return float(reach[place]), line
+    if abs(value) > FARTHEST:
+        raise IdentificationError(line)
+    warnings.warn(line, UnusualSize, stacklevel=4)
 
 
 def checked_unit(unit: Any, source: str) -> str:
@@ -202,7 +212,7 @@ def checked_unit(unit: Any, source: str) -> str:
     return spelled
 
 
-def checked_times(times: Any, source: str) -> np.ndarray:
+def _checked_times(times: Any, source: str) -> np.ndarray:
     """Return the times; IdentificationError unless they are finite and increase."""
     t = finite_array(f"{source}: times", times, IdentificationError)
     if t.ndim != 1 or len(t) < FEWEST:
@@ -225,7 +235,7 @@ def checked_times(times: Any, source: str) -> np.ndarray:
     return t.copy()
 
 
-def checked_names(names: Any, source: str) -> tuple[str, ...]:
+def _checked_names(names: Any, source: str) -> tuple[str, ...]:
     """Return the names of markers; IdentificationError unless they are different texts."""
     listed = tuple(names) if isinstance(names, list | tuple) else ()
     sound = (isinstance(x, str) and x.strip() and x.isprintable() for x in listed)
@@ -238,40 +248,32 @@ def checked_names(names: Any, source: str) -> tuple[str, ...]:
     return listed
 
 
-def without_zeros(where: np.ndarray, names: Sequence[str], zeros: str, source: str) -> np.ndarray:
+def _without_zeros(
+    positions: np.ndarray, names: Sequence[str], zeros: str, source: str
+) -> np.ndarray:
     """Return positions with nan in place of exact zeros, or refuse them."""
-    empty = (where == 0).all(axis=2)
+    empty = (positions == 0).all(axis=2)
     if not empty.any():
-        return where
+        return positions
     if zeros == "refuse":
         k = int(np.flatnonzero(empty.any(axis=0))[0])
         raise IdentificationError(
             f"{source}: marker {names[k]!r} is at exactly (0, 0, 0) in {int(empty[:, k].sum())} "
             'frames, as some programs write gaps: give zeros="gap" to read them as gaps'
         )
-    return np.where(empty[..., None], np.nan, where)
+    return np.where(empty[..., None], np.nan, positions)
 
 
-def checked_axes(axes: Any) -> tuple[list[int], np.ndarray]:
+def _checked_axes(axes: Any) -> tuple[list[int], np.ndarray]:
     """Return columns and signs of the axes of the data that point right, forward and up."""
-    words = axes if isinstance(axes, str) else ""
-    columns: list[int] = []
-    signs: list[float] = []
-    sign = 1.0
-    for letter in words:
-        if letter == "-" and sign > 0:
-            sign = -1.0
-        elif letter in "xyz":
-            columns.append("xyz".index(letter))
-            signs.append(sign)
-            sign = 1.0
-        else:
-            columns = []
-            break
+    words = axes if isinstance(axes, str) and re.fullmatch(AXES, axes) else ""
+    signed = re.findall("(-?)([xyz])", words)
+    columns = ["xyz".index(letter) for _, letter in signed]
+    signs = np.array([-1.0 if minus else 1.0 for minus, _ in signed])
     turn = np.zeros((3, 3))
     if sorted(columns) == [0, 1, 2]:
         turn[range(3), columns] = signs
     if np.linalg.det(turn) < 0.5:
         needs = 'x, y and z in some order that is right-handed, such as "xyz", "zxy" or "-yxz"'
         raise IdentificationError(needed("axes", shown(axes).strip("'"), needs))
-    return columns, np.array(signs)
+    return columns, signs

@@ -3,7 +3,7 @@
 import re
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,8 +12,7 @@ from ..basics.checks import did_you_mean, needed, number, refusal
 from ..basics.errors import IdentificationError, UnlikeBodies, UnusualSize
 from ..model.model import Model
 from ..model.parameters import ellipsoid, flat, independent
-from .placement import Placements
-from .points import STEP
+from .placement import STEP, Placements
 
 MARKER = "marker:"
 SAME = "same"
@@ -26,13 +25,15 @@ NAME = re.compile(r"([A-Za-z_]\w*)(?:\[(\d+|same)\])?")
 @dataclass(frozen=True)
 class Unknown:
     """One estimated number: a name, its unit, the parameter or the marker that it is of, which
-    entries of that it sets, its size for relative changes, and the spread of a prior on it.
+    entries of that it sets, its value at the start, its size for relative changes, and the spread
+    of a prior on it.
     """
 
     name: str
     unit: str
     of: str
     entries: tuple[int, ...]
+    start: float
     size: float
     spread: float | None = None
 
@@ -44,12 +45,20 @@ class Unknown:
 
 @dataclass(frozen=True, eq=False)
 class Unknowns:
-    """All estimated numbers of a model and its markers; start (P,): their first values."""
+    """All estimated numbers of a model and its markers."""
 
-    model: Model
     placed: Placements
     each: tuple[Unknown, ...]
-    start: np.ndarray
+
+    @property
+    def model(self) -> Model:
+        """The model to begin with."""
+        return self.placed.model
+
+    @property
+    def start(self) -> np.ndarray:
+        """The value of each at the start, (P,)."""
+        return np.array([each.start for each in self.each], float)
 
     @property
     def sizes(self) -> np.ndarray:
@@ -66,20 +75,20 @@ class Unknowns:
 
     def model_at(self, values: np.ndarray) -> Model:
         """Return the model with these parameters; ModelError if they are unphysical."""
-        changes = independent(self.model.manifest, self.model.parameters)
-        own = {each.of for each in self.each if not each.is_offset}
-        new = {name: np.array(changes[name], float) for name in own}
+        begin = independent(self.model.manifest, self.model.parameters)
+        changes: dict[str, Any] = {}
         for each, value in zip(self.each, values, strict=True):
             if not each.is_offset:
-                new[each.of] = _with(new[each.of], each.entries, value)
-        return _changed(self.model, new) if new else self.model
+                array = np.array(changes.get(each.of, begin[each.of]), float)
+                changes[each.of] = _with(array, each.entries, value)
+        return _changed(self.model, changes) if changes else self.model
 
     def placed_at(self, values: np.ndarray) -> Placements:
-        """Return the markers with these offsets."""
+        """Return the markers with these offsets, on the model with these parameters."""
         offset = self.placed.offset.copy()
         for marker, axis, k in self.offsets():
             offset[marker, axis] = values[k]
-        return self.placed.moved(offset)
+        return replace(self.placed, model=self.model_at(values), offset=offset)
 
     def offsets(self) -> list[tuple[int, int, int]]:
         """Return marker, axis and index of each number that is an offset."""
@@ -89,6 +98,12 @@ class Unknowns:
             if each.is_offset
         ]
 
+    def prior_rows(self, values: np.ndarray) -> np.ndarray:
+        """Return the rows (R, P + 1) of the priors over relative changes, right-hand side last."""
+        spread = np.array([np.inf if each.spread is None else each.spread for each in self.each])
+        rows = np.column_stack([np.diag(self.sizes / spread), (self.start - values) / spread])
+        return rows[np.isfinite(spread)]
+
     def struct_jacobian(self, model: Model) -> np.ndarray:
         """Return d(parameter struct) / d(unknowns), (scalars, P), at a model's parameters."""
         jacobian = np.zeros((len(model.parameter_vector), len(self.each)))
@@ -97,17 +112,17 @@ class Unknowns:
                 jacobian[:, k] = _struct_direction(model, each)
         return jacobian
 
-    def beside(self, model: Model) -> dict[int, list[Model]]:
-        """Return the models a small step above and below, by index of what moves the tail."""
-        models: dict[int, list[Model]] = {}
+    def neighbours(self, placed: Placements) -> dict[int, list[Placements]]:
+        """Return the markers a small step above and below, by index of what moves the tail."""
+        model, steps = placed.model, dict[int, list[Placements]]()
         for k, each in enumerate(self.each):
             if each.of in GEOMETRY:
                 values = np.array(model.parameters[each.of], float)
-                here = np.atleast_1d(values)[each.entries[0]]
-                ends = (here + STEP * each.size, here - STEP * each.size)
+                value = np.atleast_1d(values)[each.entries[0]]
+                ends = (value + STEP * each.size, value - STEP * each.size)
                 changes = [{each.of: _with(values, each.entries, end)} for end in ends]
-                models[k] = [_changed(model, change) for change in changes]
-        return models
+                steps[k] = [replace(placed, model=_changed(model, change)) for change in changes]
+        return steps
 
 
 def _changed(model: Model, changes: dict[str, Any]) -> Model:
@@ -128,14 +143,13 @@ def _with(values: np.ndarray, entries: tuple[int, ...], value: float) -> Any:
 
 
 def _struct_direction(model: Model, unknown: Unknown) -> np.ndarray:
-    """Return how the parameter struct moves with a number; link_inertia may follow from it."""
+    """Return how the parameter struct moves with a number, by a complex step."""
     values: dict[str, Any] = dict(model.parameters)
     moved = np.array(values[unknown.of], complex)
-    if moved.ndim:
-        moved[list(unknown.entries)] += 1j * TINY
-    else:
-        moved = moved + 1j * TINY
+    moved[list(unknown.entries) if moved.ndim else ...] += 1j * TINY
     values[unknown.of] = moved
+
+    # the inertia of links that are ellipsoids follows from their other parameters
     if "link_radius" in values:
         pieces = int(np.sum(model.joints_each))
         values["link_inertia"] = np.array(ellipsoid(values, pieces))
@@ -143,7 +157,7 @@ def _struct_direction(model: Model, unknown: Unknown) -> np.ndarray:
     return np.array(flat(model.manifest, as_tuples)).imag / TINY
 
 
-def unknowns(model: Model, placed: Placements, estimate: Any) -> Unknowns:
+def unknowns(placed: Placements, estimate: Any) -> Unknowns:
     """Return what is to be estimated; IdentificationError with each wrong name.
 
     estimate: names, or name -> spread of a prior about the first value.
@@ -155,56 +169,50 @@ def unknowns(model: Model, placed: Placements, estimate: Any) -> Unknowns:
     else:
         needs = 'names of parameters and markers, such as ["tail_mass", "marker:head"]'
         raise refusal("estimate", estimate, needs, IdentificationError)
-    found: list[Unknown] = []
-    start: list[float] = []
+    each: list[Unknown] = []
     for name, spread in wanted.items():
-        for each, value in _of_name(model, placed, name, spread):
-            if any(_overlap(each, other) for other in found):
-                raise IdentificationError(f"estimate: {each.name} is named twice")
-            found.append(each)
-            start.append(value)
-    if any(not each.is_offset for each in found) and model.manifest["scene"]["baked"]:
+        for unknown in _of_name(placed, name, spread):
+            named = {entry for x in each if x.of == unknown.of for entry in x.entries}
+            if not named.isdisjoint(unknown.entries):
+                raise IdentificationError(f"estimate: {unknown.name} is named twice")
+            each.append(unknown)
+    model = placed.model
+    if not all(unknown.is_offset for unknown in each) and model.manifest["scene"]["baked"]:
         raise IdentificationError(
             f"estimate: the parameters are baked into {model.name}: set `baked = false` in its "
             "scene and generate it again"
         )
-    return Unknowns(model, placed, tuple(found), np.array(start, float))
+    return Unknowns(placed, tuple(each))
 
 
-def _overlap(a: Unknown, b: Unknown) -> bool:
-    """Tell whether two are of the same entry."""
-    return a.of == b.of and bool(set(a.entries) & set(b.entries))
-
-
-def _of_name(
-    model: Model, placed: Placements, name: Any, spread: Any
-) -> list[tuple[Unknown, float]]:
-    """Return the unknowns that a name stands for, and their values."""
+def _of_name(placed: Placements, name: Any, spread: Any) -> list[Unknown]:
+    """Return the unknowns that a name stands for."""
     if spread is not None:
         spread = number(f"estimate.{name}", spread, IdentificationError, above=0)
     if isinstance(name, str) and name.startswith(MARKER):
-        return _of_marker(model, placed, name, spread)
+        return _of_marker(placed, name, spread)
+    model = placed.model
     fields = independent(model.manifest, model.parameters)
     match = NAME.fullmatch(name) if isinstance(name, str) else None
     if match is None or match[1] not in fields:
         remedy = did_you_mean(match[1] if match else name, fields)
         remedy = remedy or f"needs marker:NAME, or one of {', '.join(fields)}"
         raise IdentificationError(f"estimate: value {name!r:.80}: {remedy}")
-    values = np.atleast_1d(np.asarray(fields[match[1]], float))
-    units = {p["name"]: p["unit"] for p in model.manifest["parameters"]}
+    field, chosen = match.groups()
+    values = np.atleast_1d(np.asarray(fields[field], float))
+    (unit,) = (p["unit"] for p in model.manifest["parameters"] if p["name"] == field)
     # a part that is zero is as large as the largest
     sizes = np.where(values != 0, np.abs(values), np.abs(values).max(initial=0.0) or 1.0)
-    groups = _groups(name, match[2], values)
     return [
-        (
-            Unknown(word, units[match[1]], match[1], entries, float(sizes[entries[0]]), spread),
-            float(values[entries[0]]),
-        )
-        for word, entries in groups
+        Unknown(word, unit, field, entries, float(values[k]), float(sizes[k]), spread)
+        for word, entries in _entries(name, chosen, values)
+        for k in entries[:1]
     ]
 
 
-def _groups(name: str, chosen: str | None, values: np.ndarray) -> list[tuple[str, tuple[int, ...]]]:
+def _entries(
+    name: str, chosen: str | None, values: np.ndarray
+) -> list[tuple[str, tuple[int, ...]]]:
     """Return names of numbers and the entries of a parameter that each sets."""
     if chosen == SAME:
         if len(set(values.tolist())) > 1:
@@ -220,17 +228,15 @@ def _groups(name: str, chosen: str | None, values: np.ndarray) -> list[tuple[str
     return [(f"{name}[{k}]", (k,)) for k in range(len(values))]
 
 
-def _of_marker(
-    model: Model, placed: Placements, name: str, spread: float | None
-) -> list[tuple[Unknown, float]]:
+def _of_marker(placed: Placements, name: str, spread: float | None) -> list[Unknown]:
     """Return the three offsets of a marker."""
     marker = name[len(MARKER) :]
     if marker not in placed.names:
         remedy = did_you_mean(marker, placed.names) or f"there are {', '.join(placed.names)}"
         raise IdentificationError(f"estimate: {name}: no such marker; {remedy}")
     offset = placed.offset[placed.names.index(marker)]
-    size = float(model.parameters["tail_length"])
+    size = 0.1 * float(placed.model.parameters["tail_length"])
     return [
-        (Unknown(f"{name}.{axis}", "m", name, (k,), 0.1 * size, spread), float(offset[k]))
+        Unknown(f"{name}.{axis}", "m", name, (k,), float(offset[k]), size, spread)
         for k, axis in enumerate("xyz")
     ]

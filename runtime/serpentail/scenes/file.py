@@ -7,7 +7,7 @@ from typing import Any
 
 from serpentail_scene.units import in_unit
 
-from ..basics.checks import refusal, shown
+from ..basics.checks import Refusals, refusal, shown
 from ..basics.errors import ModelError, SerpentailError
 from ..building.build import built
 from ..building.examples import tables_of_scene
@@ -15,20 +15,12 @@ from ..model.load import load, model_from
 from ..model.manifest import read_manifest
 from ..model.model import Model
 from ..model.parameters import merged
+from .keys import Key, read, sized
 
 # keys of a scene that its generated code depends on, and that a folder is compared by
 MADE_OF = (
-    "kind",
-    "segments",
-    "links",
-    "samples",
-    "contacts",
-    "friction",
-    "bend_range",
-    "coordinates",
-    "taper",
-    "base",
-    "weightless",
+    *("kind", "segments", "links", "samples", "contacts", "friction", "bend_range"),
+    *("coordinates", "taper", "base", "weightless"),
 )
 # tables of verbs, and the keys that each needs
 NEEDS = {
@@ -37,6 +29,7 @@ NEEDS = {
     "identify": "tables [[identify.marker]]",
     "sweep": "a table [sweep.over]",
 }
+UNSIZED: Mapping[str, float] = {}  # of a body that is not scaled
 UNSAID = {"base": "free", "weightless": False}  # manifests leave these out
 
 
@@ -78,20 +71,22 @@ def model_of(scene: Mapping, path: Path, folder: str | Path | None, parameters: 
             )
     if made["baked"] or "body" in scene:  # it has the scene's own
         return load(folder, parameters)
-    return load(folder, merged(_own_parameters(scene), parameters))
+    of_scene = scene.get("parameters", {})
+    if not isinstance(of_scene, Mapping):
+        raise refusal("parameters", of_scene, "a table, under a line [parameters]", ModelError)
+    return load(folder, merged(of_scene, parameters))
+
+
+def values_of(
+    table: Mapping, key: Key, where: str, size: Mapping[str, float], refused: Refusals
+) -> dict[str, Any]:
+    """Return the values of a table, in the units of its keys and in the size of a body."""
+    return dict(sized(read(table, key, where, refused), key, size))
 
 
 def size_of(model: Model) -> dict[str, float]:
     """Return the factors of each "kg", "m" and "s" of a scaled scene; empty without scaling."""
     return dict(model.manifest.get("size", {}))
-
-
-def _own_parameters(scene: Mapping) -> Mapping:
-    """Return the parameters that a scene names."""
-    own = scene.get("parameters", {})
-    if not isinstance(own, Mapping):
-        raise refusal("parameters", own, "a table, under a line [parameters]", ModelError)
-    return own
 
 
 def _same(value: Any, made: Any) -> bool:

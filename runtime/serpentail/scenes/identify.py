@@ -6,19 +6,17 @@ from typing import Any
 from ..basics.checks import Refusals, needed
 from ..basics.errors import IdentificationError
 from ..identification.identify import identify
+from ..identification.marker_files import read_markers
 from ..identification.placement import Marker
-from ..identification.readers import read_markers
 from ..identification.result import Identification
 from ..identification.torques import TorquePrior
-from .file import model_of, read_scene, size_of, subtable
+from .file import UNSIZED, model_of, read_scene, size_of, subtable, values_of
 from .identify_keys import IDENTIFY
-from .keys import read, sized
 
 # functions that an identification calls besides the default ones of scenes
 NEEDS = ("forward_dynamics_derivatives", "forward_dynamics_parameter_derivatives")
 USES = ("forward_dynamics", "energy", "momentum", "tail_points", "mass_matrix", "bias_force")
-UNSIZED: Mapping[str, float] = {}
-READ = ("unit", "axes", "zeros")  # keys for reading files
+READING = ("unit", "axes", "zeros")  # keys for reading files
 
 
 def identified(path: str, data: Sequence[str], folder: str | None = None) -> Identification:
@@ -30,21 +28,18 @@ def identified(path: str, data: Sequence[str], folder: str | None = None) -> Ide
     """
     tables, place = read_scene(path, IdentificationError)
     table = subtable(tables, "identify", place, IdentificationError)
-    given = identify_arguments(table)  # errors are raised before a model is built
-    files = {name: given.pop(name) for name in READ if name in given}
-    unit = files.pop("unit", None)
-    tracks = [read_markers(each, unit, **files) for each in data]
+    arguments = identify_arguments(table)  # errors are raised before a model is built
+    reading = {name: arguments[name] for name in READING if name in arguments}
+    tracks = [read_markers(each, **reading) for each in data]
     model = model_of(with_functions(tables) if folder is None else tables, place, folder, {})
-    given = identify_arguments(table, size_of(model))
-    for name in READ:
-        given.pop(name, None)
-    return identify(model, tracks, given.pop("markers"), given.pop("estimate", ()), **given)
+    arguments = identify_arguments(table, size_of(model))
+    return identify(model, tracks, **{"estimate": ()} | arguments)
 
 
 def with_functions(tables: Mapping[str, Any]) -> dict[str, Any]:
     """Return a scene that also names the functions that an identification calls."""
-    own = tables.get("functions", ())
-    named = own if isinstance(own, list) else USES
+    functions = tables.get("functions")
+    named = functions if isinstance(functions, list) else USES
     return dict(tables) | {"functions": list(dict.fromkeys([*named, *USES, *NEEDS]))}
 
 
@@ -54,18 +49,18 @@ def identify_arguments(table: Mapping, size: Mapping[str, float] = UNSIZED) -> d
     IdentificationError has a line for each key that is wrong.
     """
     refused = Refusals(IdentificationError)
-    found = dict(sized(read(table, IDENTIFY, "identify", refused), IDENTIFY, size))
-    markers = _markers(found.pop("marker", None), refused)
-    torques = found.pop("torques", "none")
+    arguments = values_of(table, IDENTIFY, "identify", size, refused)
+    markers = _markers(arguments.pop("marker", None), refused)
+    torques = arguments.pop("torques", "none")
     if isinstance(torques, Mapping):
         if set(torques) == {"std", "time"}:
-            found["torques"] = TorquePrior(**torques)
+            arguments["torques"] = TorquePrior(**torques)
         else:
             refused.add("torques", needed("identify.torques", dict(torques), "std and time"))
     elif torques != "none":
         refused.add("torques", needed("identify.torques", torques, 'std and time, or "none"'))
     refused.tell()
-    return found | {"markers": markers}
+    return arguments | {"markers": markers}
 
 
 def _markers(rows: Any, refused: Refusals) -> dict[str, Marker]:

@@ -1,7 +1,6 @@
 """The keys of a scene's table [identify]."""
 
-from ..identification.readers import AXES
-from ..identification.tracks import UNITS, ZEROS
+from ..identification.tracks import AXES, UNITS, ZEROS
 from .keys import Key, one_word
 
 MARKER = Key(

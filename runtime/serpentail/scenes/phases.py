@@ -4,14 +4,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..basics.checks import Refusals, needed, shown
+from ..basics.checks import Refusals, needed, refusal
 from ..basics.errors import SimulationError
 from ..model.model import Model
 from ..sequence.phase import Phase, Tracking
 from ..simulation.controllers import Controller
-from .acting import controller_of, reference_of
-from .file import size_of
-from .keys import read, sized
+from .controllers import controller_of, reference_of
+from .file import size_of, values_of
 from .phase_keys import PHASE
 from .plan import arguments_but_start
 
@@ -34,30 +33,30 @@ def refuse_beside_phases(table: Mapping, refused: Refusals) -> None:
 
 
 def phases_of(
-    model: Model, tables: Any, usual: tuple[Controller, Path], refused: Refusals
+    model: Model, tables: Any, default: Controller, folder: Path, refused: Refusals
 ) -> tuple[Phase, ...]:
     """Return the phases of a scene's tables, and add errors phase by phase.
 
-    usual: the controller of phases without one, and the folder of files.
+    default: the controller of phases without one; folder: of the files in the tables.
     """
     if not isinstance(tables, list | tuple):
         refused.add("phase", needed("phase", tables, "tables, under lines [[phase]]"))
         return ()
-    found = []
+    phases = []
     for k, table in enumerate(tables):
         where = f"phase[{k}]"
         if isinstance(table, Mapping):
-            found.append(refused.attempt(where, _phase, where, model, table, usual))
+            phases.append(refused.attempt(where, _phase, where, model, table, default, folder))
         else:
             refused.add(where, needed(where, table, "a table, under a line [[phase]]"))
-    return tuple(phase for phase in found if phase is not None)
+    return tuple(phase for phase in phases if phase is not None)
 
 
-def _phase(where: str, model: Model, table: Mapping, usual: tuple[Controller, Path]) -> Phase:
+def _phase(where: str, model: Model, table: Mapping, default: Controller, folder: Path) -> Phase:
     """Return one phase; SimulationError has a line for each thing that is wrong."""
-    refused, (law, folder) = Refusals(SimulationError), usual
-    given = {name: value for name, value in table.items() if name != "plan"}
-    values = sized(read(given, PHASE, where, refused), PHASE, size_of(model))
+    refused, size = Refusals(SimulationError), size_of(model)
+    rest = {name: value for name, value in table.items() if name != "plan"}
+    values = values_of(rest, PHASE, where, size, refused)
     for name, needs in (("name", "a word"), ("duration", "seconds, at most")):
         if name not in table:
             refused.add(name, f"{where}.{name}: no value: needs {needs}")
@@ -71,23 +70,23 @@ def _phase(where: str, model: Model, table: Mapping, usual: tuple[Controller, Pa
             f"{where}.controller", model, values["controller"], reference
         )
     elif "plan" not in table:
-        values["controller"] = law
-    if "plan" in table:
-        values["plan"] = _plans(f"{where}.plan", table["plan"], size_of(model))
+        values["controller"] = default
+    if isinstance(table.get("plan"), list):
+        values["plan"] = [
+            _plan(f"{where}.plan[{k}]", each, size) for k, each in enumerate(table["plan"])
+        ]
+    elif "plan" in table:
+        values["plan"] = _plan(f"{where}.plan", table["plan"], size)
     if "tracking" in values:
         values["tracking"] = Tracking(**values["tracking"])
     return Phase(**values)
 
 
-def _plans(where: str, value: Any, size: Mapping[str, float]) -> list[dict[str, Any]]:
-    """Return the arguments of one plan or of several."""
-    tables = value if isinstance(value, list) else [value]
-    plans = []
-    for k, table in enumerate(tables):
-        place = f"{where}[{k}]" if isinstance(value, list) else where
-        if not isinstance(table, Mapping):
-            raise SimulationError(f"{place}: value {shown(table)}: needs a table")
-        refused = Refusals(SimulationError)
-        plans.append(arguments_but_start(table, place, refused, size))
-        refused.tell()
-    return plans
+def _plan(where: str, table: Any, size: Mapping[str, float]) -> dict[str, Any]:
+    """Return the arguments of a plan."""
+    if not isinstance(table, Mapping):
+        raise refusal(where, table, "a table", SimulationError)
+    refused = Refusals(SimulationError)
+    arguments = arguments_but_start(table, where, refused, size)
+    refused.tell()
+    return arguments

@@ -13,12 +13,11 @@ from ..model.model import Model
 from ..planning.goal import Bounds, Goal
 from ..planning.planner import plan
 from ..planning.result.plan import Plan
-from .file import model_of, read_scene, size_of, subtable
-from .keys import Key, read, sized
+from .file import UNSIZED, model_of, read_scene, size_of, subtable, values_of
+from .keys import Key, sized
 from .plan_keys import FREE, PLAN
 
 ELSEWHERE = "programs can give others, to serpentail.plan"
-UNSIZED: Mapping[str, float] = {}
 CODE_ONLY = ("guess", "path", "legs")  # values that no file can hold
 
 
@@ -81,32 +80,25 @@ def arguments_but_start(
     table: Mapping, where: str, refused: Refusals, size: Mapping[str, float]
 ) -> dict[str, Any]:
     """Return the arguments of ``plan`` that a table of a scene has, in the size of a body, its
-    start as it is there.
-
-    Notes each key that is wrong.
+    start as it is there; refuse each key that is wrong.
     """
     for name in CODE_ONLY:
         if name in table:
             remedy = "only programs can give it; call serpentail.plan"
             refused.add(name, f"{where}.{name}: value {shown(table[name])}: {remedy}")
-    own = {name: value for name, value in table.items() if name not in CODE_ONLY}
-    table = dict(sized(read(own, PLAN, where, refused), PLAN, size))
-    solver = table.get("solver", "ipopt"), table.get("options", {})
-    refused.attempt("solver", _check_solver, *solver)
+    rest = {name: value for name, value in table.items() if name not in CODE_ONLY}
+    table = values_of(rest, PLAN, where, size, refused)
+    solver, options = table.get("solver", "ipopt"), table.get("options", {})
+    refused.attempt("solver", _check_solver, solver, options)
     if refused.lines:
         return {}
 
     # goal and bounds are tables; other values are passed on, except "free"
     goal = table.get("goal", {})
     if isinstance(goal, Mapping):
-        goal = Goal(**{key: _free(value) for key, value in goal.items()})
-    arguments = table | {"goal": goal, "bounds": Bounds(**table.get("bounds", {}))}
-    return {name: None if _is_free(value) else value for name, value in arguments.items()}
-
-
-def _is_free(value: Any) -> bool:
-    """Tell if nothing is demanded."""
-    return isinstance(value, str) and value == FREE
+        goal = Goal(**{key: _free_parts(value) for key, value in goal.items()})
+    arguments = {name: _unless_free(value) for name, value in table.items()}
+    return arguments | {"goal": goal, "bounds": Bounds(**table.get("bounds", {}))}
 
 
 def _check_solver(solver: Any, options: Any) -> None:
@@ -114,14 +106,17 @@ def _check_solver(solver: Any, options: Any) -> None:
     if not isinstance(solver, str) or not re.fullmatch("[a-z]+", solver):
         raise refusal("plan.solver", solver, f"a name of a-z; {ELSEWHERE}", PlanningError)
     for name, value in options.items() if isinstance(options, Mapping) else [("", options)]:
-        own = re.fullmatch(rf"{solver}\.(?!\w*(file|lib))\w+", name)
-        if not own or not isinstance(value, int | float | str):
+        harmless = re.fullmatch(rf"{solver}\.(?!\w*(file|lib))\w+", name)
+        if not harmless or not isinstance(value, int | float | str):
             needs = f"numbers and words of the solver, such as ipopt.max_iter; {ELSEWHERE}"
             raise refusal(f"plan.options.{name}".rstrip("."), value, needs, PlanningError)
 
 
-def _free(value: Any) -> Any:
-    """None for "free", in arrays too."""
-    if isinstance(value, list):
-        return tuple(None if entry == FREE else entry for entry in value)
-    return None if value == FREE else value
+def _unless_free(value: Any) -> Any:
+    """Return a value, or None in place of "free"."""
+    return None if isinstance(value, str) and value == FREE else value
+
+
+def _free_parts(value: Any) -> Any:
+    """Return a part of a goal, None in place of "free" in arrays, too."""
+    return tuple(map(_unless_free, value)) if isinstance(value, list) else _unless_free(value)

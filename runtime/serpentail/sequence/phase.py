@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..basics.checks import none_of, number, refusal
+from ..basics.checks import number, one_of, refusal
 from ..basics.errors import SimulationError
 from ..basics.short_repr import brief
 from ..model.model import Model
@@ -148,7 +148,7 @@ def _until(where: str, until: Any) -> Any:
     try:
         events = tuple((kind, group) for kind, group in until)
     except (TypeError, ValueError):
-        raise refusal(f"{where}: until", until, needs, SimulationError) from None
+        events = ()
     if not events or any(kind not in KINDS or not isinstance(group, str) for kind, group in events):
         raise refusal(f"{where}: until", until, needs, SimulationError)
     return events
@@ -158,19 +158,17 @@ def _moves(where: str, moves: Any, planned: bool) -> tuple[Mapping[str, float], 
     """Return moves whose keys are known; of their numbers ``Legs.moves`` takes care."""
     if isinstance(moves, str | Mapping) or not isinstance(moves, Iterable):
         raise refusal(f"{where}: moves", moves, "an array of tables", SimulationError)
-    found = tuple(moves)
+    listed = tuple(moves)
     keys = (*MOVE, BEFORE) if planned else MOVE
-    for k, move in enumerate(found):
+    for k, move in enumerate(listed):
         if not isinstance(move, Mapping):
             raise refusal(f"{where}: moves[{k}]", move, "a table", SimulationError)
         for key in move:
-            unknown = none_of(f"{where}: moves[{k}]: key", key, keys)
-            if unknown:
-                raise SimulationError(unknown)
+            one_of(f"{where}: moves[{k}]: key", key, keys, SimulationError)
         if ("at" in move) == (BEFORE in move):
             needs = f"at or {BEFORE}, not both" if planned else "at"
             raise refusal(f"{where}: moves[{k}]", dict(move), needs, SimulationError)
-    return found
+    return listed
 
 
 def _plans(where: str, plan: Any) -> tuple[Mapping[str, Any], ...]:

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from ..basics.errors import PlanningError, SimulationError
 from ..basics.short_repr import brief
 from ..motion.derived import AGAIN
 from ..motion.joined import joined, joined_again
@@ -39,8 +38,8 @@ class PhaseRun:
 
     def info(self) -> dict[str, Any]:
         """Return its entry in a trajectory's info."""
-        told = {"name": self.name, "begin": self.begin, "end": self.end, "ended_by": self.ended_by}
-        return told if self.plan is None else told | {"plan": self.plan.report}
+        entry = {"name": self.name, "begin": self.begin, "end": self.end, "ended_by": self.ended_by}
+        return entry if self.plan is None else entry | {"plan": self.plan.report}
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,25 +74,15 @@ def whole(parts: list[Trajectory], runs: list[PhaseRun], phases: Iterable[Phase]
             warnings.append(
                 f"phase {run.name!r} ended without {phase.words} within {phase.duration:.6g} s"
             )
-    told = {"phases": [run.info() for run in runs], "warnings": warnings}
-    found = replace(motion, info=motion.info | told)
+    outcomes = {"phases": [run.info() for run in runs], "warnings": warnings}
+    motion = replace(motion, info=motion.info | outcomes)
     repeats = [vars(part).get(AGAIN) for part in parts]
     if all(repeats):
-        vars(found)[AGAIN] = partial(joined_again, repeats)
-    return found
+        vars(motion)[AGAIN] = partial(joined_again, repeats)
+    return motion
 
 
-def told(
-    phase: Phase, error: SimulationError | PlanningError, parts: list[Trajectory]
-) -> SimulationError | PlanningError:
-    """Return an error that names its phase, with the motion up to there."""
-    found = type(error)(f"phase {phase.name!r}: {error}")
-    if isinstance(found, SimulationError):
-        found.trajectory = so_far(parts, getattr(error, "trajectory", None))
-    return found
-
-
-def so_far(parts: list[Trajectory], last: Trajectory | None) -> Trajectory | None:
+def motion_until(parts: list[Trajectory], last: Trajectory | None) -> Trajectory | None:
     """Return the motion of all finished phases and of a part of one more."""
-    made = parts if last is None else [*parts, last]
-    return joined(made) if made else None
+    motions = parts if last is None else [*parts, last]
+    return joined(motions) if motions else None

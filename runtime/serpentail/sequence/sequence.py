@@ -14,21 +14,24 @@ from ..basics.errors import PlanningError, SimulationError
 from ..basics.short_repr import brief
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
-from ..mpc.mpc import Mpc
-from ..planning.planner import plan as planned
-from ..planning.problem import checked_goal
-from ..planning.result.plan import Plan
-from ..simulation.controllers import Controller, Phases
-from ..simulation.pfl import Pfl
+from ..simulation.controllers import Controller, Phases, parts_of
 from ..simulation.schedules import Legs
 from ..simulation.simulate import simulate
-from .ballistic import landing_time
-from .checks import check_legs, check_phase
-from .phase import AIRBORNE, BEFORE, Phase, Tracking
-from .run import PhaseRun, SequenceRun, so_far, told, whole
+from .flight import planned_flight
+from .phase import AIRBORNE, BEFORE, Event, Phase
+from .run import PhaseRun, SequenceRun, motion_until, whole
 
 SAMPLES = 400  # of a phase, to find when it is clear of the ground
-State = tuple[np.ndarray, np.ndarray]  # q, v
+
+
+@dataclass(frozen=True, eq=False)
+class PhaseStart:
+    """The state in which a phase begins: time (s) of the motion, q, v, and friction springs."""
+
+    time: float
+    q: np.ndarray
+    v: np.ndarray
+    bristles: ArrayLike | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,9 +86,15 @@ class Sequence:
             if names.count(name) > 1:
                 raise SimulationError(f"phases: two are called {name!r}: give each its own name")
         object.__setattr__(self, "phases", phases)
-        check_legs(self.model, self.gamma, self.delta)
+        for name, angle in (("gamma", self.gamma), ("delta", self.delta)):
+            if "feet" in self.model.contacts:
+                number(f"Sequence: {name}", angle, SimulationError)
+            elif angle is not None:
+                raise SimulationError(
+                    f"Sequence: {name}: {self.model.name} has no legs: leave it out"
+                )
         for phase in phases:
-            check_phase(self.model, phase)
+            _check_phase(self.model, phase)
 
     def simulate(
         self, q0: ArrayLike, v0: ArrayLike, bristles0: ArrayLike | None = None
@@ -117,26 +126,36 @@ class Sequence:
         StateError, ModelError, ExtraMissing
             As of ``simulate`` and ``plan``.
         """
-        state: State = np.asarray(q0, float), np.asarray(v0, float)
+        start = PhaseStart(0.0, np.asarray(q0, float), np.asarray(v0, float), bristles0)
         parts: list[Trajectory] = []
         runs: list[PhaseRun] = []
         moves: list[dict[str, float]] = []
-        begin, complete, bristles = 0.0, True, bristles0
+        complete = True
         for phase in self.phases:
+            controller, plan, landing = phase.controller, None, None
             try:
-                controller, plan, own = self._acting(phase, state, begin, moves)
-                moves += own
-                motion, ended_by = self._made(phase, controller, (state, bristles), begin, moves)
+                # what acts: the controller, or the plan for the state in which the phase begins
+                if phase.plan:
+                    angles = self._last_angles(phase, moves)
+                    flight = planned_flight(self.model, phase, (start.q, start.v), angles)
+                    controller, plan, landing = flight.controller, flight.plan, flight.landing
+                moves += [_timed(move, start.time, landing) for move in phase.moves]
+                motion, ended_by = self._made(phase, controller, start, moves)
             except (SimulationError, PlanningError) as error:
-                raise told(phase, error, parts) from error
+                named = type(error)(f"phase {phase.name!r}: {error}")
+                if isinstance(named, SimulationError):
+                    named.trajectory = motion_until(parts, getattr(error, "trajectory", None))
+                raise named from error
             except KeyboardInterrupt as stop:
-                vars(stop)["motion"] = so_far(parts, getattr(stop, "motion", None))
+                vars(stop)["motion"] = motion_until(parts, getattr(stop, "motion", None))
                 raise
+
+            # the next phase begins where this one ends
             parts.append(motion)
             end = float(motion.t[-1])
-            runs.append(PhaseRun(phase.name, begin, end, ended_by, plan))
-            state, begin = (motion.q[-1], motion.v[-1]), end
+            runs.append(PhaseRun(phase.name, start.time, end, ended_by, plan))
             bristles = None if motion.contact is None else motion.contact.bristles[-1]
+            start = PhaseStart(end, motion.q[-1], motion.v[-1], bristles)
             if phase.until is not None and ended_by == "duration":
                 complete = False
                 break
@@ -148,82 +167,57 @@ class Sequence:
             return {}
         return {"legs": Legs.moves(self.gamma, self.delta, moves)}
 
-    def _acting(
-        self, phase: Phase, state: State, begin: float, moves: list[dict[str, float]]
-    ) -> tuple[Controller, Plan | None, list[dict[str, float]]]:
-        """Return the controller, the plan and the timed moves of a phase that begins in a state."""
-        if not phase.plan:
-            return phase.controller, None, [_at(move, begin) for move in phase.moves]
-        angles = self._last_angles(phase, moves)
-        found: list[tuple[Plan, float | None]] = []
-        for arguments in phase.plan:
-            found.append(self._planned(phase, dict(arguments), state, angles))
-            if found[-1][0].success:
-                break
-        plan, landing = min(found, key=lambda pair: _off(pair[0]))
-        law = _tracking(self.model, plan, phase.tracking)
-        return law, plan, [_at(move, begin, landing) for move in phase.moves]
-
-    def _planned(
-        self, phase: Phase, arguments: dict[str, Any], state: State, angles: np.ndarray
-    ) -> tuple[Plan, float | None]:
-        """Return a plan from a state, and the time of its landing (s) if that is needed."""
-        landing = None
-        if "duration" not in arguments or any(BEFORE in move for move in phase.moves):
-            goal = checked_goal(arguments.get("goal"), self.model.layout.nt)
-            landing = landing_time(self.model, state, goal, angles)
-            arguments = {"duration": landing - phase.tracking.early} | arguments
-        return planned(self.model, start=state, **arguments), landing
-
-    def _last_angles(self, phase: Phase, moves: list[dict[str, float]]) -> np.ndarray:
+    def _last_angles(self, phase: Phase, moves: Iterable[Mapping[str, float]]) -> np.ndarray:
         """Return gamma, delta (rad) after all moves up to the end of a phase."""
-        angles = [self.gamma or 0.0, self.delta or 0.0]
+        gamma, delta = self.gamma or 0.0, self.delta or 0.0
         for move in (*moves, *phase.moves):
-            angles = [move.get("gamma", angles[0]), move.get("delta", angles[1])]
-        return np.array(angles)
+            gamma, delta = move.get("gamma", gamma), move.get("delta", delta)
+        return np.array([gamma, delta])
 
     def _made(
         self,
         phase: Phase,
         controller: Controller,
-        start: tuple[State, ArrayLike | None],
-        begin: float,
-        moves: list[dict[str, float]],
+        start: PhaseStart,
+        moves: Iterable[Mapping[str, float]],
     ) -> tuple[Trajectory, str]:
         """Return the motion of a phase, and what ended it."""
-        (q, v), bristles = start
         settings = dict(self.settings) | self.legs(moves)
-        settings["controller"] = Phases([(begin, controller)])
-        if bristles is not None:
-            settings["bristles0"] = bristles
-        end = begin + phase.duration
-        if phase.until == AIRBORNE:
-            trial = settings | {"output_step": phase.duration / SAMPLES}
-            looked = simulate(self.model, q, v, t_span=(begin, end), **trial)
-            assert isinstance(looked, Trajectory)
-            clear = _clear(looked, phase.clearance)
-            motion = simulate(self.model, q, v, t_span=(begin, clear or end), **settings)
-            assert isinstance(motion, Trajectory)
-            return motion, AIRBORNE if clear else "duration"
+        settings["controller"] = Phases([(start.time, controller)])
+        if start.bristles is not None:
+            settings["bristles0"] = start.bristles
+
+        def run(end: float, **more: Any) -> Trajectory:
+            span = (start.time, end)
+            motion = simulate(self.model, start.q, start.v, t_span=span, **settings | more)
+            assert isinstance(motion, Trajectory)  # of one start
+            return motion
+
+        end = start.time + phase.duration
+        if phase.until == AIRBORNE:  # found in samples of a first run
+            clear = _clear(run(end, output_step=phase.duration / SAMPLES), phase.clearance)
+            return run(clear or end), AIRBORNE if clear else "duration"
         events = phase.stop_at(self.model)
-        if events:
-            settings["stop_at"] = events
-        motion = simulate(self.model, q, v, t_span=(begin, end), **settings)
-        assert isinstance(motion, Trajectory)
+        motion = run(end, stop_at=events) if events else run(end)
         return motion, _ended_by(motion, events, end)
 
 
-def _tracking(model: Model, plan: Plan, tracking: Tracking) -> Controller:
-    """Return the controller that tracks a plan."""
-    if tracking.mpc is not None:
-        return Mpc(model, plan, **tracking.mpc)
-    return Pfl(model, plan, tracking.kp, tracking.kd, torque=plan.problem.bounds.torque)
-
-
-def _off(plan: Plan) -> float:
-    """Return how far (deg) a plan's true motion misses the goal; -1 for a successful plan."""
-    error = plan.report["open_loop_goal_error_deg"]
-    return -1.0 if plan.success else np.inf if error is None else float(error)
+def _check_phase(model: Model, phase: Phase) -> None:
+    """SimulationError if a model cannot make a phase: its events, its controller or its moves."""
+    where = f"phase {phase.name!r}"
+    if phase.until is not None and not model.contacts:
+        remedy = "add `contacts` to its scene, or leave it out"
+        raise SimulationError(f"{where}: until: {model.name} has no contacts: {remedy}")
+    for kind, group in phase.stop_at(model):
+        if group not in model.contacts:
+            needs = f"one of {', '.join(map(repr, model.contacts))}"
+            raise refusal(f"{where}: until: {kind}", group, needs, SimulationError)
+    try:
+        parts_of(phase.controller, model.layout.nt)
+    except SimulationError as error:
+        raise SimulationError(f"{where}: {error}") from error
+    if phase.moves and "feet" not in model.contacts:
+        raise SimulationError(f"{where}: moves: {model.name} has no legs: leave them out")
 
 
 def _clear(motion: Trajectory, clearance: float) -> float | None:
@@ -235,15 +229,15 @@ def _clear(motion: Trajectory, clearance: float) -> float | None:
     return float(motion.t[clear.argmax()]) if clear.any() else None
 
 
-def _ended_by(motion: Trajectory, events: Iterable[tuple[str, str]], end: float) -> str:
+def _ended_by(motion: Trajectory, events: list[Event], end: float) -> str:
     """Return the event that ended a motion, as words, or "duration"."""
     for event in motion.info.get("events", [])[::-1]:
-        if (event["kind"], event["group"]) in set(events) and motion.t[-1] < end:
+        if (event["kind"], event["group"]) in events and motion.t[-1] < end:
             return f"{event['kind']} of {event['group']}"
     return "duration"
 
 
-def _at(move: Mapping[str, float], begin: float, landing: float | None = None) -> dict[str, float]:
+def _timed(move: Mapping[str, float], begin: float, landing: float | None) -> dict[str, float]:
     """Return a move on the clock of the motion, from one on its phase's clock."""
     rest = {name: value for name, value in move.items() if name not in ("at", BEFORE)}
     if landing is not None and BEFORE in move:

@@ -14,7 +14,8 @@ from ...model.model import Model
 from ...motion.numbers import NUMBERS
 from ...motion.trajectory import Trajectory
 from ...scenes.overrides import changed
-from ...scenes.simulate import Scenario, scenario_of
+from ...scenes.scenario import Scenario
+from ...scenes.simulate import scenario_of
 from ...simulation.controllers import Damping, TorqueCurve, TorqueTable
 from ...simulation.rollouts import Rollouts
 from ...simulation.simulate import simulate

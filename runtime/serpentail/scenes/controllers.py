@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..basics.checks import number, one_of, shown
+from ..basics.checks import number, one_of, refusal, shown
 from ..basics.errors import SimulationError
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
@@ -18,10 +18,8 @@ def legs_of(table: Mapping) -> Legs:
     """Return the legs of a table [simulate.legs]."""
     missing = [name for name in ("gamma", "delta") if name not in table]
     if missing or {"moves", "times"} <= set(table):
-        raise SimulationError(
-            f"simulate.legs: value {shown(dict(table))}: needs gamma, delta, and moves or times, "
-            "not both"
-        )
+        needs = "gamma, delta, and moves or times, not both"
+        raise refusal("simulate.legs", dict(table), needs, SimulationError)
     if "times" in table:
         return Legs(table["times"], table["gamma"], table["delta"])
     gamma, delta = (
@@ -38,9 +36,7 @@ def reference_of(where: str, model: Model, table: Mapping, parent: Path) -> Refe
         except (OSError, ValueError) as error:
             raise SimulationError(f"{where}.file: value {shown(table['file'])}: {error}") from error
     if not {"times", "bends"} <= set(table) or "file" in table:
-        raise SimulationError(
-            f"{where}: value {shown(dict(table))}: needs times and bends, or a file"
-        )
+        raise refusal(where, dict(table), "times and bends, or a file", SimulationError)
     return Reference.of_bends(model, table["times"], table["bends"], table.get("blend", "quintic"))
 
 
@@ -49,13 +45,13 @@ def controller_of(where: str, model: Model, value: Any, reference: Any) -> Contr
     if isinstance(value, Mapping):
         return law_of(where, model, value, reference)
     if not isinstance(value, list) or not value:
-        remedy = f"needs a table, or tables under lines [[{where}]], with begin"
-        raise SimulationError(f"{where}: value {shown(value)}: {remedy}")
+        needs = f"a table, or tables under lines [[{where}]], with begin"
+        raise refusal(where, value, needs, SimulationError)
     pairs = []
     for index, table in enumerate(value):
         place = f"{where}[{index}]"
         if not isinstance(table, Mapping) or "begin" not in table:
-            raise SimulationError(f"{place}: value {shown(table)}: needs a table with begin (s)")
+            raise refusal(place, table, "a table with begin (s)", SimulationError)
         law = {name: value for name, value in table.items() if name != "begin"}
         begin = number(f"{place}.begin", table["begin"], SimulationError)
         pairs.append((begin, law_of(place, model, law, reference)))
@@ -73,12 +69,8 @@ def law_of(where: str, model: Model, table: Mapping, reference: Any) -> Controll
     if kind == "torques":
         return TorqueTable(**{"times": None, "torques": None} | values)
     if reference is None:
+        parent = where.split(".controller", maxsplit=1)[0]
         raise SimulationError(
-            f"{where}: kind 'pfl' tracks a reference: add a table [{beside(where)}.reference]"
+            f"{where}: kind 'pfl' tracks a reference: add a table [{parent}.reference]"
         )
     return Pfl(model, reference, **{"kp": KP, "kd": KD} | values)
-
-
-def beside(where: str) -> str:
-    """Return the table that a controller's table is in."""
-    return where.split(".controller", maxsplit=1)[0]

@@ -1,0 +1,106 @@
+"""The planned flight of a phase: the landing that it is for, its plan, and its tracking."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from serpentail_scene.layout import QUATERNION, TAIL_Q
+
+from ..basics.errors import SimulationError
+from ..model.model import Model
+from ..mpc.mpc import Mpc
+from ..planning.goal import Goal
+from ..planning.planner import plan
+from ..planning.problem import checked_goal
+from ..planning.result.full_state import com_at_start
+from ..planning.result.plan import Plan
+from ..simulation.controllers import Controller
+from ..simulation.pfl import Pfl
+from .phase import BEFORE, Phase
+
+UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
+State = tuple[np.ndarray, np.ndarray]  # q, v
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedFlight:
+    """A plan, the controller that tracks it, and the time (s) from its start to the landing, if
+    that is needed.
+    """
+
+    plan: Plan
+    controller: Controller
+    landing: float | None
+
+
+def planned_flight(model: Model, phase: Phase, state: State, angles: np.ndarray) -> PlannedFlight:
+    """Return the first successful plan of a phase from a state, else the one that misses least.
+
+    angles (2,): gamma, delta (rad) of the legs at the landing.
+    """
+    attempts: list[tuple[Plan, float | None]] = []
+    for arguments in phase.plan:
+        attempts.append(_attempt(model, phase, arguments, state, angles))
+        if attempts[-1][0].success:
+            break
+    best, landing = min(attempts, key=lambda attempt: _miss(attempt[0]))
+    tracking = phase.tracking
+    if tracking.mpc is not None:
+        return PlannedFlight(best, Mpc(model, best, **tracking.mpc), landing)
+    torque = best.problem.bounds.torque
+    return PlannedFlight(best, Pfl(model, best, tracking.kp, tracking.kd, torque=torque), landing)
+
+
+def _attempt(
+    model: Model, phase: Phase, arguments: Mapping[str, Any], state: State, angles: np.ndarray
+) -> tuple[Plan, float | None]:
+    """Return a plan from a state, and the time of its landing (s) if that is needed."""
+    landing = None
+    if "duration" not in arguments or any(BEFORE in move for move in phase.moves):
+        goal = checked_goal(arguments.get("goal"), model.layout.nt)
+        landing = landing_time(model, state, goal, angles)
+        arguments = {"duration": landing - phase.tracking.early, **arguments}
+    return plan(model, start=state, **arguments), landing
+
+
+def _miss(attempt: Plan) -> float:
+    """Return how far (deg) a plan's true motion misses the goal; -1 for a successful plan."""
+    error = attempt.report["open_loop_goal_error_deg"]
+    return -1.0 if attempt.success else np.inf if error is None else float(error)
+
+
+def landing_time(model: Model, state: State, goal: Goal, angles: np.ndarray) -> float:
+    """Return the time (s) from a state to the landing in the posture of a checked goal.
+
+    Then the lowest foot, or the lowest point of a model without feet, is at the ground. Parts that
+    the goal leaves free count as upright and straight. SimulationError if the centre of mass never
+    reaches that height.
+    """
+    (_, _, z), (_, _, rise) = com_at_start(model, state)
+    drop, g = z - _height(model, goal, angles), model.parameters["gravity"]
+    inside = rise**2 + 2 * g * drop
+    if g == 0 or inside < 0:
+        raise SimulationError(
+            f"landing: the centre of mass is {-drop:.3g} m too low for the goal's posture, and "
+            f"rises by {max(rise, 0) ** 2 / (2 * g) if g else 0:.3g} m: give the plan a duration"
+        )
+    time = (rise + math.sqrt(inside)) / g
+    if time <= 0:
+        raise SimulationError("landing: it is in the past: give the plan a duration")
+    return time
+
+
+def _height(model: Model, goal: Goal, angles: np.ndarray) -> float:
+    """Return the height (m) of the centre of mass over the lowest foot or point in a posture."""
+    q, at_rest = np.zeros(model.nq), np.zeros(model.nv)
+    named = isinstance(goal.attitude, str) or goal.attitude is None
+    q[QUATERNION] = UPRIGHT if named else goal.attitude
+    if goal.tail is not None:
+        q[TAIL_Q] = np.nan_to_num(goal.tail)
+    legs = (np.array([*angles, *angles, *np.zeros(4)]),) if "feet" in model.contacts else ()
+    points, _ = model.contact_points(q, at_rest, *legs)
+    lowest = points[: model.contacts.get("feet", len(points)), 2].min()
+    return float(com_at_start(model, (q, at_rest))[0][2] - lowest)
