@@ -15,7 +15,7 @@ from serpentail.bridges.sweeps import supervision
 from serpentail.bridges.sweeps.result import Status
 from tests.support import swept
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.mark.slow
