@@ -11,7 +11,7 @@ LATER = ("executor", "retry_failed", "limit")  # of running alone
 
 def sweep(arguments: argparse.Namespace) -> Outcome:
     """Run the missing points of a scene's sweep, and return how far it is."""
-    from ..bridges.sweeps.axes import axes_of, checked_row
+    from ..bridges.sweeps.points import axes_of, checked_row
     from ..bridges.sweeps.scene import arguments_of
     from ..bridges.sweeps.sweep import posed
     from ..bridges.sweeps.sweep import sweep as swept

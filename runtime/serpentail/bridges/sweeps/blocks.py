@@ -1,9 +1,10 @@
-"""How many points are sent as one task, and how many tasks a second."""
+"""How many points are sent as one block, and how many blocks a second."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+
+from .pose import Posed
 
 LEAST_S = 1.0  # s of work that a block is to have
 MOST_S = 60.0  # s of work that a kill may cost
@@ -27,9 +28,9 @@ class Pace:
 
     def learn(self, points: int, seconds: float) -> None:
         """Note how long a block took; of a much larger one, the start of workers is a less part."""
-        kept = OLDER if points < 2 * self.largest else 0.0
-        self.seconds = kept * self.seconds + seconds
-        self.points = kept * self.points + points
+        weight = OLDER if points < 2 * self.largest else 0.0
+        self.seconds = weight * self.seconds + seconds
+        self.points = weight * self.points + points
         self.largest = max(self.largest, points)
 
     def block(self, left: int, workers: int) -> int:
@@ -59,30 +60,33 @@ class Gate:
         return True
 
 
-class Missing:
-    """The numbers of points without rows, in order, each taken once; of one model of several.
+class Group:
+    """Points of one model without rows, in order; each is sent once.
 
-    done: which points have rows; models: returns the model of each of some numbers.
+    done: which points have rows; left: how many are not sent yet.
     """
 
-    def __init__(self, done: np.ndarray, models: Callable, model: int):
-        self.done, self.models, self.model = done, models, model
-        self.at = 0
+    def __init__(self, posed: Posed, model: int, done: np.ndarray):
+        self.posed, self.model, self.done = posed, model, done
+        self.bundle, self.pace = posed.bundles[model], Pace()
+        self.first = 0  # number that is looked at next
         self.left = sum(len(self._window(k)) for k in range(0, len(done), MOST_IN_BLOCK))
 
-    def take(self, most: int) -> np.ndarray:
-        """Return the next numbers, at most so many."""
+    def take(self, workers: int) -> np.ndarray:
+        """Return the numbers of the points of the next block."""
+        most = self.pace.block(self.left, workers)
         parts, count = [np.empty(0, np.int64)], 0
-        while count < most and self.at < len(self.done):
-            numbers = self._window(self.at)
-            part = numbers[: most - count]
-            whole = len(part) == len(numbers)
-            self.at = self.at + MOST_IN_BLOCK if whole else int(part[-1]) + 1
+        while count < most and self.first < len(self.done):
+            window = self._window(self.first)
+            part = window[: most - count]
+            whole = len(part) == len(window)
+            self.first = self.first + MOST_IN_BLOCK if whole else int(part[-1]) + 1
             parts.append(part)
             count += len(part)
         self.left -= count
         return np.concatenate(parts)
 
     def _window(self, first: int) -> np.ndarray:
+        """Return the numbers among the next ones."""
         numbers = first + np.flatnonzero(~self.done[first : first + MOST_IN_BLOCK])
-        return numbers[self.models(numbers) == self.model]
+        return numbers[self.posed.models(numbers) == self.model]

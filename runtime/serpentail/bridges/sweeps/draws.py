@@ -8,20 +8,20 @@ PART = 1024  # places that are drawn together
 ROUNDS = 6  # of the permutation of a Latin hypercube
 
 
-def drawn(way: str, places: np.ndarray, size: int, seed: int, points: int) -> np.ndarray:
+def drawn(kind: str, places: np.ndarray, size: int, seed: int, points: int) -> np.ndarray:
     """Return numbers (k, size) from 0 to 1 at places (k,) from 0 to points - 1."""
     parts, inside = np.divmod(places, PART)
-    found = np.empty((len(places), size))
+    numbers = np.empty((len(places), size))
     for part in np.unique(parts):
         here = parts == part
-        found[here] = _part(way, int(part), size, seed, points)[inside[here]]
-    return found
+        numbers[here] = _part(kind, int(part), size, seed, points)[inside[here]]
+    return numbers
 
 
 @lru_cache(maxsize=16)
-def _part(way: str, part: int, size: int, seed: int, points: int) -> np.ndarray:
+def _part(kind: str, part: int, size: int, seed: int, points: int) -> np.ndarray:
     """Return the numbers (PART, size) of one part of the places."""
-    if way == "sobol":
+    if kind == "sobol":
         from scipy.stats import qmc
 
         engine = qmc.Sobol(size, seed=np.random.default_rng(seed))
@@ -31,7 +31,7 @@ def _part(way: str, part: int, size: int, seed: int, points: int) -> np.ndarray:
     bits = np.random.PCG64(seed)
     bits.advance(part * PART * size)
     numbers = np.random.Generator(bits).random((PART, size))
-    if way == "latin":
+    if kind == "latin":
         places = np.arange(part * PART, min((part + 1) * PART, points))
         for k in range(size):
             numbers[: len(places), k] += permuted(places, points, [seed, k])
@@ -48,15 +48,15 @@ def permuted(places: np.ndarray, points: int, seed: list[int]) -> np.ndarray:
     half = np.uint64(max(1, (max(points - 1, 1).bit_length() + 1) // 2))
     mask = (np.uint64(1) << half) - np.uint64(1)
     keys = np.random.default_rng(seed).integers(0, 2**64, ROUNDS, np.uint64)
-    found = places.astype(np.uint64)
-    outside = np.ones(len(found), bool)
+    numbers = places.astype(np.uint64)
+    outside = np.ones(len(numbers), bool)
     while outside.any():
-        left, right = found[outside] >> half, found[outside] & mask
+        left, right = numbers[outside] >> half, numbers[outside] & mask
         for key in keys:
             left, right = right, left ^ (_mixed(right ^ key) & mask)
-        found[outside] = (left << half) | right
-        outside = found >= points
-    return found.astype(np.int64)
+        numbers[outside] = (left << half) | right
+        outside = numbers >= points
+    return numbers.astype(np.int64)
 
 
 def _mixed(numbers: np.ndarray) -> np.ndarray:

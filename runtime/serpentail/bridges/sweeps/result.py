@@ -13,11 +13,14 @@ import numpy as np
 from ...basics.checks import one_line
 from ...basics.errors import SweepError
 from ...basics.short_repr import brief
-from .axes import Axes, checked_row
 from .driver import Spent
-from .groups import Posed
+from .points import Axes, checked_row
+from .pose import Posed
+from .runs import run_point
 from .shards import AT_ONCE, Row
 from .store import Store
+from .tables import dataset, frame, write
+from .worker import model_of
 
 if TYPE_CHECKING:
     import pandas
@@ -89,8 +92,8 @@ class Sweep:
         """Return a stored row as a dict; SweepError if it is damaged."""
         try:
             outcome = {} if row.outcome is None else json.loads(row.outcome)
-            told = {"error": row.error, "seconds": row.seconds}
-            return {"number": row.number} | point | outcome | told
+            outcome |= {"error": row.error, "seconds": row.seconds}
+            return {"number": row.number} | point | outcome
         except (RecursionError, TypeError, ValueError) as reason:
             raise SweepError(
                 f"store: the row of point {row.number} is damaged ({one_line(str(reason))}): "
@@ -139,9 +142,6 @@ class Sweep:
         SerpentailError
             What the run raises.
         """
-        from .bundles import model_of
-        from .runs import run_point
-
         number, job = [checked_row(k, len(self))], self.posed.job
         bundle = self.posed.bundles[self.posed.models(np.array(number))[0]]
         _, motion = run_point(job, model_of(bundle, job), self.axes.at(number)[0])
@@ -188,8 +188,6 @@ class Sweep:
         ExtraMissing
             pandas is not installed.
         """
-        from .tables import frame
-
         return frame(self)
 
     def to_xarray(self) -> "xarray.Dataset":
@@ -206,8 +204,6 @@ class Sweep:
         ExtraMissing
             xarray is not installed.
         """
-        from .tables import dataset
-
         return dataset(self)
 
     def save(self, path: str | PathLike[str]) -> Path:
@@ -233,6 +229,4 @@ class Sweep:
         NotWritten
             The file cannot be written.
         """
-        from .tables import write
-
         return write(self, path)

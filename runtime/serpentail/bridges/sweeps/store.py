@@ -14,10 +14,9 @@ from filelock import FileLock, Timeout
 
 from ...basics.errors import SweepError
 from ...basics.files import refuse_unusable, replacing
-from .adoption import Mapped
+from .adoption import adopted_numbers
 from .axis import as_json
-from .shards import NAME, Row, Shard, in_order, parquet_library
-from .supervision import ShardFolder
+from .shards import NAME, Row, Shard, ShardFolder, in_order, parquet_library
 
 MARK = "store.json"  # tells that a folder is a store, and which one
 SPEC = "sweep.json"
@@ -38,14 +37,13 @@ class Store:
         self.spec = json.loads(as_json(spec))
         self.shards: list[Shard] = []
         self.done = np.zeros(total, bool)
-        if self.path is None:
-            return
-        parquet_library()
-        _refuse_other(self.path)
-        family, own = (
-            hashlib.sha256(as_json(x).encode()).hexdigest()[:16] for x in (spec["family"], spec)
-        )
-        self.folder = self.path / f"{family}-{own}"
+        if self.path is not None:
+            parquet_library()
+            _refuse_other(self.path)
+            family, sweep = (
+                hashlib.sha256(as_json(x).encode()).hexdigest()[:16] for x in (spec["family"], spec)
+            )
+            self.folder = self.path / f"{family}-{sweep}"
 
     @contextmanager
     def writing(self) -> Iterator[None]:
@@ -67,7 +65,9 @@ class Store:
         try:
             self._begin(self.path)
             yield
-            self._remove_others()
+            # the shards of workers that were thought to be lost: others have their rows
+            for path in set(_files(self.folder)) - {shard.where for shard in self.shards}:
+                Path(path).unlink(missing_ok=True)
         finally:
             lock.release()
 
@@ -81,22 +81,18 @@ class Store:
             _write(self.folder / SPEC, self.spec)
         self.look()
 
-    def _remove_others(self) -> None:
-        """Remove shards whose rows others have: of workers that were thought to be lost."""
-        own = {shard.where for shard in self.shards}
-        for path in set(_files(self.folder)) - own:
-            Path(path).unlink(missing_ok=True)
-
     def _adopt(self, other: Path) -> None:
         """Take the rows of another sweep that are rows of this one, too."""
         try:
-            mapped = Mapped(json.loads(other.read_bytes()), self.spec)
+            total, numbers_here = adopted_numbers(json.loads(other.read_bytes()), self.spec)
         except (ArithmeticError, LookupError, MemoryError, RecursionError, TypeError, ValueError):
             raise SweepError(f"store: {other} is damaged: delete its folder") from None
-        for shard in _accepted(other.parent, np.zeros(mapped.old_total, bool)):
+        for shard in _accepted(other.parent, np.zeros(total, bool)):
             rows = [
                 row._replace(number=number)
-                for row, number in zip(shard.rows(), mapped(shard), strict=True)
+                for row, number in zip(
+                    shard.rows(), numbers_here(shard.numbers()).tolist(), strict=True
+                )
                 if number >= 0 and not self.done[number]
             ]
             if rows:
@@ -130,47 +126,40 @@ class Store:
 
     def rows(self) -> Iterator[Row]:
         """Yield all rows in the order of their numbers."""
-        return in_order(sorted(self.shards, key=lambda shard: shard[:4]))
+        return in_order(self.shards)
 
     def row(self, number: int) -> Row | None:
         """Return the row of a number; None if it has none."""
-        for shard in self.shards:
-            if shard.first <= number <= shard.last:
-                for row in shard.rows():
-                    if row.number == number:
-                        return row
-        return None
+        near = (shard for shard in self.shards if shard.first <= number <= shard.last)
+        return next((row for shard in near for row in shard.rows() if row.number == number), None)
 
     def forget(self, numbers: Sequence[int] | None = None) -> None:
         """Delete rows, by default those of failures, so that they are made again."""
-        gone = None if numbers is None else set(numbers)
+        gone = np.zeros(len(self.done), bool)
+        if numbers is None:
+            failures = (shard for shard in self.shards if shard.failed)
+            numbers = [r.number for shard in failures for r in shard.rows() if r.error is not None]
+        gone[numbers] = True
         for shard in list(self.shards):
-            if shard.failed if gone is None else self.done[list(gone)].any():
-                kept = [
-                    row
-                    for row in shard.rows()
-                    if (row.error is None if gone is None else row.number not in gone)
-                ]
-                if len(kept) < shard.size:
-                    self._replace(shard, kept)
-
-    def _replace(self, shard: Shard, kept: Sequence[Row]) -> None:
-        """Have fewer rows in place of a shard."""
-        self.shards.remove(shard)
-        self.done[shard.numbers()] = False
-        if kept:
-            self.accept(Shard.of(kept))
-        if self.path is not None:
-            os.unlink(shard.where)
+            if not gone[shard.first : shard.last + 1].any():
+                continue
+            rows = [row for row in shard.rows() if not gone[row.number]]
+            if len(rows) < shard.size:
+                self.shards.remove(shard)
+                if rows:
+                    self.accept(Shard.of(rows))
+                if self.path is not None:
+                    os.unlink(shard.where)
+        self.done &= ~gone
 
 
 def _files(folder: Path) -> list[str]:
     """Return the paths of shards in a folder, in the order of their first numbers."""
-    found: list[str] = []
+    paths: list[str] = []
     for inner in folder.glob("[0-9]*"):
         with os.scandir(inner) as entries:
-            found += [entry.path for entry in entries if NAME.fullmatch(entry.name)]
-    return sorted(found)
+            paths += [entry.path for entry in entries if NAME.fullmatch(entry.name)]
+    return sorted(paths)
 
 
 def _accepted(folder: Path, done: np.ndarray) -> list[Shard]:
