@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ...basics.checks import needed, refusal, shown, whole_number
+from ...basics.checks import refusal, shown, whole_number
 from ...basics.errors import SweepError
 from .axis import Grid, Spread, in_units, spread
 from .draws import drawn
@@ -27,11 +27,11 @@ Units = Mapping[str, str | Sequence[str] | None]  # by name; None: any unit, in 
 class Axes:
     """The axes of a sweep.
 
-    grids: rows of values, by the names that they set together. spreads: numbers between bounds.
+    grids: by the names that change together, the values of each. spreads: numbers between bounds.
     points, seed: of the samples that all spreads together give.
     """
 
-    grids: Mapping[Names, Sequence[tuple]]
+    grids: Mapping[Names, Sequence[Sequence]]
     spreads: Mapping[str, Spread]
     points: int
     seed: int
@@ -43,8 +43,8 @@ class Axes:
 
     @property
     def sizes(self) -> tuple[int, ...]:
-        """How many rows each grid has, and last, how many samples all spreads together."""
-        grids = tuple(len(rows) for rows in self.grids.values())
+        """How many places each grid has, and last, how many samples all spreads together."""
+        grids = tuple(len(columns[0]) for columns in self.grids.values())
         return (*grids, self.points) if self.spreads else grids
 
     def __len__(self) -> int:
@@ -57,18 +57,19 @@ class Axes:
 
     def measured(self, units: Units) -> "Axes":
         """Return the axes with texts such as "2 g" as numbers, for the names that have a unit."""
-
-        def converted(name: str, value: Any) -> Any:
-            return in_units(f"over: {name}", value, units[name]) if name in units else value
-
-        grids = {
-            names: [tuple(map(converted, names, row)) for row in rows]
-            for names, rows in self.grids.items()
-        }
-        spreads = {}
+        grids, spreads = {}, {}
+        for names, columns in self.grids.items():
+            grids[names] = [
+                [in_units(f"over: {name}", value, units[name]) for value in column]
+                if name in units
+                else column
+                for name, column in zip(names, columns, strict=True)
+            ]
         for name, axis in self.spreads.items():
-            low, high = (converted(name, bound) for bound in axis.bounds)
-            spreads[name] = replace(spread(axis.kind, low, high, axis.law), bounds=axis.bounds)
+            spreads[name] = axis
+            if name in units:
+                low, high = (in_units(f"over: {name}", x, units[name]) for x in axis.bounds)
+                spreads[name] = replace(spread(axis.kind, low, high, axis.law), bounds=axis.bounds)
         return replace(self, grids=grids, spreads=spreads)
 
     def places(self, numbers: Sequence[int] | np.ndarray) -> tuple[np.ndarray, ...]:
@@ -89,24 +90,24 @@ class Axes:
     def at(self, numbers: Sequence[int] | np.ndarray) -> list[Point]:
         """Return the points of some numbers: the last axis changes first, spreads together."""
         places = self.places(numbers)
-        columns: dict[str, list] = {}
-        for (names, rows), where in zip(self.grids.items(), places, strict=False):
-            for i, name in enumerate(names):
-                columns[name] = [rows[k][i] for k in where]
-        columns |= self.samples(places[-1])
-        return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+        points: dict[str, list] = {}
+        for (names, columns), where in zip(self.grids.items(), places, strict=False):
+            for name, column in zip(names, columns, strict=True):
+                points[name] = [column[k] for k in where]
+        points |= self.samples(places[-1])
+        return [dict(zip(points, row, strict=True)) for row in zip(*points.values(), strict=True)]
 
     def part(self, numbers: np.ndarray) -> tuple["Axes", np.ndarray]:
-        """Return axes with the rows that some points need, and the numbers that these have there.
+        """Return axes with the values that some points need, and the points' numbers there.
 
         Grids of few values stay whole.
         """
-        if all(len(rows) <= FEW_VALUES for rows in self.grids.values()):
+        if max(self.sizes[: len(self.grids)], default=0) <= FEW_VALUES:
             return self, numbers
         places, grids = list(self.places(numbers)), {}
-        for k, (names, rows) in enumerate(self.grids.items()):
+        for k, (names, columns) in enumerate(self.grids.items()):
             used, places[k] = np.unique(places[k], return_inverse=True)
-            grids[names] = [rows[i] for i in used]
+            grids[names] = [[column[i] for i in used] for column in columns]
         axes = replace(self, grids=grids)
         return axes, np.ravel_multi_index(tuple(places), axes.sizes)
 
@@ -116,7 +117,7 @@ def axes_of(over: Any, points: Any, seed: Any) -> Axes:
     if not isinstance(over, Mapping) or not over:
         needs = 'a table of axes by name, such as {"tail_mass": st.grid([0.002, 0.003])}'
         raise refusal("over", over, needs, SweepError)
-    grids: dict[Names, list[tuple]] = {}
+    grids: dict[Names, Sequence[Sequence]] = {}
     spreads: dict[str, Spread] = {}
     taken: set[str] = set()
     for key, axis in over.items():
@@ -126,7 +127,7 @@ def axes_of(over: Any, points: Any, seed: Any) -> Axes:
                 raise SweepError(f"over: {name!r} twice: needs one axis for each name")
             taken.add(name)
         if isinstance(axis, Grid):
-            grids[names] = [_row(names, value) for value in axis.values]
+            grids[names] = _columns(names, axis.values)
         elif isinstance(axis, Spread) and len(names) == 1:
             spreads[names[0]] = axis
         else:
@@ -175,10 +176,12 @@ def _names(key: Any) -> Names:
     return names
 
 
-def _row(names: Names, value: Any) -> tuple:
-    """Return the values of one or several names at one place of a grid."""
+def _columns(names: Names, values: Sequence) -> Sequence[Sequence]:
+    """Return the values of a grid by its names."""
     if len(names) == 1:
-        return (value,)
-    if not isinstance(value, list) or len(value) != len(names):
-        raise SweepError(needed(f"over: {', '.join(names)}", value, f"{len(names)} entries each"))
-    return tuple(value)
+        return [values]
+    for value in values:
+        if not isinstance(value, list) or len(value) != len(names):
+            needs = f"{len(names)} entries each"
+            raise refusal(f"over: {', '.join(names)}", value, needs, SweepError)
+    return list(zip(*values, strict=True))

@@ -90,7 +90,7 @@ def pose(what: Any, axes: Axes, job: Job, of: Any) -> Posed:
     job, axes = subject.job, axes.measured(subject.units)
     if isinstance(what, Model):
         _refuse_shapes(what, axes)
-    grids = [[names, _row_texts(names, rows, job)] for names, rows in axes.grids.items()]
+    grids = [[names, _row_texts(names, columns, job)] for names, columns in axes.grids.items()]
     _refuse_twice(axes, [texts for _, texts in grids])
 
     # one model for each place on the axes that decide on it; the last axis has all spreads
@@ -117,12 +117,12 @@ def pose(what: Any, axes: Axes, job: Job, of: Any) -> Posed:
     return Posed(axes, job, bundles, models.reshape(shape), spec)
 
 
-def _row_texts(names: tuple[str, ...], rows: Sequence[tuple], job: Job) -> list[str]:
-    """Return what tells each row of a grid from others; of a file, also its content."""
-    texts = [as_json(row) for row in rows]
+def _row_texts(names: tuple[str, ...], columns: Sequence[Sequence], job: Job) -> list[str]:
+    """Return what tells each place of a grid from others; of a file, also its content."""
+    texts = [as_json(values) for values in zip(*columns, strict=True)]
     if job.run != "identify" or DATA not in names:
         return texts
-    digests = [job.digest_of({DATA: row[names.index(DATA)]}) for row in rows]
+    digests = [job.digest_of({DATA: file}) for file in columns[names.index(DATA)]]
     return [f"{text}\n{digest}" for text, digest in zip(texts, digests, strict=True)]
 
 

@@ -111,8 +111,8 @@ def dataset(sweep: "Sweep") -> "xarray.Dataset":
     axes = sweep.axes
     dims = ["_".join(names) for names in axes.grids]
     coordinates: dict[str, Any] = {}
-    for dim, (names, rows) in zip(dims, axes.grids.items(), strict=True):
-        coordinates |= _grid_coordinates(dim, names, rows)
+    for dim, (names, columns) in zip(dims, axes.grids.items(), strict=True):
+        coordinates |= _grid_coordinates(dim, names, columns)
     for name, samples in axes.samples(np.arange(axes.points)).items():
         entries = _columns([flat({name: sample}) for sample in samples])
         coordinates |= {entry: (SAMPLE, numbers) for entry, numbers in entries.items()}
@@ -135,14 +135,15 @@ def _column(name: str, values: Sequence) -> np.ndarray:
     return np.array([math.nan if x is None else x for x in values], float)
 
 
-def _grid_coordinates(dim: str, names: tuple[str, ...], rows: Sequence[tuple]) -> dict[str, Any]:
+def _grid_coordinates(
+    dim: str, names: tuple[str, ...], columns: Sequence[Sequence]
+) -> dict[str, Any]:
     """Return the coordinates of one grid: its values, or their numbers and a coordinate a name."""
-    columns = {}
-    for name, values in zip(names, zip(*rows, strict=True), strict=True):
+    found: dict[str, Any] = {}
+    for name, values in zip(names, columns, strict=True):
         simple = all(isinstance(x, int | float | str) for x in values)
-        columns[name] = (dim, list(values) if simple else [str(x) for x in values])
         if simple and len(names) == 1:
-            return columns
-    if len(names) == 1:
-        columns = {f"{dim}_value": columns[dim]}
-    return {dim: (dim, np.arange(len(rows))), **columns}
+            return {dim: (dim, list(values))}
+        own = name if len(names) > 1 else f"{name}_value"
+        found[own] = (dim, list(values) if simple else [str(x) for x in values])
+    return {dim: (dim, np.arange(len(columns[0]))), **found}
