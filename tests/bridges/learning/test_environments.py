@@ -6,9 +6,8 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import serpentail as st
-
-from ..support import zoo
-from ..support.rows import row
+from tests.support import zoo
+from tests.support.rows import row
 
 ACTIONS = np.random.default_rng(1).uniform(-1.2, 1.2, (25, 9, 2))
 TASKS = {"righting": "m1_n3", "landing": "ground", "self_recovery": "ground"}

@@ -1,5 +1,6 @@
 """How many points are sent as one block, and how many blocks a second."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,32 +62,26 @@ class Gate:
 
 
 class Group:
-    """Points of one model without rows, in order; each is sent once.
-
-    done: which points have rows; left: how many are not sent yet.
-    """
+    """Points of one model without rows, in order; ``left`` of them are not sent yet."""
 
     def __init__(self, posed: Posed, model: int, done: np.ndarray):
-        self.posed, self.model, self.done = posed, model, done
         self.bundle, self.pace = posed.bundles[model], Pace()
-        self.first = 0  # number that is looked at next
-        self.left = sum(len(self._window(k)) for k in range(0, len(done), MOST_IN_BLOCK))
+        self.left = sum(map(len, _missing(posed, model, done)))
+        self._windows = _missing(posed, model, done)
+        self._next = np.empty(0, np.int64)
 
     def take(self, workers: int) -> np.ndarray:
         """Return the numbers of the points of the next block."""
-        most = self.pace.block(self.left, workers)
-        parts, count = [np.empty(0, np.int64)], 0
-        while count < most and self.first < len(self.done):
-            window = self._window(self.first)
-            part = window[: most - count]
-            whole = len(part) == len(window)
-            self.first = self.first + MOST_IN_BLOCK if whole else int(part[-1]) + 1
-            parts.append(part)
-            count += len(part)
-        self.left -= count
-        return np.concatenate(parts)
+        count = self.pace.block(self.left, workers)
+        while len(self._next) < min(count, self.left):
+            self._next = np.concatenate([self._next, next(self._windows)])
+        block, self._next = np.split(self._next, [count])
+        self.left -= len(block)
+        return block
 
-    def _window(self, first: int) -> np.ndarray:
-        """Return the numbers among the next ones."""
-        numbers = first + np.flatnonzero(~self.done[first : first + MOST_IN_BLOCK])
-        return numbers[self.posed.models(numbers) == self.model]
+
+def _missing(posed: Posed, model: int, done: np.ndarray) -> Iterator[np.ndarray]:
+    """Yield the numbers of a model's points that are not done, in windows that need little room."""
+    for first in range(0, len(done), MOST_IN_BLOCK):
+        numbers = first + np.flatnonzero(~done[first : first + MOST_IN_BLOCK])
+        yield numbers[posed.models(numbers) == model]

@@ -12,6 +12,7 @@ import numpy as np
 
 from ...basics.checks import one_line
 from ...basics.errors import SweepError
+from ...basics.extras import needed
 from ...basics.short_repr import brief
 from .driver import Spent
 from .points import Axes, checked_row
@@ -19,7 +20,7 @@ from .pose import Posed
 from .runs import run_point
 from .shards import AT_ONCE, Row
 from .store import Store
-from .tables import dataset, frame, write
+from .tables import dataset, flat, write
 from .worker import model_of
 
 if TYPE_CHECKING:
@@ -103,22 +104,13 @@ class Sweep:
     def rows(self) -> list[dict[str, Any]]:
         """Return all rows that exist, in the order of their points.
 
-        Returns
-        -------
-        list of dict
-            Each has "number", the point's values, the run's outputs, "error" (None for success) and
-            "seconds" (s).
+        Each has "number", the point's values, the run's outputs, "error" (None for success) and
+        "seconds" (s).
         """
         return list(self)
 
     def status(self) -> Status:
-        """Return how far the sweep is, from the store's present content.
-
-        Returns
-        -------
-        Status
-            ``points``, ``done`` and ``failed``.
-        """
+        """Return how far the sweep is, from the store's present content."""
         self.store.look()
         return Status(len(self), int(self.store.done.sum()), self.store.failed)
 
@@ -153,80 +145,34 @@ class Sweep:
         return motion
 
     def view(self, k: int, path: str | PathLike[str] = "run.html") -> Path:
-        """Run a point again and write a page of its motion.
+        """Run a point again, write a page of its motion (.html), and return the file's path.
 
-        Parameters
-        ----------
-        k : int
-            Number of the point, from 0.
-        path : str or path, default "run.html"
-            The .html file.
-
-        Returns
-        -------
-        Path
-            The path of the file.
-
-        Raises
-        ------
-        SweepError, ViewError
-            As of ``motion`` and ``serpentail.view``.
+        SweepError as of ``motion``, ViewError as of ``serpentail.view``.
         """
         page: Path = self.motion(k).view(path)
         return page
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Convert the rows to a pandas table with one row for each point; needs the extra "pandas".
+        """Return the rows as a pandas table with one row for each point.
 
-        Returns
-        -------
-        pandas.DataFrame
-            The table.
-
-        Raises
-        ------
-        ExtraMissing
-            pandas is not installed.
+        ExtraMissing unless the extra "pandas" is installed.
         """
-        return frame(self)
+        pandas = needed("pandas", "pandas")
+        return pandas.DataFrame([flat(row) for row in self])
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Convert the rows to an xarray dataset; needs the extra "xarray".
+        """Return the rows as an xarray dataset.
 
-        Returns
-        -------
-        xarray.Dataset
-            It has a dimension for each grid, and "sample" for all other axes together. Points that
-            failed or have no row are NaN.
-
-        Raises
-        ------
-        ExtraMissing
-            xarray is not installed.
+        It has a dimension for each grid, and "sample" for all other axes together. Points that
+        failed or have no row are NaN. ExtraMissing unless the extra "xarray" is installed.
         """
         return dataset(self)
 
     def save(self, path: str | PathLike[str]) -> Path:
-        """Write the rows to a file, whole or not at all. A .nc file is made in memory, others are
-        not.
+        """Write the rows to a .parquet, .csv or .nc file, whole or not at all; return its path.
 
-        Parameters
-        ----------
-        path : str or path
-            A .parquet, .csv or .nc file.
-
-        Returns
-        -------
-        Path
-            The path of the file.
-
-        Raises
-        ------
-        SweepError
-            The suffix is another one.
-        ExtraMissing
-            The library for this file is not installed.
-        NotWritten
-            The file cannot be written.
+        A .nc file is made in memory, others are not. SweepError if the suffix is another one,
+        ExtraMissing if the library for this file is not installed, NotWritten if it cannot be
+        written.
         """
         return write(self, path)

@@ -16,7 +16,6 @@ from ...basics.files import refuse_unwritable, replacing, write_csv
 from .shards import AT_ONCE, parquet_library
 
 if TYPE_CHECKING:
-    import pandas
     import xarray
 
     from .result import Sweep
@@ -97,12 +96,6 @@ def flat(row: dict[str, Any], before: str = "") -> dict[str, Any]:
         else:
             columns[before + name] = value
     return columns
-
-
-def frame(sweep: "Sweep") -> "pandas.DataFrame":
-    """Return the rows as a table of pandas."""
-    pandas = needed("pandas", "pandas")
-    return pandas.DataFrame([flat(row) for row in sweep])
 
 
 def dataset(sweep: "Sweep") -> "xarray.Dataset":
