@@ -107,7 +107,9 @@ def test_starts_are_spread_as_asked_for(flyer):
     lying, walker = many("self_recovery", 50, tilt=0.2), zoo.model("ground")
     seen, _ = lying.reset(seed=0)
     assert (seen[:, 2] < -np.cos(0.3)).all()
-    points, _ = walker.contact_points(lying.worlds.q, lying.worlds.v, lying.worlds.given["legs"])
+    points, _ = walker.contact_points(
+        lying.worlds.q, lying.worlds.v, lying.worlds.step_settings["legs"]
+    )
     np.testing.assert_allclose(points[..., 2].min(axis=1), 1e-3, atol=1e-9)
 
 
