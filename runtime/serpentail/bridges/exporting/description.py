@@ -61,9 +61,9 @@ def description(model: Model, guid: str, sources: list[str]) -> bytes:
         numberOfEventIndicators=str(sum(model.contacts.values())),
     )
     shared = SHARED | {"providesDirectionalDerivative": "false" if model.contacts else "true"}
-    own = {"CoSimulation": {"canHandleVariableCommunicationStepSize": "true"}}
+    extra = {"CoSimulation": {"canHandleVariableCommunicationStepSize": "true"}}
     for kind in ("ModelExchange", "CoSimulation"):
-        able = {"modelIdentifier": model.name} | own.get(kind, {}) | shared
+        able = {"modelIdentifier": model.name} | extra.get(kind, {}) | shared
         files = Xml.SubElement(Xml.SubElement(root, kind, able), "SourceFiles")
         for name in sources:
             Xml.SubElement(files, "File", name=name)
@@ -82,12 +82,12 @@ def description(model: Model, guid: str, sources: list[str]) -> bytes:
 
 def _add_variables(root: Xml.Element, model: Model) -> None:
     """Add all variables in the order of their references, and which are outputs and derivatives."""
-    found = [*_states(model)]
+    states = [*_states(model)]
     variables = Xml.SubElement(root, "ModelVariables")
     output = {"causality": "output", "variability": "continuous", "initial": "exact"}
-    for each in found:
+    for each in states:
         _add(variables, each, output)
-    for index, each in enumerate(found, 1):
+    for index, each in enumerate(states, 1):
         rate = FmuVariable(f"der({each.name})", f"rate of {each.name}", RATES[each.unit])
         real = _add(variables, rate, {"causality": "local", "variability": "continuous"})
         real.set("derivative", str(index))
@@ -96,7 +96,7 @@ def _add_variables(root: Xml.Element, model: Model) -> None:
     for each in _parameters(model):
         _add(variables, each, {"causality": "parameter", "variability": "tunable"})
     # indices from 1: states, then their derivatives
-    structure, n = Xml.SubElement(root, "ModelStructure"), len(found)
+    structure, n = Xml.SubElement(root, "ModelStructure"), len(states)
     lists = {"Outputs": 0, "Derivatives": n, "InitialUnknowns": n}
     for name, first in lists.items():
         unknowns = Xml.SubElement(structure, name)

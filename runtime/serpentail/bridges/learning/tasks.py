@@ -70,10 +70,10 @@ def _up_to(name: str, value: Any, most: float) -> float:
     try:
         return number(name, value, SimulationError, least=0, most=most)
     except SimulationError as error:
-        given = numbers_in(value)
-        if UNITS[name] != "rad" or given is None or given.shape != ():
+        angle = numbers_in(value)
+        if UNITS[name] != "rad" or angle is None or angle.shape != ():
             raise
-        remedy = f', or "{given:g} deg"' if most < given <= np.degrees(most) else ""
+        remedy = f', or "{angle:g} deg"' if most < angle <= np.degrees(most) else ""
         raise SimulationError(f"{error} rad{remedy}") from None
 
 

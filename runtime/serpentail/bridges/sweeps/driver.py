@@ -5,7 +5,6 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from contextlib import suppress
-from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from typing import Any, NamedTuple
 
@@ -15,10 +14,9 @@ from ...basics.errors import SerpentailError, SweepError
 from ...basics.progress import Stage
 from .blocks import Gate, Group
 from .executors import Place, place_of
-from .pose import Posed
+from .result import Sweep
 from .runs import run_points
-from .store import Store
-from .supervision import Block, Result, Task, run_block
+from .supervision import Block, BlockSettings, Result, run_block
 from .worker import model_of
 
 AHEAD = 2  # blocks a worker, so that none waits
@@ -39,27 +37,15 @@ class Work(NamedTuple):
     tries: int = 0
 
 
-@dataclass
-class Spent:
-    """What a sweep took: elapsed seconds, seconds of all workers, blocks, points, workers; and how
-    many points hung.
-    """
-
-    wall_s: float = 0.0
-    busy_s: float = 0.0
-    blocks: int = 0
-    points: int = 0
-    workers: int = 1
-    hung: int = 0
-
-
 class Driver:
     """Runs all points of a sweep that have no rows; these come into the store."""
 
-    def __init__(self, store: Store, posed: Posed, task: Task, name: str, spent: Spent):
-        self.store, self.posed, self.task, self.name, self.spent = store, posed, task, name, spent
-        self.groups = [Group(posed, k, store.done) for k in range(len(posed.bundles))]
-        self.done, self.failed = int(store.done.sum()), store.failed
+    def __init__(self, sweep: Sweep, settings: BlockSettings, name: str):
+        self.store, self.posed, self.spent = sweep.store, sweep.posed, sweep.spent
+        self.settings, self.name = settings, name
+        models = range(len(self.posed.bundles))
+        self.groups = [Group(self.posed, model, self.store.done) for model in models]
+        self.done, self.failed = int(self.store.done.sum()), self.store.failed
         self.sent: dict[Future, Work] = {}
         self.ended: SimpleQueue[Future] = SimpleQueue()
         self.lost: deque[Work] = deque()  # blocks whose worker is gone
@@ -74,7 +60,7 @@ class Driver:
         begun = time.perf_counter()
         with Stage("sweep", self.name) as stage:
             self._tell(stage)
-            if executor is None and self.task.limit is None and self.posed.job.run == "simulate":
+            if executor is None and self.settings.limit is None and self.settings.together:
                 self._run_here(stage)
             if self.left:
                 with place_of(executor) as place:
@@ -92,7 +78,7 @@ class Driver:
                 points = zip(numbers.tolist(), self.posed.axes.at(numbers), strict=True)
                 parts = run_points(self.posed.job, model, dict(points))
                 rows = [row for part in parts for row in part]
-                self._keep(group, Result.of(rows, len(numbers), self.task.store))
+                self._keep(group, Result.of(rows, len(numbers), self.settings.store))
                 self._tell(stage)
 
     def _run_at(self, place: Place, stage: Stage) -> None:
@@ -145,10 +131,12 @@ class Driver:
     def _block(self, work: Work) -> Block:
         """Return points as they travel."""
         axes, places = self.posed.axes.part(work.numbers)
-        return Block(self.task, work.group.bundle, axes, places, work.numbers)
+        return Block(self.settings, work.group.bundle, axes, places, work.numbers)
 
     def _keep(self, group: Group, result: Result) -> None:
         """Take notice of the rows of a block."""
+        if result.refusal:
+            raise SweepError(result.refusal)
         points = 0
         if result.shard is not None:
             self.store.accept(result.shard)

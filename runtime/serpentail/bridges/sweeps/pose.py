@@ -94,9 +94,9 @@ def pose(what: Any, axes: Axes, job: Job, of: Any) -> Posed:
     _refuse_twice(axes, [texts for _, texts in grids])
 
     # one model for each place on the axes that decide on it; the last axis has all spreads
-    decide = [not job.built.isdisjoint(names) for names in axes.grids]
-    decide += [not job.built.isdisjoint(axes.spreads)] if axes.spreads else []
-    shape = [size if own else 1 for own, size in zip(decide, axes.sizes, strict=True)]
+    decides = [not job.built.isdisjoint(names) for names in axes.grids]
+    decides += [not job.built.isdisjoint(axes.spreads)] if axes.spreads else []
+    shape = [size if several else 1 for several, size in zip(decides, axes.sizes, strict=True)]
     models = np.arange(np.prod(shape))
     firsts = np.ravel_multi_index(np.unravel_index(models, shape), axes.sizes)
     bundles = [subject.bundle(point) for point in axes.at(firsts)]
@@ -190,8 +190,8 @@ def _of_scene(scene: Any, axes: Axes, job: Job) -> Subject:
     others = [name for name in axes.names if name not in {*keys, *shape}]
     if isinstance(job.run, str):
         _refuse_unknown(others, job.run, Parameters.__annotations__)  # before a model is made
-    made = tables | {name: first[name] for name in shape}
-    checked, left = built(made, path.stem, {name: first[name] for name in others})
+    first_scene = tables | {name: first[name] for name in shape}
+    checked, left = built(first_scene, path.stem, {name: first[name] for name in others})
     known = _parameter_units(checked.manifest)
     units |= {name: known[name] for name in others if name in known}
     if isinstance(job.run, str):
@@ -201,8 +201,8 @@ def _of_scene(scene: Any, axes: Axes, job: Job) -> Subject:
     making = [name for name in others if name not in keys and name not in (left or {})]
 
     def bundle(point: Point) -> Bundle:
-        made = tables | {name: point[name] for name in shape}
-        checked, _ = built(made, path.stem, {name: point[name] for name in making})
+        scene = tables | {name: point[name] for name in shape}
+        checked, _ = built(scene, path.stem, {name: point[name] for name in making})
         return Bundle.of(checked)
 
     job = replace(

@@ -14,7 +14,6 @@ from ...basics.checks import one_line
 from ...basics.errors import SweepError
 from ...basics.extras import needed
 from ...basics.short_repr import brief
-from .driver import Spent
 from .points import Axes, checked_row
 from .pose import Posed
 from .runs import run_point
@@ -43,6 +42,20 @@ class Status:
         )
 
 
+@dataclass
+class Spent:
+    """What a sweep took: elapsed seconds, seconds of all workers, blocks, points, workers; and how
+    many points hung.
+    """
+
+    wall_s: float = 0.0
+    busy_s: float = 0.0
+    blocks: int = 0
+    points: int = 0
+    workers: int = 1
+    hung: int = 0
+
+
 @dataclass(frozen=True, eq=False)
 class Sweep:
     """The rows of a sweep; ``sweep[k]`` is the row of point k, and ``len(sweep)`` their number.
@@ -63,7 +76,7 @@ class Sweep:
 
     posed: Posed = field(repr=False)
     store: Store = field(repr=False)
-    spent: Spent
+    spent: Spent = field(default_factory=Spent)
     __repr__ = brief
 
     @property
@@ -76,10 +89,10 @@ class Sweep:
 
     def __getitem__(self, k: int) -> dict[str, Any]:
         """Return the row of point k; KeyError if it has none yet, IndexError if k is no point."""
-        found = self.store.row(range(len(self))[k])
-        if found is None:
+        row = self.store.row(range(len(self))[k])
+        if row is None:
             raise KeyError(f"point {k} has no row yet")
-        return self._row(found, self.axes.at([found.number])[0])
+        return self._row(row, self.axes.at([row.number])[0])
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
         """Yield all rows that exist, in the order of their points."""

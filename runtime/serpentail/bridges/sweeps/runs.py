@@ -75,9 +75,7 @@ def _simulated(job: Job, model: Model, point: Point) -> tuple[dict[str, Any], Tr
     if job.table is not None:
         motion = _scenario(job, model, point).simulate(**job.settings)
     else:
-        arguments = {**job.settings, **job.keys_of(point)}
-        q0, v0 = (arguments.pop(name) for name in STARTS)
-        motion = simulate(model, q0, v0, **arguments)
+        motion = simulate(model, **{**job.settings, **job.keys_of(point)})
     assert isinstance(motion, Trajectory)
     return _outputs(motion, job.outputs), motion
 
@@ -100,21 +98,20 @@ def _identified(job: Job, model: Model, point: Point) -> tuple[dict[str, Any], A
     from ...identification.identify import identify
     from ...scenes.identify import identify_arguments
 
-    arguments = job.keys_of(point)
-    arguments.pop(DATA, None)
+    keys = {name: value for name, value in job.keys_of(point).items() if name != DATA}
     if job.table is not None:
-        table = changed(job.table, arguments)
+        table = changed(job.table, keys)
         arguments = {**identify_arguments(table, size_of(model)), **job.settings}
     else:
-        arguments = {**job.settings, **arguments}
+        arguments = {**job.settings, **keys}
     arguments.pop(DATA, None)
     markers, estimate = arguments.pop("markers"), arguments.pop("estimate", ())
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        found = identify(model, job.recordings(point), markers, estimate, **arguments)
-    report = found.report
+        result = identify(model, job.recordings(point), markers, estimate, **arguments)
+    report = result.report | {"warnings": [str(warning.message) for warning in caught]}
     del report["seconds"]  # which each row has
-    return report | {"warnings": [str(each.message) for each in caught]}, found
+    return report, result
 
 
 def _scenario(job: Job, model: Model, point: Point) -> Scenario:
@@ -155,26 +152,26 @@ def _side_by_side(job: Job, model: Model, points: Sequence[Point]) -> list[Outco
     )
     parameters = [job.parameters_of(point) for point in points]
     runs = {name: [each[name] for each in parameters] for name in parameters[0]}
-    found = flight.simulate(**settings, parameters=runs)
-    assert isinstance(found, Rollouts)
-    return _outcomes(found, job.outputs)
+    rollouts = flight.simulate(**settings, parameters=runs)
+    assert isinstance(rollouts, Rollouts)
+    return _outcomes(rollouts, job.outputs)
 
 
-def _outcomes(found: Rollouts, outputs: Sequence[str]) -> list[Outcome]:
+def _outcomes(rollouts: Rollouts, outputs: Sequence[str]) -> list[Outcome]:
     """Return the outcomes of runs."""
-    last = np.maximum(np.isfinite(found.kinetic).sum(axis=1) - 1, 0)
-    every = np.arange(len(found))
-    arrays = (found.q, found.v, found.kinetic, found.potential)
-    columns = [found.ends.tolist(), *(x[every, last].tolist() for x in arrays)]
+    last = np.maximum(np.isfinite(rollouts.kinetic).sum(axis=1) - 1, 0)
+    every = np.arange(len(rollouts))
+    arrays = (rollouts.q, rollouts.v, rollouts.kinetic, rollouts.potential)
+    columns = [rollouts.ends.tolist(), *(x[every, last].tolist() for x in arrays)]
     ends = dict(zip(ENDS, columns, strict=True))
     outcomes: list[Outcome] = []
-    for k, error in enumerate(found.errors):
+    for k, error in enumerate(rollouts.errors):
         if error is not None:
             outcomes.append((None, _error_text(error)))
         elif ends.keys() >= set(outputs):
             outcomes.append((json.dumps({name: ends[name][k] for name in outputs}), None))
         else:
-            outcomes.append((json.dumps(_outputs(found[k], outputs)), None))
+            outcomes.append((json.dumps(_outputs(rollouts[k], outputs)), None))
     return outcomes
 
 

@@ -37,7 +37,7 @@ COMMAND = "from serpentail.bridges.sweeps.worker import main; main({})"
 
 
 @dataclass(frozen=True)
-class Task:
+class BlockSettings:
     """What all blocks of a sweep have in common.
 
     job: pickled; script: the driver's main program, None if the job needs none of its names; limit:
@@ -55,7 +55,7 @@ class Task:
 class Block(NamedTuple):
     """Points of one model: axes, places: what makes the points; numbers: of their rows."""
 
-    task: Task
+    settings: BlockSettings
     bundle: Bundle | None
     axes: Axes
     places: np.ndarray
@@ -65,12 +65,14 @@ class Block(NamedTuple):
 class Result(NamedTuple):
     """What came of a block: a shard, None if it has no row; seconds of its rows; points that hung.
 
-    The shard is written if the worker sees its store.
+    The shard is written if the worker sees its store. refusal: why no process can run the points;
+    it is no exception, because Dask would print that.
     """
 
-    shard: Shard | None
-    seconds: float
-    hung: int
+    shard: Shard | None = None
+    seconds: float = 0.0
+    hung: int = 0
+    refusal: str = ""
 
     @classmethod
     def of(cls, rows: list[Row], points: int, store: ShardFolder | None) -> "Result":
@@ -82,16 +84,16 @@ class Result(NamedTuple):
 
 
 def run_block(block: Block) -> Result:
-    """Run a block, and write its shard.
-
-    NotWritten if it cannot be written; SweepError if no process can run its points.
-    """
+    """Run a block, and write its shard; NotWritten if it cannot be written."""
     rows: list[Row] = []
     for first in range(0, len(block.places), TOGETHER):
         part = slice(first, first + TOGETHER)
         points = zip(block.numbers[part].tolist(), block.axes.at(block.places[part]), strict=True)
-        rows += _rows(block, dict(points))
-    return Result.of(rows, len(block.numbers), block.task.store)
+        try:
+            rows += _rows(block, dict(points))
+        except SweepError as reason:
+            return Result(refusal=str(reason))
+    return Result.of(rows, len(block.numbers), block.settings.store)
 
 
 def _rows(block: Block, left: dict[int, Point]) -> Iterator[Row]:
@@ -117,14 +119,14 @@ def _rows(block: Block, left: dict[int, Point]) -> Iterator[Row]:
             hangs, status = isinstance(reason, TimeoutError), process.end()
         # it was at the first point that is left, unless it ran all at once
         number = next(iter(left))
-        if block.task.together and len(points) > 1 and len(points) == len(left):
+        if block.settings.together and len(points) > 1 and len(points) == len(left):
             one_by_one = True
             continue
         ends[number] += 1
         if hangs or status == -signal.SIGPROF or ends[number] >= TRIES:
             del left[number]
             if not hangs:
-                error = _error_text(status, block.task.limit)
+                error = _error_text(status, block.settings.limit)
                 yield Row(number, None, error, time.perf_counter() - begun)
 
 
@@ -157,9 +159,10 @@ class Process:
         TimeoutError if a point hangs, EOFError or OSError if the process ends, SweepError if it
         cannot run them.
         """
-        task, limit = block.task, block.task.limit or 0.0  # of one point
-        first_limit = limit * len(points) if task.together else limit  # of what comes first
-        self.link.send((task.script, task.job, block.bundle, points, first_limit, limit))
+        settings = block.settings
+        limit = settings.limit or 0.0  # of one point
+        first_limit = limit * len(points) if settings.together else limit  # of what comes first
+        self.link.send((settings.script, settings.job, block.bundle, points, first_limit, limit))
         patience = 0.0  # s until the next answer; none until it has made the model
         while True:
             used = self._processor_time()

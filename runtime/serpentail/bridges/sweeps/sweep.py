@@ -11,14 +11,14 @@ from ...basics.checks import none_of, number, one_of, refusal, shown
 from ...basics.errors import SweepError
 from ...model.model import Model
 from .axis import Grid, Spread, plain
-from .driver import Driver, Spent
+from .driver import Driver
 from .job import RUNS, STARTS, Job
 from .points import axes_of
 from .pose import pose
 from .result import Sweep
 from .runs import ENDS, OUTPUTS
 from .store import Store
-from .supervision import Task
+from .supervision import BlockSettings
 from .worker import importing
 
 WITHOUT = ("watch", "threads", "parameters")  # settings of a run that a sweep has itself
@@ -108,19 +108,19 @@ def sweep(  # noqa: PLR0913 - the public face names all that it takes
             "the main program calls sweep where a worker imports its functions: put the call below "
             'the line if __name__ == "__main__":'
         )
-    found = posed(
+    rows = posed(
         model, over, run, store, points=points, seed=seed, settings=settings, outputs=outputs, of=of
     )
     limit = None if limit is None else number("limit", limit, SweepError, above=0)
     name = model.name if isinstance(model, Model) else Path(model or _function_name(run)).stem
-    job = found.posed.job.pickled()
+    job = rows.posed.job.pickled()
     script = _script(job)
-    with found.store.writing():
+    with rows.store.writing():
         if retry_failed:
-            found.store.forget()
-        task = Task(job, script, limit, run == "simulate", found.store.place)
-        Driver(found.store, found.posed, task, name, found.spent).drive(executor)
-    return found
+            rows.store.forget()
+        shared = BlockSettings(job, script, limit, run == "simulate", rows.store.place)
+        Driver(rows, shared, name).drive(executor)
+    return rows
 
 
 def posed(  # noqa: PLR0913 - the arguments of ``sweep`` on which rows depend
@@ -144,7 +144,7 @@ def posed(  # noqa: PLR0913 - the arguments of ``sweep`` on which rows depend
     job.identity()  # refuses functions that other processes cannot import
     job.pickled()
     problem = pose(model, axes, job, of)
-    return Sweep(problem, Store(store, problem.spec, len(axes)), Spent())
+    return Sweep(problem, Store(store, problem.spec, len(axes)))
 
 
 def _settings(settings: Any, run: Any) -> dict[str, Any]:

@@ -137,6 +137,6 @@ def _grid_coordinates(
         simple = all(isinstance(x, int | float | str) for x in values)
         if simple and len(names) == 1:
             return {dim: (dim, list(values))}
-        own = name if len(names) > 1 else f"{name}_value"
-        found[own] = (dim, list(values) if simple else [str(x) for x in values])
+        key = name if len(names) > 1 else f"{name}_value"
+        found[key] = (dim, list(values) if simple else [str(x) for x in values])
     return {dim: (dim, np.arange(len(columns[0]))), **found}
