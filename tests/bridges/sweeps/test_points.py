@@ -8,8 +8,7 @@ import pytest
 from scipy.stats import kstest
 
 import serpentail as st
-from serpentail.bridges.sweeps.draws import permuted
-from serpentail.bridges.sweeps.points import axes_of
+from serpentail.bridges.sweeps.points import axes_of, permuted
 from tests.support.rows import row as named
 
 
