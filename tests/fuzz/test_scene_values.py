@@ -7,7 +7,7 @@ import warnings
 import pytest
 
 import serpentail as st
-from serpentail.bridges.sweeps.axes import axes_of
+from serpentail.bridges.sweeps.points import axes_of
 from serpentail.bridges.sweeps.scene import arguments_of
 from serpentail.scenes import identify_keys, phase_keys, plan_keys, simulate_keys, sweep_keys
 from serpentail.scenes.identify import identify_arguments

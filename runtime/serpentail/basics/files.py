@@ -22,7 +22,7 @@ except ImportError:  # Windows, where no part is locked, and none is swept
 PART = re.compile(r"\..+\.[0-9a-f]{8}\.part")
 # begins a text, but no number, that a spreadsheet would run, with or without a ' in front
 FORMULA = re.compile(r"'*(?![-+]?[\d.]+(e[-+]?\d+)?$)[-=+@\t\r\n]", re.IGNORECASE)
-LEFT_AFTER = 60.0  # s without a change, after which a part that no process holds was left by a kill
+ABANDONED_AFTER_S = 60.0  # without a change: a part that no process holds was left by a kill
 
 
 @contextlib.contextmanager
@@ -42,8 +42,8 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
             else:
                 folder = target.parent
                 folder.mkdir(parents=True, exist_ok=True)
-                _remove_left(folder)
-            part = after.enter_context(_held(folder, target.name))
+                _remove_abandoned(folder)
+            part = after.enter_context(_locked_part(folder, target.name))
             yield part
             if special:
                 with part.open("rb") as content, target.open("wb") as stream:
@@ -86,7 +86,7 @@ def without_quote(text: str) -> str:
 
 
 @contextlib.contextmanager
-def _held(folder: Path, name: str) -> Iterator[Path]:
+def _locked_part(folder: Path, name: str) -> Iterator[Path]:
     """Make an empty part, locked while this process uses it, and remove it if it is still there."""
     part = folder / f".{name}.{secrets.token_hex(4)}.part"
     handle = os.open(part, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
@@ -103,7 +103,7 @@ def _held(folder: Path, name: str) -> Iterator[Path]:
             os.close(handle)
 
 
-def _remove_left(folder: Path) -> None:
+def _remove_abandoned(folder: Path) -> None:
     """Remove parts that killed processes left in a folder, where locks tell which these are."""
     if fcntl is None:
         return
@@ -111,7 +111,7 @@ def _remove_left(folder: Path) -> None:
         parts = [entry.path for entry in entries if PART.fullmatch(entry.name)]
     for part in parts:
         with contextlib.suppress(OSError):  # it is held, or gone
-            if time.time() - os.stat(part).st_mtime > LEFT_AFTER:
+            if time.time() - os.stat(part).st_mtime > ABANDONED_AFTER_S:
                 handle = os.open(part, os.O_RDWR)
                 try:
                     fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -21,15 +21,15 @@ from ...model.model import Model
 SOURCE = Path(__file__).with_name("native") / "jax_calls.cc"
 TARGET = "serpentail_call"
 LIBRARIES = ("-Wl,--no-as-needed,-lstdc++", "-pthread")
-kept: dict[str, Any] = {}  # objects that entries point to, by the entries' names
+alive: dict[str, Any] = {}  # what registered functions point to, by their names
 
 
-class Entry(ctypes.Structure):
+class XlaFunction(ctypes.Structure):
     """A function of a model, as the C++ code knows it."""
 
     _fields_ = (
-        *((name, ctypes.c_void_p) for name in ("single", "together", "parameters")),
-        *((name, ctypes.c_size_t) for name in ("single_work", "together_work", "states")),
+        *((name, ctypes.c_void_p) for name in ("single", "many", "parameters")),
+        *((name, ctypes.c_size_t) for name in ("single_work", "many_work", "states")),
         *((name, ctypes.c_size_t) for name in ("bytes", "least", "threads")),
     )
 
@@ -40,39 +40,38 @@ def library() -> ctypes.CDLL:
     version = f'-DJAX_VERSION="{jax.__version__}"'
     flags = ("-std=c++17", "-I", jax.ffi.include_dir(), version, *LIBRARIES)
     try:
-        found = opened(lambda: compile_library([SOURCE], SOURCE.parent, flags=flags))
+        code = opened(lambda: compile_library([SOURCE], SOURCE.parent, flags=flags))
     except CompileFailed as error:
         raise CompileFailed(
             f"jax_functions: a C++17 compiler is needed beside that of C, such as g++: {error}"
         ) from error
-    found.serpentail_enter.argtypes = (ctypes.c_char_p, ctypes.c_void_p)
-    found.serpentail_enter.restype = None
-    capsule = jax.ffi.pycapsule(getattr(found, TARGET))
+    code.serpentail_enter.argtypes = (ctypes.c_char_p, ctypes.c_void_p)
+    code.serpentail_enter.restype = None
+    capsule = jax.ffi.pycapsule(getattr(code, TARGET))
     jax.ffi.register_ffi_target(TARGET, capsule, platform="cpu")
-    return found
+    return code
 
 
-def entered(model: Model, function: str) -> str:
+def registered(model: Model, function: str) -> str:
     """Return the name under which XLA calls a function of a model; compiles its batches."""
-    kernel, parameters = model.kernel(function), model.parameter_vector
+    kernel, parameters = model.kernel(function), np.array(model.parameter_vector)
     digest = hashlib.sha256(parameters.tobytes()).hexdigest()[:16]
     name = f"{model.name}/{model.checked.manifest_hash}/{model.profile}/{digest}/{function}"
-    if name in kept:
+    if name in alive:
         return name
     batches, size = model.batch_library, parameters.itemsize
-    together = batches.entry(function, MIN_BATCH)
-    own = np.array(parameters)
-    entry = Entry(
+    many = batches.entry(function, MIN_BATCH)
+    entry = XlaFunction(
         single=ctypes.cast(kernel.function, ctypes.c_void_p),
-        together=together and ctypes.cast(together, ctypes.c_void_p),  # type: ignore[arg-type]
-        parameters=address_of(own),
+        many=many and ctypes.cast(many, ctypes.c_void_p),  # type: ignore[arg-type]
+        parameters=address_of(parameters),
         single_work=kernel.work * size,
-        together_work=batches.work.get(function, 0) * size,
+        many_work=batches.work.get(function, 0) * size,
         states=batches.states,
         bytes=size,
         least=MIN_STATES_PER_THREAD,
         threads=threads(batches.threads),
     )
     library().serpentail_enter(name.encode(), ctypes.byref(entry))
-    kept[name] = model.library, together, own
+    alive[name] = model.library, many, parameters
     return name

@@ -41,10 +41,10 @@ def zipped(files: dict[str, bytes]) -> bytes:
 
     It is not compressed, because versions of zlib compress differently.
     """
-    made = io.BytesIO()
-    with zipfile.ZipFile(made, "w", zipfile.ZIP_STORED) as archive:
+    archived = io.BytesIO()
+    with zipfile.ZipFile(archived, "w", zipfile.ZIP_STORED) as archive:
         for name, content in sorted(files.items()):
             entry = zipfile.ZipInfo(name, BEGINNING)
             entry.external_attr, entry.create_system = RIGHTS, UNIX
             archive.writestr(entry, content)
-    return made.getvalue()
+    return archived.getvalue()

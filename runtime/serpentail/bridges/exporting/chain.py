@@ -82,29 +82,19 @@ def chain_of(model: Model, kind: str) -> Chain:
     _refuse_other(model, kind)
     p = model.parameters
     numbers = [(i + 1, j + 1) for i, count in enumerate(model.joints_each) for j in range(count)]
-    masses, lengths, centers, inertias = _links(model, len(numbers))
-    own = "link_masses" in p
-    radii = tail_radii(model).tolist() if own else [usual_radius(model)] * len(numbers)
-    places = [p["tail_mount"], *((0.0, -length, 0.0) for length in lengths)]
-    links = tuple(
-        Link(*number, *rest)
-        for number, *rest in zip(
-            numbers,
-            places[:-1],
-            [_mount_turn(model), *[NO_TURN] * (len(numbers) - 1)],
-            lengths,
-            masses,
-            [(0.0, -center, 0.0) for center in centers],
-            inertias,
-            radii,
-            strict=True,
-        )
-    )
+    place, turn = p["tail_mount"], _mount_turn(model)
+    links: list[Link] = []
+    for (segment, number), body in zip(numbers, _bodies(model, len(numbers)), strict=True):
+        length, mass, center, inertia, radius = body
+        com = (0.0, -center, 0.0)
+        link = Link(segment, number, place, turn, length, mass, com, inertia, radius)
+        links.append(link)
+        place, turn = link.end, NO_TURN
     joints = [link.joint(axis) for link in links if link.number == 1 for axis, _ in AXES]
     none = (0.0,) * len(joints)
     columns = zip(*(p.get(f"tail_{name}", none) for name in Passive._fields), strict=True)
     passive = dict(zip(joints, map(Passive._make, columns), strict=True))
-    return Chain(links, passive, p["torso_mass"], p["torso_inertia"])
+    return Chain(tuple(links), passive, p["torso_mass"], p["torso_inertia"])
 
 
 def _refuse_other(model: Model, kind: str) -> None:
@@ -121,18 +111,18 @@ def _refuse_other(model: Model, kind: str) -> None:
     raise ExportError(f"kind: value {kind!r}: needs {needs} ({model.name}): {remedy}")
 
 
-def _links(model: Model, count: int) -> tuple[list, list, list, list]:
-    """Return the links' masses, lengths, distances from joint to COM, moments of inertia."""
+def _bodies(model: Model, count: int) -> Iterable[tuple]:
+    """Return length, mass, distance from joint to COM, moments of inertia and radius of links."""
     p = model.parameters
     if "link_masses" not in p:
         length = p["tail_length"] / count
-        equal = (p["tail_mass"] / count, length, length / 2, p["link_inertia"])
-        masses, lengths, centers, inertias = ([each] * count for each in equal)
-        return masses, lengths, centers, inertias
-    names = ("link_masses", "link_lengths", "link_centers")
-    masses, lengths, centers = (np.ravel(p[name]).tolist() for name in names)
-    inertias = np.reshape(p["link_inertias"], (count, 3)).tolist()
-    return masses, lengths, centers, [tuple(each) for each in inertias]
+        body = (length, p["tail_mass"] / count, length / 2, p["link_inertia"], usual_radius(model))
+        return [body] * count
+    lengths, masses, centers = (
+        np.ravel(p[f"link_{name}"]).tolist() for name in ("lengths", "masses", "centers")
+    )
+    inertias = map(tuple, np.reshape(p["link_inertias"], (count, 3)).tolist())
+    return zip(lengths, masses, centers, inertias, tail_radii(model).tolist(), strict=True)
 
 
 def _mount_turn(model: Model) -> Vector:

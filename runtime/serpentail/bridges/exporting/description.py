@@ -7,6 +7,7 @@ from xml.etree import ElementTree as Xml
 from ... import __version__
 from ...model.model import Model
 from ...show.page.shape import length
+from .export import xml_file
 
 # our unit -> FMI's: its name, and exponents of SI's base units
 UNITS: dict[str, tuple[str, dict[str, int] | None]] = {
@@ -37,7 +38,7 @@ SHARED = {  # of both kinds of interface
 }
 
 
-class Variable(NamedTuple):
+class FmuVariable(NamedTuple):
     """A variable: name, description, unit and start value; computed ones have no start value."""
 
     name: str
@@ -60,9 +61,9 @@ def description(model: Model, guid: str, sources: list[str]) -> bytes:
         numberOfEventIndicators=str(sum(model.contacts.values())),
     )
     shared = SHARED | {"providesDirectionalDerivative": "false" if model.contacts else "true"}
-    own = {"CoSimulation": {"canHandleVariableCommunicationStepSize": "true"}}
+    extra = {"CoSimulation": {"canHandleVariableCommunicationStepSize": "true"}}
     for kind in ("ModelExchange", "CoSimulation"):
-        able = {"modelIdentifier": model.name} | own.get(kind, {}) | shared
+        able = {"modelIdentifier": model.name} | extra.get(kind, {}) | shared
         files = Xml.SubElement(Xml.SubElement(root, kind, able), "SourceFiles")
         for name in sources:
             Xml.SubElement(files, "File", name=name)
@@ -76,27 +77,26 @@ def description(model: Model, guid: str, sources: list[str]) -> bytes:
     Xml.SubElement(categories, "Category", name="logStatusError")
     Xml.SubElement(root, "DefaultExperiment", startTime="0", stopTime="0.5")
     _add_variables(root, model)
-    Xml.indent(root)
-    return bytes(Xml.tostring(root, encoding="utf-8", xml_declaration=True)) + b"\n"
+    return xml_file(root)
 
 
 def _add_variables(root: Xml.Element, model: Model) -> None:
     """Add all variables in the order of their references, and which are outputs and derivatives."""
-    found = [*_states(model)]
+    states = [*_states(model)]
     variables = Xml.SubElement(root, "ModelVariables")
     output = {"causality": "output", "variability": "continuous", "initial": "exact"}
-    for each in found:
+    for each in states:
         _add(variables, each, output)
-    for index, each in enumerate(found, 1):
-        rate = Variable(f"der({each.name})", f"rate of {each.name}", RATES[each.unit])
+    for index, each in enumerate(states, 1):
+        rate = FmuVariable(f"der({each.name})", f"rate of {each.name}", RATES[each.unit])
         real = _add(variables, rate, {"causality": "local", "variability": "continuous"})
         real.set("derivative", str(index))
-    for each in (*_torques(model), *_legs(model)):
+    for each in _inputs(model):
         _add(variables, each, {"causality": "input", "variability": "continuous"})
     for each in _parameters(model):
         _add(variables, each, {"causality": "parameter", "variability": "tunable"})
     # indices from 1: states, then their derivatives
-    structure, n = Xml.SubElement(root, "ModelStructure"), len(found)
+    structure, n = Xml.SubElement(root, "ModelStructure"), len(states)
     lists = {"Outputs": 0, "Derivatives": n, "InitialUnknowns": n}
     for name, first in lists.items():
         unknowns = Xml.SubElement(structure, name)
@@ -104,7 +104,7 @@ def _add_variables(root: Xml.Element, model: Model) -> None:
             Xml.SubElement(unknowns, "Unknown", index=str(index))
 
 
-def _add(variables: Xml.Element, each: Variable, role: dict[str, str]) -> Xml.Element:
+def _add(variables: Xml.Element, each: FmuVariable, role: dict[str, str]) -> Xml.Element:
     """Add a variable, whose reference is its index; return the element of its type."""
     head = {"name": each.name, "valueReference": str(len(variables)), "description": each.meaning}
     scalar = Xml.SubElement(variables, "ScalarVariable", head | role)
@@ -116,26 +116,26 @@ def _add(variables: Xml.Element, each: Variable, role: dict[str, str]) -> Xml.El
     return real
 
 
-def _states(model: Model) -> Iterator[Variable]:
+def _states(model: Model) -> Iterator[FmuVariable]:
     """Yield q, v and bristles; the start is upright, straight, at rest, and clear of the ground."""
     for k, (axis, place) in enumerate(zip(AXES, (0.0, 0.0, height(model)), strict=True), 1):
-        yield Variable(f"q[{k}]", f"position of B, {axis} of the world", "m", place)
+        yield FmuVariable(f"q[{k}]", f"position of B, {axis} of the world", "m", place)
     for k, part in enumerate("wxyz", 4):
         meaning = f"attitude of the torso, {part} of a quaternion of any norm but 0"
-        yield Variable(f"q[{k}]", meaning, "1", 1.0 if part == "w" else 0.0)
+        yield FmuVariable(f"q[{k}]", meaning, "1", 1.0 if part == "w" else 0.0)
     for k, name in enumerate(_coordinates(model), 8):
-        yield Variable(f"q[{k}]", name, "rad", 0.0)
+        yield FmuVariable(f"q[{k}]", name, "rad", 0.0)
     for k, axis in enumerate(AXES, 1):
-        yield Variable(f"v[{k}]", f"velocity of B, {axis} of the world", "m/s", 0.0)
+        yield FmuVariable(f"v[{k}]", f"velocity of B, {axis} of the world", "m/s", 0.0)
     for k, axis in enumerate(AXES, 4):
-        yield Variable(f"v[{k}]", f"angular velocity, {axis} of the torso", "rad/s", 0.0)
+        yield FmuVariable(f"v[{k}]", f"angular velocity, {axis} of the torso", "rad/s", 0.0)
     for k, name in enumerate(_coordinates(model), 7):
-        yield Variable(f"v[{k}]", f"rate of {name}", "rad/s", 0.0)
+        yield FmuVariable(f"v[{k}]", f"rate of {name}", "rad/s", 0.0)
     for k in range(2 * sum(model.contacts.values())):
         meaning = (
             f"stretch of the friction spring of point {k // 2 + 1}, {AXES[k % 2]} of the world"
         )
-        yield Variable(f"bristle[{k + 1}]", meaning, "m", 0.0)
+        yield FmuVariable(f"bristle[{k + 1}]", meaning, "m", 0.0)
 
 
 def height(model: Model) -> float:
@@ -148,18 +148,14 @@ def legs(model: Model) -> int:
     return 8 if "feet" in model.contacts else 0
 
 
-def _legs(model: Model) -> Iterator[Variable]:
-    """Yield the inputs that move the legs."""
+def _inputs(model: Model) -> Iterator[FmuVariable]:
+    """Yield the torques, and the angles and rates of the legs."""
+    for k, name in enumerate(_coordinates(model), 1):
+        yield FmuVariable(f"tau[{k}]", f"torque on {name}", "N m", 0.0)
     for k in range(legs(model)):
         angle = f"{('gamma', 'delta')[k % 2]} of the {('right', 'left')[k % 4 // 2]} leg"
         meaning, unit = (angle, "rad") if k < 4 else (f"rate of {angle}", "rad/s")
-        yield Variable(f"legs[{k + 1}]", meaning, unit, 0.0)
-
-
-def _torques(model: Model) -> Iterator[Variable]:
-    """Yield the inputs."""
-    for k, name in enumerate(_coordinates(model), 1):
-        yield Variable(f"tau[{k}]", f"torque on {name}", "N m", 0.0)
+        yield FmuVariable(f"legs[{k + 1}]", meaning, unit, 0.0)
 
 
 def _coordinates(model: Model) -> Iterator[str]:
@@ -169,7 +165,7 @@ def _coordinates(model: Model) -> Iterator[str]:
         yield from (f"{name}_{segment}" for name in pair)
 
 
-def _parameters(model: Model) -> Iterator[Variable]:
+def _parameters(model: Model) -> Iterator[FmuVariable]:
     """Yield the parameters that can be changed, with their values."""
     entries = [] if model.manifest["scene"]["baked"] else model.manifest["parameters"]
     for entry in entries:
@@ -179,4 +175,4 @@ def _parameters(model: Model) -> Iterator[Variable]:
             for k, value in enumerate(values if several else (values,), 1):
                 name = f"{entry['name']}[{k}]" if several else entry["name"]
                 least = None if entry["check"] == "finite" else "0"
-                yield Variable(name, entry["meaning"], entry["unit"], value, least)
+                yield FmuVariable(name, entry["meaning"], entry["unit"], value, least)

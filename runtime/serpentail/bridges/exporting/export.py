@@ -64,6 +64,14 @@ def export(model: Model, kind: str, path: str | os.PathLike[str] | None = None) 
     return target
 
 
+def xml_file(root: Any) -> bytes:
+    """Return an element of XML, and what is in it, as a file."""
+    from xml.etree import ElementTree as Xml
+
+    Xml.indent(root)
+    return bytes(Xml.tostring(root, encoding="utf-8", xml_declaration=True)) + b"\n"
+
+
 def checked_path(kind: str, path: Any) -> Path:
     """Return the path of a file of a kind.
 

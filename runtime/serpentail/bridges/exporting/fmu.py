@@ -49,15 +49,10 @@ def _refuse_others(model: Model) -> None:
         raise _refused(model, "coordinates", "polar", words)
     if model.manifest["real"] != "double":
         raise _refused(model, "real", model.manifest["real"], 'FMI uses double: give "double" to')
-    needs = _needs(model)
+    needs = TOUCHING if model.contacts else FLYING
     absent = [name for name in needs if name not in model.generated]
     if absent or "c" not in scene["targets"]:
         raise model.without(*(absent or needs))
-
-
-def _needs(model: Model) -> tuple[str, ...]:
-    """Return the functions that are called."""
-    return TOUCHING if model.contacts else FLYING
 
 
 def _refused(model: Model, field: str, value: object, words: str) -> ExportError:
@@ -82,7 +77,7 @@ def _names(model: Model) -> str:
     values = [] if model.manifest["scene"]["baked"] else model.parameter_vector.tolist()
     work = model.manifest["work"]
     sizes = {"NQ": model.nq, "NV": model.nv, "NT": model.layout.nt, "NP": len(values)}
-    sizes["WORK"] = max(work[name] for name in _needs(model))
+    sizes["WORK"] = max(work[name] for name in (TOUCHING if model.contacts else FLYING))
     method = "ros34pw2" if "implicit_factor" in work and model.contacts else "tsit5"
     lines = [
         "/* The model, its sizes, and the values of its parameters, with a 0 behind them. */",

@@ -10,7 +10,8 @@ from xml.etree import ElementTree as Xml
 from ...basics.checks import shown
 from ...basics.errors import ExportError
 from ...model.model import Model
-from .chain import AXES, Capsule, Chain, Link, Vector, along, chain_of, origin, text, torso_capsule
+from .chain import AXES, Capsule, Chain, Link, along, chain_of, origin, text, torso_capsule
+from .export import xml_file
 
 LEAST = 1e-15  # kg, kg m^2: MuJoCo takes none of a moving body that is not above it (mjMINVAL)
 MARGIN = 1e-12  # tolerance of the sum of two moments, because of rounding
@@ -55,8 +56,7 @@ def mjcf(model: Model) -> bytes:
     Xml.SubElement(body, "site", name="tip", pos=text(chain.links[-1].end))
     _add_ties(root, chain)
     _add_passive(root, chain)
-    Xml.indent(root)
-    return bytes(Xml.tostring(root, encoding="utf-8", xml_declaration=True)) + b"\n"
+    return xml_file(root)
 
 
 def _refuse_slight(name: str, value: float | tuple[float, ...]) -> None:
@@ -93,7 +93,10 @@ def _add_link(before: Xml.Element, link: Link) -> Xml.Element:
     """Return the body of a link, added to the one before it; a site marks its joints."""
     body = Xml.SubElement(before, "body", name=link.name, pos=text(link.place))
     if any(link.turn):
-        body.set("quat", text(_quaternion(link.turn)))
+        from scipy.spatial.transform import Rotation
+
+        x, y, z, w = Rotation.from_euler("xyz", link.turn).as_quat()
+        body.set("quat", text((w, x, y, z)))
     for name, axis in AXES:
         Xml.SubElement(body, "joint", name=link.joint(name), type="hinge", axis=text(axis))
     _inertial(body, link.center, link.mass, link.inertia)
@@ -101,14 +104,6 @@ def _add_link(before: Xml.Element, link: Link) -> Xml.Element:
     Xml.SubElement(body, "geom", {"name": link.name, "type": "capsule", **ends})
     Xml.SubElement(body, "site", name=f"joint_{link.segment}_{link.number}")
     return body
-
-
-def _quaternion(turn: Vector) -> Vector:
-    """Return w, x, y, z of roll, pitch and yaw about fixed axes."""
-    from scipy.spatial.transform import Rotation
-
-    x, y, z, w = Rotation.from_euler("xyz", turn).as_quat().tolist()
-    return (w, x, y, z)
 
 
 def _add_ties(root: Xml.Element, chain: Chain) -> None:

@@ -5,7 +5,19 @@ from xml.etree import ElementTree as Xml
 
 from ...basics.errors import ExportError
 from ...model.model import Model
-from .chain import AXES, Link, Passive, Vector, along, chain_of, origin, text, torso_capsule
+from .chain import (
+    AXES,
+    Capsule,
+    Link,
+    Passive,
+    Vector,
+    along,
+    chain_of,
+    origin,
+    text,
+    torso_capsule,
+)
+from .export import xml_file
 
 HALF_TURN = math.pi
 # The model has no limits of effort (N m) and speed (rad/s), but a revolute joint must.
@@ -28,7 +40,7 @@ def urdf(model: Model) -> bytes:
     # the torso
     torso = Xml.SubElement(robot, "link", name="torso")
     _inertial(torso, FIXED, chain.torso_mass, chain.torso_inertia)
-    _rod(torso, FIXED, capsule.axis, capsule.half, capsule.radius)
+    _rod(torso, FIXED, capsule)
     for end in (capsule.half, -capsule.half):
         _solid(torso, along(capsule.axis, end), 2, "sphere", radius=text(capsule.radius))
     # the tail, each link on the one before it
@@ -39,8 +51,7 @@ def urdf(model: Model) -> bytes:
     Xml.SubElement(robot, "link", name="tip")
     joint = Xml.SubElement(robot, "joint", name="tail_end", type="fixed")
     _between(joint, chain.links[-1].end, before, "tip")
-    Xml.indent(robot)
-    return bytes(Xml.tostring(robot, encoding="utf-8", xml_declaration=True)) + b"\n"
+    return xml_file(robot)
 
 
 def _add_link(robot: Xml.Element, before: str, link: Link, passive: dict[str, Passive]) -> None:
@@ -49,7 +60,7 @@ def _add_link(robot: Xml.Element, before: str, link: Link, passive: dict[str, Pa
     Xml.SubElement(robot, "link", name=cross)
     body = Xml.SubElement(robot, "link", name=link.name)
     _inertial(body, link.center, link.mass, link.inertia)
-    _rod(body, (0.0, -link.length / 2, 0.0), 1, link.length / 2, link.radius)
+    _rod(body, (0.0, -link.length / 2, 0.0), Capsule(1, link.length / 2, link.radius))
     ends = ((link.place, link.turn, before, cross), (FIXED, FIXED, cross, link.name))
     for (name, axis), (place, turn, parent, child) in zip(AXES, ends, strict=True):
         joint = Xml.SubElement(robot, "joint", name=link.joint(name), type="revolute")
@@ -75,9 +86,7 @@ def _between(
     Xml.SubElement(joint, "child", link=child)
 
 
-def _inertial(
-    link: Xml.Element, centre: tuple[float, ...], mass: float, moments: tuple[float, ...]
-) -> None:
+def _inertial(link: Xml.Element, centre: Vector, mass: float, moments: Vector) -> None:
     """Give a link a mass, and moments of inertia along its axes."""
     inertial = Xml.SubElement(link, "inertial")
     Xml.SubElement(inertial, "origin", xyz=text(centre), rpy=text(FIXED))
@@ -87,16 +96,13 @@ def _inertial(
     Xml.SubElement(inertial, "inertia", {key: text(value) for key, value in tensor.items()})
 
 
-def _rod(
-    link: Xml.Element, centre: tuple[float, ...], axis: int, half: float, radius: float
-) -> None:
-    """Give a link a cylinder along an axis, of this half length."""
-    _solid(link, centre, axis, "cylinder", radius=text(radius), length=text(2 * half))
+def _rod(link: Xml.Element, centre: Vector, rod: Capsule) -> None:
+    """Give a link a cylinder, as long as the straight part of a capsule."""
+    sizes = {"radius": text(rod.radius), "length": text(2 * rod.half)}
+    _solid(link, centre, rod.axis, "cylinder", **sizes)
 
 
-def _solid(
-    link: Xml.Element, centre: tuple[float, ...], axis: int, kind: str, **sizes: str
-) -> None:
+def _solid(link: Xml.Element, centre: Vector, axis: int, kind: str, **sizes: str) -> None:
     """Give a link a solid to see and to collide with, its z turned to an axis."""
     for use in ("visual", "collision"):
         part = Xml.SubElement(link, use)

@@ -32,13 +32,13 @@ class Environment(gymnasium.Env):
         _refuse_options(options)
         super().reset(seed=seed)
         self.worlds.restart(np.zeros(1, int), self.np_random.random((1, DRAWS)))
-        return self.worlds.seen()[0], {}
+        return self.worlds.observations()[0], {}
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Apply an action (2m,) for the time that an action is held."""
         rewards, terminated, truncated = self.worlds.act(np.asarray(action)[None])
         ends = bool(terminated[0]), bool(truncated[0])
-        return self.worlds.seen()[0], float(rewards[0]), *ends, {}
+        return self.worlds.observations()[0], float(rewards[0]), *ends, {}
 
 
 class Environments(VectorEnv):
@@ -70,7 +70,7 @@ class Environments(VectorEnv):
             each = seeds or [None] * self.num_envs
             self.generators = [np.random.default_rng(seed) for seed in each]
         self._restart(np.arange(self.num_envs))
-        return self.worlds.seen(), {}
+        return self.worlds.observations(), {}
 
     def step(
         self, actions: Any
@@ -82,10 +82,10 @@ class Environments(VectorEnv):
         begun = self.over.nonzero()[0]
         if len(begun):
             self._restart(begun)
-            for told in (rewards, terminated, truncated):
-                told[begun] = 0
+            for array in (rewards, terminated, truncated):
+                array[begun] = 0
         self.over = terminated | truncated
-        return self.worlds.seen(), rewards, terminated, truncated, {}
+        return self.worlds.observations(), rewards, terminated, truncated, {}
 
     def _restart(self, which: np.ndarray) -> None:
         """Begin new episodes, each from its own generator."""

@@ -25,12 +25,12 @@ DRAWS = 5  # numbers in [0, 1) that a start takes
 
 
 @dataclass(frozen=True)
-class Task:
+class LearningTask:
     """One kind of episode: contacts that it needs, its start, and settings by default."""
 
     name: str
     contacts: tuple[str, ...]  # none: it flies all the time
-    start: Callable[["Task", Model, dict[str, float], Array], tuple[Array, Array]]
+    start: Callable[[Model, dict[str, Any], Array], tuple[Array, Array]]
     settings: dict[str, float]
 
     def checked(self, model: Model, given: dict[str, Any]) -> dict[str, Any]:
@@ -51,9 +51,9 @@ class Task:
                 f"{self.name} has no setting {', '.join(map(repr, unknown))}; it has "
                 f"{', '.join(settings)}"
             )
-        settings |= given
-        for name in (name for name in given if name in UNITS):
-            settings[name] = measured(name, given[name], UNITS[name], SimulationError)
+        for name, value in given.items():
+            unit = UNITS.get(name)
+            settings[name] = measured(name, value, unit, SimulationError) if unit else value
         for name in ("torque", "step", "duration", "angle"):
             settings[name] = number(name, settings[name], SimulationError, above=0)
         for name, most in (("tilt", np.pi), ("spin", np.inf), ("height", np.inf)):
@@ -70,18 +70,16 @@ def _up_to(name: str, value: Any, most: float) -> float:
     try:
         return number(name, value, SimulationError, least=0, most=most)
     except SimulationError as error:
-        given = numbers_in(value)
-        if UNITS[name] != "rad" or given is None or given.shape != ():
+        angle = numbers_in(value)
+        if UNITS[name] != "rad" or angle is None or angle.shape != ():
             raise
-        remedy = f', or "{given:g} deg"' if most < given <= np.degrees(most) else ""
+        remedy = f', or "{angle:g} deg"' if most < angle <= np.degrees(most) else ""
         raise SimulationError(f"{error} rad{remedy}") from None
 
 
-def thrown(
-    task: Task, model: Model, settings: dict[str, float], draws: Array
-) -> tuple[Array, Array]:
+def start_in_air(model: Model, settings: dict[str, Any], draws: Array) -> tuple[Array, Array]:
     """Return states (k, nq), (k, nv) in the air, tilted and spinning as drawn."""
-    q, v = _at_rest(model, len(draws))
+    q, v = np.zeros((len(draws), model.nq)), np.zeros((len(draws), model.nv))
     q[:, 2] = settings["height"]
     # a tilt about a horizontal axis, and a spin about any
     tilt, axis = settings["tilt"] * draws[:, 0], 2 * np.pi * draws[:, 1]
@@ -90,29 +88,20 @@ def thrown(
     )
     z, angle = 2 * draws[:, 2] - 1, 2 * np.pi * draws[:, 3]
     level = np.sqrt(1 - z * z)
-    way = np.stack([level * np.cos(angle), level * np.sin(angle), z], axis=1)
-    v[:, OMEGA] = settings["spin"] * draws[:, 4:] * way
+    direction = np.stack([level * np.cos(angle), level * np.sin(angle), z], axis=1)
+    v[:, OMEGA] = settings["spin"] * draws[:, 4:] * direction
     return q, v
 
 
-def lying(
-    task: Task, model: Model, settings: dict[str, float], draws: Array
-) -> tuple[Array, Array]:
+def start_on_back(model: Model, settings: dict[str, Any], draws: Array) -> tuple[Array, Array]:
     """Return states (k, nq), (k, nv) at rest on the back, rolled aside and pitched as drawn."""
-    q, v = _at_rest(model, len(draws))
+    q, v = np.zeros((len(draws), model.nq)), np.zeros((len(draws), model.nv))
     angles = np.zeros((len(draws), 3))  # pitch, roll, yaw
     angles[:, 0] = settings["tilt"] / 3 * (2 * draws[:, 0] - 1)
     angles[:, 1] = np.pi + settings["tilt"] * (2 * draws[:, 1] - 1)
     q[:, QUATERNION] = from_angles(angles)
     points, _ = model.contact_points(q, v, standing_legs())
     q[:, 2] = ABOVE - points[..., 2].min(axis=1)
-    return q, v
-
-
-def _at_rest(model: Model, count: int) -> tuple[Array, Array]:
-    """Return upright states without motion."""
-    q, v = np.zeros((count, model.nq)), np.zeros((count, model.nv))
-    q[:, QUATERNION.start] = 1
     return q, v
 
 
@@ -127,18 +116,23 @@ GROUND = {"torque": 0.02, "step": 2e-4, "substeps": 25}
 TASKS = {
     task.name: task
     for task in (
-        Task(
+        LearningTask(
             "righting",
             (),
-            thrown,
+            start_in_air,
             FLIGHT | {"duration": 0.5, "tilt": np.pi / 2, "spin": 0.0, "height": 0.3},
         ),
-        Task(
+        LearningTask(
             "landing",
             ("feet",),
-            thrown,
+            start_in_air,
             GROUND | {"duration": 0.8, "tilt": np.pi / 3, "spin": 0.0, "height": 0.4},
         ),
-        Task("self_recovery", ("feet", "torso"), lying, GROUND | {"duration": 1.5, "tilt": 0.3}),
+        LearningTask(
+            "self_recovery",
+            ("feet", "torso"),
+            start_on_back,
+            GROUND | {"duration": 1.5, "tilt": 0.3},
+        ),
     )
 }

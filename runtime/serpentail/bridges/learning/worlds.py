@@ -9,7 +9,7 @@ from serpentail_scene.layout import OMEGA, QUATERNION, TAIL_Q, TAIL_V
 from ...basics.checks import real_array, refuse_not_finite
 from ...basics.errors import StateError
 from ...model.model import Model
-from .tasks import DRAWS, Task, standing_legs
+from .tasks import DRAWS, LearningTask, standing_legs
 
 EFFORT = 0.01  # of a reward, that full torques cost
 # bounds of observations, which are clipped: m, m/s, rad/s
@@ -21,25 +21,25 @@ Array = np.ndarray
 class Worlds:
     """States of k episodes.
 
-    Seen of each, SI: the world's z axis in body axes (3,), omega (3,), height and its rate, tail
-    coordinates (2m,), their rates (2m,), and which part of its time is left.
+    Observations of each, SI: the world's z axis in body axes (3,), omega (3,), height and its rate,
+    tail coordinates (2m,), their rates (2m,), and which part of its time is left.
     """
 
-    def __init__(self, model: Model, task: Task, count: int, settings: dict[str, Any]):
+    def __init__(self, model: Model, task: LearningTask, count: int, settings: dict[str, Any]):
         self.model, self.task, self.settings = model, task, settings
-        self.q, self.v = task.start(task, model, settings, np.zeros((count, DRAWS)))
+        self.q, self.v = task.start(model, settings, np.zeros((count, DRAWS)))
         self.q = self.q.astype(model.parameter_vector.dtype)
         self.v = self.v.astype(self.q.dtype)
         self.parts = [self.q, self.v]
-        self.given: dict[str, Any] = {"steps": settings["substeps"]}
+        self.step_settings: dict[str, Any] = {"steps": settings["substeps"]}
         if model.contacts:
             bristles = np.zeros((count, 2 * sum(model.contacts.values())), self.q.dtype)
             self.parts.append(bristles)
-            self.given["bristles"] = bristles
+            self.step_settings["bristles"] = bristles
         if "feet" in model.contacts:
-            self.given["legs"] = standing_legs()
+            self.step_settings["legs"] = standing_legs()
         self.statuses = np.zeros(count, np.intc)
-        self.taken = np.zeros(count, int)  # actions
+        self.actions = np.zeros(count, int)  # of each since its start
         self.horizon = max(1, round(settings["duration"] / self.control_step))
         self.low, self.high = self._bounds()
 
@@ -50,10 +50,10 @@ class Worlds:
 
     def restart(self, which: Array, draws: Array) -> None:
         """Begin new episodes; draws (len(which), DRAWS) are from [0, 1)."""
-        q, v = self.task.start(self.task, self.model, self.settings, draws)
+        q, v = self.task.start(self.model, self.settings, draws)
         for part, start in zip(self.parts, (q, v, 0.0), strict=False):
             part[which] = start
-        self.taken[which] = 0
+        self.actions[which] = 0
 
     def act(self, actions: Any) -> tuple[Array, Array, Array]:
         """Apply actions (k, 2m), parts of the largest torque, limited to -1 and 1.
@@ -73,18 +73,18 @@ class Worlds:
             self.settings["step"],
             out=self.parts,
             statuses=self.statuses,
-            **self.given,
+            **self.step_settings,
         )
-        self.taken += 1
+        self.actions += 1
         rewards = (1 + self._up()[2]) / 2 - EFFORT * np.mean(parts * parts, axis=1)
         bent = np.abs(self.q[:, TAIL_Q]).max(axis=1) > self.settings["angle"]
-        return rewards, bent | (self.statuses != 0), self.taken >= self.horizon
+        return rewards, bent | (self.statuses != 0), self.actions >= self.horizon
 
-    def seen(self) -> Array:
+    def observations(self) -> Array:
         """Return the observations (k, 9 + 4m), within their bounds."""
         q, v = self.q, self.v
         columns = [*self._up(), *v[:, OMEGA].T, q[:, 2], v[:, 2], *q[:, TAIL_Q].T, *v[:, TAIL_V].T]
-        left = 1 - self.taken / self.horizon
+        left = 1 - self.actions / self.horizon
         return np.clip(np.stack([*columns, left], axis=1), self.low, self.high).astype(np.float32)
 
     def _up(self) -> tuple[Array, Array, Array]:

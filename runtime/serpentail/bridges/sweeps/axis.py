@@ -3,7 +3,7 @@
 import json
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,32 +22,23 @@ class Grid:
 
     values: tuple[Any, ...]
 
-    def measured(self, field: str, unit: str | Sequence[str] | None) -> "Grid":
-        """Return it with texts such as "2 g" as numbers in a unit; None: in SI."""
-        return Grid(tuple(in_units(field, value, unit) for value in self.values))
-
 
 @dataclass(frozen=True)
 class Spread:
     """Numbers between two bounds, of any shape; ``random``, ``latin`` and ``sobol`` make it.
 
-    given: the bounds as the caller wrote them.
+    bounds: low and high as the caller wrote them.
     """
 
-    way: str
+    kind: str
     low: np.ndarray
     high: np.ndarray
     law: str
-    given: tuple[Any, Any]
+    bounds: tuple[Any, Any]
 
-    def measured(self, field: str, unit: str | Sequence[str] | None) -> "Spread":
-        """Return it with bounds such as "2 g" as numbers in a unit; None: in SI."""
-        low, high = (in_units(field, bound, unit) for bound in self.given)
-        return replace(_spread(self.way, low, high, self.law), given=self.given)
-
-    def at(self, unit: np.ndarray) -> np.ndarray:
+    def at(self, places: np.ndarray) -> np.ndarray:
         """Return the numbers (k, ...) at places (k, size) from 0 to 1 between the bounds."""
-        places = unit.reshape(-1, *self.low.shape)
+        places = places.reshape(-1, *self.low.shape)
         if self.law == "log":
             return np.exp(np.log(self.low) + places * (np.log(self.high) - np.log(self.low)))
         return self.low + places * (self.high - self.low)
@@ -83,10 +74,10 @@ def grid(values: Any) -> Grid:
     """
     if isinstance(values, str | Mapping) or not hasattr(values, "__iter__"):
         raise refusal("grid", values, "a list of values", SweepError)
-    found = tuple(plain("grid", value) for value in values)
-    if not found:
+    rows = tuple(plain("grid", value) for value in values)
+    if not rows:
         raise SweepError("grid: no values: needs one or more")
-    return Grid(found)
+    return Grid(rows)
 
 
 def random(low: Any, high: Any, law: str = "uniform") -> Spread:
@@ -112,95 +103,43 @@ def random(low: Any, high: Any, law: str = "uniform") -> Spread:
     SweepError
         The bounds or the law are wrong.
     """
-    return _spread("random", low, high, law)
+    return spread("random", low, high, law)
 
 
 def latin(low: Any, high: Any, law: str = "uniform") -> Spread:
     """Make an axis whose points are a Latin hypercube: each of k equal parts has one point.
 
-    Another number of points gives other points.
-
-    Parameters
-    ----------
-    low, high : float, str or array_like
-        As of ``random``.
-    law : {"uniform", "log"}, default "uniform"
-        As of ``random``.
-
-    Returns
-    -------
-    Spread
-        The axis.
-
-    Raises
-    ------
-    SweepError
-        The bounds or the law are wrong.
+    Another number of points gives other points. Arguments and errors are those of ``random``.
     """
-    return _spread("latin", low, high, law)
+    return spread("latin", low, high, law)
 
 
 def sobol(low: Any, high: Any, law: str = "uniform") -> Spread:
     """Make an axis whose points are a scrambled Sobol sequence, even in all axes together.
 
     The number of points should be a power of two. scipy.stats.qmc.Sobol makes the points.
-
-    Parameters
-    ----------
-    low, high : float, str or array_like
-        As of ``random``.
-    law : {"uniform", "log"}, default "uniform"
-        As of ``random``.
-
-    Returns
-    -------
-    Spread
-        The axis.
-
-    Raises
-    ------
-    SweepError
-        The bounds or the law are wrong.
+    Arguments and errors are those of ``random``.
     """
-    return _spread("sobol", low, high, law)
+    return spread("sobol", low, high, law)
 
 
-def _spread(way: str, low: Any, high: Any, law: str) -> Spread:
+def spread(kind: str, low: Any, high: Any, law: str) -> Spread:
+    """Return an axis between checked bounds."""
     lows, highs = (
-        finite_array(f"{way}: {name}", in_units(f"{way}: {name}", x), SweepError)
+        finite_array(f"{kind}: {name}", in_units(f"{kind}: {name}", x), SweepError)
         for name, x in (("low", low), ("high", high))
     )
-    one_of(f"{way}: law", law, LAWS, SweepError)
+    one_of(f"{kind}: law", law, LAWS, SweepError)
     if lows.shape != highs.shape:
         raise SweepError(
-            f"{way}: low is {lows.shape}, high is {highs.shape}: needs bounds of one shape"
+            f"{kind}: low is {lows.shape}, high is {highs.shape}: needs bounds of one shape"
         )
     if (lows > highs).any() or (law == "log" and (lows <= 0).any()):
         least = "above 0 and " if law == "log" else ""
         raise refusal(
-            f"{way}: low", low, f"numbers {least}not above high, {shown(high)}", SweepError
+            f"{kind}: low", low, f"numbers {least}not above high, {shown(high)}", SweepError
         )
-    return Spread(way, lows, highs, law, (low, high))
-
-
-def plain(field: str, value: Any) -> Any:
-    """Return a value as JSON represents it: numbers, texts, lists and tables."""
-    if isinstance(value, np.ndarray | np.generic):
-        value = value.tolist()
-    try:
-        return json.loads(json.dumps(value, allow_nan=False, default=_listed))
-    except (TypeError, ValueError) as reason:
-        raise SweepError(
-            f"{field}: value {shown(value)}: needs numbers, texts, lists or tables ({reason})"
-        ) from None
-
-
-def as_json(value: Any) -> str:
-    """Return plain data as JSON, the same text for the same data."""
-    return _ENCODER.encode(value)
-
-
-_ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"))
+    return Spread(kind, lows, highs, law, (low, high))
 
 
 def in_units(field: str, value: Any, unit: str | Sequence[str] | None = None) -> Any:
@@ -220,7 +159,22 @@ def in_units(field: str, value: Any, unit: str | Sequence[str] | None = None) ->
     raise refusal(field, value, "a unit that a scene may have, such as g, cm or deg", SweepError)
 
 
-def _listed(value: Any) -> Any:
+def plain(field: str, value: Any) -> Any:
+    """Return a value as JSON represents it: numbers, texts, lists and tables."""
+    try:
+        return json.loads(json.dumps(value, allow_nan=False, default=array_as_list))
+    except (TypeError, ValueError) as reason:
+        raise SweepError(
+            f"{field}: value {shown(value)}: needs numbers, texts, lists or tables ({reason})"
+        ) from None
+
+
+def array_as_list(value: Any) -> Any:
+    """Return an array or a number of NumPy for JSON; TypeError for anything else."""
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     raise TypeError(f"{type(value).__name__} is none of these")
+
+
+# plain data as JSON, the same text for the same data
+as_json = json.JSONEncoder(sort_keys=True, separators=(",", ":")).encode

@@ -1,9 +1,11 @@
-"""How many points are sent as one task, and how many tasks a second."""
+"""How many points are sent as one block, and how many blocks a second."""
 
-from collections.abc import Callable
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+
+from .pose import Posed
 
 LEAST_S = 1.0  # s of work that a block is to have
 MOST_S = 60.0  # s of work that a kill may cost
@@ -27,9 +29,9 @@ class Pace:
 
     def learn(self, points: int, seconds: float) -> None:
         """Note how long a block took; of a much larger one, the start of workers is a less part."""
-        kept = OLDER if points < 2 * self.largest else 0.0
-        self.seconds = kept * self.seconds + seconds
-        self.points = kept * self.points + points
+        weight = OLDER if points < 2 * self.largest else 0.0
+        self.seconds = weight * self.seconds + seconds
+        self.points = weight * self.points + points
         self.largest = max(self.largest, points)
 
     def block(self, left: int, workers: int) -> int:
@@ -59,30 +61,27 @@ class Gate:
         return True
 
 
-class Missing:
-    """The numbers of points without rows, in order, each taken once; of one model of several.
+class Group:
+    """Points of one model without rows, in order; ``left`` of them are not sent yet."""
 
-    done: which points have rows; models: returns the model of each of some numbers.
-    """
+    def __init__(self, posed: Posed, model: int, done: np.ndarray):
+        self.bundle, self.pace = posed.bundles[model], Pace()
+        self.left = sum(map(len, _missing(posed, model, done)))
+        self._windows = _missing(posed, model, done)
+        self._next = np.empty(0, np.int64)
 
-    def __init__(self, done: np.ndarray, models: Callable, model: int):
-        self.done, self.models, self.model = done, models, model
-        self.at = 0
-        self.left = sum(len(self._window(k)) for k in range(0, len(done), MOST_IN_BLOCK))
+    def take(self, workers: int) -> np.ndarray:
+        """Return the numbers of the points of the next block."""
+        count = self.pace.block(self.left, workers)
+        while len(self._next) < min(count, self.left):
+            self._next = np.concatenate([self._next, next(self._windows)])
+        block, self._next = np.split(self._next, [count])
+        self.left -= len(block)
+        return block
 
-    def take(self, most: int) -> np.ndarray:
-        """Return the next numbers, at most so many."""
-        parts, count = [np.empty(0, np.int64)], 0
-        while count < most and self.at < len(self.done):
-            numbers = self._window(self.at)
-            part = numbers[: most - count]
-            whole = len(part) == len(numbers)
-            self.at = self.at + MOST_IN_BLOCK if whole else int(part[-1]) + 1
-            parts.append(part)
-            count += len(part)
-        self.left -= count
-        return np.concatenate(parts)
 
-    def _window(self, first: int) -> np.ndarray:
-        numbers = first + np.flatnonzero(~self.done[first : first + MOST_IN_BLOCK])
-        return numbers[self.models(numbers) == self.model]
+def _missing(posed: Posed, model: int, done: np.ndarray) -> Iterator[np.ndarray]:
+    """Yield the numbers of a model's points that are not done, in windows that need little room."""
+    for first in range(0, len(done), MOST_IN_BLOCK):
+        numbers = first + np.flatnonzero(~done[first : first + MOST_IN_BLOCK])
+        yield numbers[posed.models(numbers) == model]

@@ -2,231 +2,167 @@
 
 import time
 from collections import deque
-from collections.abc import Iterator, Sequence
-from concurrent.futures import CancelledError, Future
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from contextlib import suppress
 from queue import Empty, SimpleQueue
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...basics.errors import NotWritten, SweepError
+from ...basics.errors import SerpentailError, SweepError
 from ...basics.progress import Stage
-from .axes import Axes
-from .blocks import Gate, Missing, Pace
-from .bundles import Bundle, model_of
+from .blocks import Gate, Group
 from .executors import Place, place_of
-from .job import Job
+from .result import Sweep
 from .runs import run_points
-from .store import Store
-from .supervision import Block, Ran, ShardFolder, ran, run_block
+from .supervision import Block, BlockSettings, Result, run_block
+from .worker import model_of
 
 AHEAD = 2  # blocks a worker, so that none waits
 TRIES = 4  # of a block whose worker is gone
 LOOK_S = 0.2  # s between looks at the executor
-SOON_S = 0.01  # s after which another task may pass
+WAIT_S = 0.02  # s for a block, until more may be sent
 HERE_S = 3.0  # s of work of flights that is not worth other processes
+GONE = (
+    "executor: its workers are gone: finished rows are kept, and the same call resumes from there"
+)
 
 
 class Work(NamedTuple):
     """Points of a group, and how often they were sent in vain."""
 
-    group: "Group"
+    group: Group
     numbers: np.ndarray
     tries: int = 0
 
 
-@dataclass
-class Group:
-    """Points of one model that are still to be run."""
-
-    bundle: Bundle | None
-    missing: Missing
-    pace: Pace = field(default_factory=Pace)
-
-    def take(self, workers: int) -> np.ndarray:
-        """Return the numbers of the points of the next block."""
-        return self.missing.take(self.pace.block(self.missing.left, workers))
-
-
-@dataclass
-class Spent:
-    """What a sweep took: elapsed seconds, seconds of all workers, blocks, points, workers; and how
-    many points hung.
-    """
-
-    wall_s: float = 0.0
-    busy_s: float = 0.0
-    blocks: int = 0
-    points: int = 0
-    workers: int = 1
-    hung: int = 0
-
-
-@dataclass
 class Driver:
-    """Runs groups of points, whose rows come into the store."""
+    """Runs all points of a sweep that have no rows; these come into the store."""
 
-    store: Store
-    axes: Axes
-    job: Job
-    groups: Sequence[Group]
-    limit: float | None
-    script: str | None
-    name: str
-    spent: Spent = field(default_factory=Spent)
-
-    def __post_init__(self) -> None:
+    def __init__(self, sweep: Sweep, settings: BlockSettings, name: str):
+        self.store, self.posed, self.spent = sweep.store, sweep.posed, sweep.spent
+        self.settings, self.name = settings, name
+        models = range(len(self.posed.bundles))
+        self.groups = [Group(self.posed, model, self.store.done) for model in models]
         self.done, self.failed = int(self.store.done.sum()), self.store.failed
-        self.place: ShardFolder | None = self.store.place
+        self.sent: dict[Future, Work] = {}
+        self.ended: SimpleQueue[Future] = SimpleQueue()
+        self.lost: deque[Work] = deque()  # blocks whose worker is gone
+
+    @property
+    def left(self) -> bool:
+        """Whether there are points that are not sent yet."""
+        return any(group.left for group in self.groups)
 
     def drive(self, executor: Any) -> None:
         """Run all points; NotWritten if rows cannot be written, SweepError if no worker is left."""
         begun = time.perf_counter()
         with Stage("sweep", self.name) as stage:
             self._tell(stage)
-            if executor is None and self.limit is None:
-                self._here(stage)
-            if any(group.missing.left for group in self.groups):
+            if executor is None and self.settings.limit is None and self.settings.together:
+                self._run_here(stage)
+            if self.left:
                 with place_of(executor) as place:
-                    self._elsewhere(place, stage)
+                    self._run_at(place, stage)
+            self._tell(stage)
         self.spent.wall_s = time.perf_counter() - begun
 
-    # ---- in this process -------------------------------------------------------------------------
-
-    def _here(self, stage: Stage) -> None:
+    def _run_here(self, stage: Stage) -> None:
         """Run flights in this process for as long as others would take to begin."""
         begun = time.perf_counter()
-        for group in self.groups if self.job.run == "simulate" else ():
-            model = model_of(group.bundle, self.job)
-            while group.missing.left and time.perf_counter() - begun < HERE_S:
+        for group in self.groups:
+            model = model_of(group.bundle, self.posed.job)
+            while group.left and time.perf_counter() - begun < HERE_S:
                 numbers = group.take(1)
-                parts = run_points(self.job, model, self.axes.at(numbers))
-                told = [each for part in parts for each in part]
-                self._keep(group, numbers, ran(numbers, told, self.place))
+                points = zip(numbers.tolist(), self.posed.axes.at(numbers), strict=True)
+                parts = run_points(self.posed.job, model, dict(points))
+                rows = [row for part in parts for row in part]
+                self._keep(group, Result.of(rows, len(numbers), self.settings.store))
                 self._tell(stage)
 
-    # ---- in others -------------------------------------------------------------------------------
-
-    def _elsewhere(self, place: Place, stage: Stage) -> None:
+    def _run_at(self, place: Place, stage: Stage) -> None:
         """Keep all workers at work until no point is left."""
-        waiting: dict[Future, Work] = {}
-        ready: SimpleQueue[Future] = SimpleQueue()
-        lost: deque[Work] = deque()
-        job, blocks = self.job.pickled(), self._blocks()
-        gate, looked = Gate(time.perf_counter()), -LOOK_S
+        blocks, gate, looked = self._blocks(), Gate(time.perf_counter()), -LOOK_S
         try:
-            while True:
+            while self.sent or self.lost or self.left:
                 now = time.perf_counter()
-                if now - looked > LOOK_S:
+                if now - looked >= LOOK_S:
                     looked = now
-                    with _reached():
-                        self.spent.workers = place.workers()
+                    self.spent.workers = _asked(place.workers)
                     if not place.alive():
                         raise SweepError(GONE)
                     self._tell(stage)
-                full = self._send(place, job, (waiting, ready), (lost, blocks), gate)
-                if not waiting and not full:
-                    self._tell(stage)
-                    return
-                for future in _ended(ready, SOON_S if full == "gate" else LOOK_S):
-                    work = waiting.pop(future)
-                    ran = self._result(future, work.tries, place)
-                    if ran is None:
-                        lost.append(work._replace(tries=work.tries + 1))
-                    else:
-                        self._keep(work.group, work.numbers, ran)
+                # as many blocks as the workers and the scheduler bear
+                while len(self.sent) < AHEAD * self.spent.workers and gate.passes(now):
+                    work = self.lost.popleft() if self.lost else next(blocks, None)
+                    if work is None:
+                        break
+                    future = _asked(place.submit, run_block, self._block(work))
+                    self.sent[future] = work
+                    future.add_done_callback(self.ended.put)
+                with suppress(Empty):
+                    self._receive(self.ended.get(timeout=WAIT_S), place)
         finally:
-            for future in waiting:
+            for future in self.sent:
                 future.cancel()
 
-    def _send(self, place: Place, job: bytes, sent: tuple, rest: tuple, gate: Gate) -> str:
-        """Send blocks; return what holds up more of them, "" if none is left."""
-        (waiting, ready), (lost, blocks) = sent, rest
-        while len(waiting) < AHEAD * self.spent.workers:
-            if not gate.passes(time.perf_counter()):
-                return "gate"
-            work = lost.popleft() if lost else next(blocks, None)
-            if work is None:
-                return ""
-            with _reached():
-                future = place.submit(run_block, self._block(work, job))
-            waiting[future] = work
-            future.add_done_callback(ready.put)
-        return "workers"
+    def _receive(self, future: Future, place: Place) -> None:
+        """Keep the rows of a block that has ended; put it back if its worker was lost."""
+        work = self.sent.pop(future)
+        try:
+            result = future.result()
+        except SerpentailError:
+            raise
+        except Exception as reason:  # whatever an executor loses work by
+            if work.tries + 1 >= TRIES or not place.alive():
+                raise _gone(reason) from reason
+            self.lost.append(work._replace(tries=work.tries + 1))
+        else:
+            self._keep(work.group, result)
 
     def _blocks(self) -> Iterator[Work]:
         """Yield points of the groups in turn."""
-        while True:
-            left = [group for group in self.groups if group.missing.left]
-            if not left:
-                return
-            for group in left:
-                yield Work(group, group.take(self.spent.workers))
+        while self.left:
+            for group in self.groups:
+                if group.left:
+                    yield Work(group, group.take(self.spent.workers))
 
-    def _block(self, work: Work, job: bytes) -> Block:
+    def _block(self, work: Work) -> Block:
         """Return points as they travel."""
-        axes, places = self.axes.part(work.numbers)
-        together = self.job.run == "simulate"
-        given = (job, self.script, work.group.bundle, axes, places, work.numbers)
-        return Block(*given, self.limit, together, self.place)
+        axes, places = self.posed.axes.part(work.numbers)
+        return Block(self.settings, work.group.bundle, axes, places, work.numbers)
 
-    def _result(self, future: Future, tries: int, place: Place) -> Ran | None:
-        """Return the results of a block; None if it is to be sent again."""
-        try:
-            return future.result()
-        except NotWritten:
-            raise
-        except (Exception, CancelledError) as reason:  # whatever an executor loses work by
-            if tries + 1 >= TRIES or not place.alive():
-                raise _gone(reason) from reason
-            return None
-
-    # ---- rows ------------------------------------------------------------------------------------
-
-    def _keep(self, group: Group, numbers: np.ndarray, ran: Ran) -> None:
+    def _keep(self, group: Group, result: Result) -> None:
         """Take notice of the rows of a block."""
-        if ran.refused is not None:
-            raise SweepError(f"run: no process can run it: {ran.refused}")
-        if ran.shard is not None:
-            self.store.accept(ran.shard)
-            self.done += ran.shard.size
-            self.failed += ran.shard.failed
-        group.pace.learn(len(numbers), ran.seconds)
-        self.spent.points += len(numbers) - ran.hung
-        self.spent.hung += ran.hung
+        if result.refusal:
+            raise SweepError(result.refusal)
+        points = 0
+        if result.shard is not None:
+            self.store.accept(result.shard)
+            points = result.shard.size
+            self.done += points
+            self.failed += result.shard.failed
+            group.pace.learn(points, result.seconds)
+        self.spent.points += points
+        self.spent.hung += result.hung
         self.spent.blocks += 1
-        self.spent.busy_s += ran.seconds
+        self.spent.busy_s += result.seconds
 
     def _tell(self, stage: Stage) -> None:
         failed = f", {self.failed} failed" if self.failed else ""
-        total = len(self.axes)
+        total = len(self.posed.axes)
         stage.tell(self.done / total, f"{self.name}: {self.done} of {total}{failed}")
 
 
-GONE = (
-    "executor: its workers are gone: finished rows are kept, and the same call resumes from there"
-)
+def _asked(ask: Callable, *arguments: Any) -> Any:
+    """Ask an executor; what it raises, whatever that is, tells that it is gone."""
+    try:
+        return ask(*arguments)
+    except Exception as reason:
+        raise _gone(reason) from reason
 
 
 def _gone(reason: BaseException) -> SweepError:
     words = " ".join(str(reason).split())
     return SweepError(f"{GONE} ({type(reason).__name__}: {words:.300})")
-
-
-@contextmanager
-def _reached() -> Iterator[None]:
-    """Ask an executor; what it raises, whatever that is, tells that it is gone."""
-    try:
-        yield
-    except Exception as reason:
-        raise _gone(reason) from reason
-
-
-def _ended(ready: SimpleQueue, patience: float) -> Iterator[Future]:
-    """Yield the futures that have ended, after some seconds at the latest."""
-    with suppress(Empty):
-        yield ready.get(timeout=patience)
-        while True:
-            yield ready.get_nowait()

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,54 +34,35 @@ class Place:
 @contextmanager
 def place_of(executor: Any) -> Iterator[Place]:
     """Provide the executor that was asked for; SweepError if it is unknown or not reachable."""
-    if executor is None:
-        executor = "processes"
-    if isinstance(executor, str):
-        kind, _, rest = executor.partition(":")
-        if kind == "processes":
-            asked = rest or None
-            count = (
-                checked_threads(
-                    "executor: processes", int(rest) if rest.isdecimal() else rest, SweepError
-                )
-                if asked
-                else threads()
-            )
-            with _processes(count) as place:
-                yield place
-            return
-        if kind == "dask":
-            with _dask(rest) as place:
-                yield place
-            return
+    name = executor if isinstance(executor, str) else "processes" if executor is None else ""
+    kind, _, rest = name.partition(":")
+    if kind == "processes":
+        count = threads()
+        if rest:
+            asked = int(rest) if rest.isdecimal() else rest
+            count = checked_threads("executor: processes", asked, SweepError)
+        pool = ThreadPoolExecutor(count, "serpentail-sweep")  # each thread controls one process
+        try:
+            yield Place(pool.submit, lambda: count)
+        finally:
+            with ending():  # of an end in good order, none is at work
+                pool.shutdown(wait=True, cancel_futures=True)
+    elif kind == "dask":
+        with _dask(rest) as place:
+            yield place
     elif hasattr(executor, "submit"):
         count = getattr(executor, "_max_workers", None) or os.cpu_count() or 1
         yield Place(executor.submit, lambda: count)
-        return
-    raise refusal("executor", executor, CHOICES, SweepError)
-
-
-@contextmanager
-def _processes(count: int) -> Iterator[Place]:
-    """Threads, each of which controls one process."""
-    pool: Executor = ThreadPoolExecutor(count, "serpentail-sweep")
-    try:
-        yield Place(pool.submit, lambda: count)
-    finally:
-        with ending():  # of an end in good order, none is at work
-            pool.shutdown(wait=True, cancel_futures=True)
+    else:
+        raise refusal("executor", executor, CHOICES, SweepError)
 
 
 @contextmanager
 def _dask(address: str) -> Iterator[Place]:
     """Dask's workers: of a cluster on this machine, or of a scheduler's address or file."""
     distributed = needed("distributed", "dask")
-    if address:
-        where: dict[str, Any] = {"address": address}
-        if Path(address).suffix == ".json":
-            where = {"scheduler_file": address}
-        cluster = None
-    else:
+    cluster = None
+    if not address:
         # threads of this process, because each block has a process of its own
         cluster = distributed.LocalCluster(
             n_workers=1,
@@ -90,9 +71,9 @@ def _dask(address: str) -> Iterator[Place]:
             dashboard_address=None,
             scheduler_kwargs={"dashboard_address": ":0"},  # any port: others may have sweeps
         )
-        where = {"address": cluster}
+    key = "scheduler_file" if Path(address).suffix == ".json" else "address"
     try:
-        client = distributed.Client(**where, timeout=PATIENCE_S)
+        client = distributed.Client(**{key: cluster or address}, timeout=PATIENCE_S)
     except (OSError, ValueError) as reason:
         raise SweepError(
             f"executor: no scheduler of Dask at {address!r} ({reason}): start `dask scheduler`, "

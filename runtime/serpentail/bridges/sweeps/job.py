@@ -5,17 +5,18 @@ import pickle
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from os import PathLike
+from pathlib import Path
 from typing import Any
 
 from ...basics.checks import shown
 from ...basics.errors import SweepError
-from .axes import Point
 from .axis import as_json
+from .points import Point
 
 RUNS = ("simulate", "plan", "identify")
 STARTS = ("q0", "v0")
 DATA = "data"  # of an identification: its files of marker tracks
-NOTHING: Mapping[str, Any] = {}
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class Job:
     """
 
     run: str | Callable[..., Any]
-    settings: dict[str, Any] = field(default_factory=dict)
+    settings: Mapping[str, Any] = field(default_factory=dict)
     outputs: tuple[str, ...] = ()
     table: Mapping[str, Any] | None = None
     phases: Sequence[Mapping] = ()
@@ -39,14 +40,34 @@ class Job:
     parameters: Mapping[str, Any] = field(default_factory=dict)
     profile: str | None = None
 
-    def own_parameters(self, point: Point) -> Point:
+    def parameters_of(self, point: Point) -> Point:
         """Return the parameters of the model that a point has."""
         others = self.built | self.keys
         return {name: value for name, value in point.items() if name not in others}
 
-    def own_keys(self, point: Point) -> Point:
+    def keys_of(self, point: Point) -> Point:
         """Return the keys of the scene's table, or the settings, that a point has."""
         return {name: value for name, value in point.items() if name in self.keys}
+
+    def recordings(self, point: Point) -> list[Any]:
+        """Return the trials of a point: paths of files, whole, and tracks as they were given."""
+        data = point.get(DATA, self.settings.get(DATA))
+        trials = data if isinstance(data, list | tuple) else [data]
+        return [Path(self.parent, x) if isinstance(x, str | PathLike) else x for x in trials]
+
+    def digest_of(self, point: Point) -> str:
+        """Return a hash of the content of a point's files; SweepError if one cannot be read."""
+        content = hashlib.sha256()
+        for path in self.recordings(point):
+            if isinstance(path, Path):
+                try:
+                    content.update(hashlib.sha256(path.read_bytes()).digest())
+                except OSError as reason:
+                    raise SweepError(
+                        f"{DATA}: {shown(str(path))}: it cannot be read ({reason.strerror}): needs "
+                        "files of marker tracks"
+                    ) from None
+        return content.hexdigest()
 
     def pickled(self) -> bytes:
         """Return it as bytes; SweepError if a part of it cannot be pickled."""
@@ -60,24 +81,16 @@ class Job:
 
     def identity(self) -> str:
         """Return what rows depend on besides the model and the point."""
-        told = {
-            "run": _named(self.run),
-            "settings": _identified(self.settings),
-            "outputs": self.outputs,
-            "table": self.table,
-            "phases": self.phases,
-            "parameters": dict(self.parameters),
-            "profile": self.profile,
-        }
-        return as_json(told)
+        parts = (self.outputs, self.table, self.phases, dict(self.parameters), self.profile)
+        return as_json([_run_identity(self.run), _identity(dict(self.settings)), *parts])
 
 
-def _named(run: Any) -> Any:
+def _run_identity(run: Any) -> Any:
     """Return the name of a run; of a partial function, with its arguments."""
     if isinstance(run, str):
         return run
     if isinstance(run, partial):
-        return [_named(run.func), _identified([list(run.args), run.keywords])]
+        return [_run_identity(run.func), _identity([list(run.args), run.keywords])]
     where = run if hasattr(run, "__qualname__") else type(run)  # an object that is called
     name = f"{where.__module__}.{where.__qualname__}"
     if not callable(run) or "<" in name:  # a lambda, or a function in a function
@@ -88,12 +101,12 @@ def _named(run: Any) -> Any:
     return name
 
 
-def _identified(value: Any) -> Any:
+def _identity(value: Any) -> Any:
     """Return plain data as it is, anything else as a digest of its pickle."""
     try:
         as_json(value)
         return value
     except (TypeError, ValueError):
         if isinstance(value, dict):
-            return {str(name): _identified(each) for name, each in value.items()}
+            return {str(name): _identity(each) for name, each in value.items()}
         return hashlib.sha256(pickle.dumps(value)).hexdigest()

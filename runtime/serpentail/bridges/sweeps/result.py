@@ -12,12 +12,15 @@ import numpy as np
 
 from ...basics.checks import one_line
 from ...basics.errors import SweepError
+from ...basics.extras import needed
 from ...basics.short_repr import brief
-from .axes import Axes, checked_row
-from .driver import Spent
-from .groups import Posed
+from .points import Axes, checked_row
+from .pose import Posed
+from .runs import run_point
 from .shards import AT_ONCE, Row
 from .store import Store
+from .tables import dataset, flat, write
+from .worker import model_of
 
 if TYPE_CHECKING:
     import pandas
@@ -37,6 +40,20 @@ class Status:
         return (
             f"{self.done} of {self.points} points done, {self.failed} of them failed, {left} left"
         )
+
+
+@dataclass
+class Spent:
+    """What a sweep took: elapsed seconds, seconds of all workers, blocks, points, workers; and how
+    many points hung.
+    """
+
+    wall_s: float = 0.0
+    busy_s: float = 0.0
+    blocks: int = 0
+    points: int = 0
+    workers: int = 1
+    hung: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +76,7 @@ class Sweep:
 
     posed: Posed = field(repr=False)
     store: Store = field(repr=False)
-    spent: Spent
+    spent: Spent = field(default_factory=Spent)
     __repr__ = brief
 
     @property
@@ -72,10 +89,10 @@ class Sweep:
 
     def __getitem__(self, k: int) -> dict[str, Any]:
         """Return the row of point k; KeyError if it has none yet, IndexError if k is no point."""
-        found = self.store.row(range(len(self))[k])
-        if found is None:
+        row = self.store.row(range(len(self))[k])
+        if row is None:
             raise KeyError(f"point {k} has no row yet")
-        return self._row(found, self.axes.at([found.number])[0])
+        return self._row(row, self.axes.at([row.number])[0])
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
         """Yield all rows that exist, in the order of their points."""
@@ -89,8 +106,8 @@ class Sweep:
         """Return a stored row as a dict; SweepError if it is damaged."""
         try:
             outcome = {} if row.outcome is None else json.loads(row.outcome)
-            told = {"error": row.error, "seconds": row.seconds}
-            return {"number": row.number} | point | outcome | told
+            outcome |= {"error": row.error, "seconds": row.seconds}
+            return {"number": row.number} | point | outcome
         except (RecursionError, TypeError, ValueError) as reason:
             raise SweepError(
                 f"store: the row of point {row.number} is damaged ({one_line(str(reason))}): "
@@ -100,22 +117,13 @@ class Sweep:
     def rows(self) -> list[dict[str, Any]]:
         """Return all rows that exist, in the order of their points.
 
-        Returns
-        -------
-        list of dict
-            Each has "number", the point's values, the run's outputs, "error" (None for success) and
-            "seconds" (s).
+        Each has "number", the point's values, the run's outputs, "error" (None for success) and
+        "seconds" (s).
         """
         return list(self)
 
     def status(self) -> Status:
-        """Return how far the sweep is, from the store's present content.
-
-        Returns
-        -------
-        Status
-            ``points``, ``done`` and ``failed``.
-        """
+        """Return how far the sweep is, from the store's present content."""
         self.store.look()
         return Status(len(self), int(self.store.done.sum()), self.store.failed)
 
@@ -139,9 +147,6 @@ class Sweep:
         SerpentailError
             What the run raises.
         """
-        from .bundles import model_of
-        from .runs import run_point
-
         number, job = [checked_row(k, len(self))], self.posed.job
         bundle = self.posed.bundles[self.posed.models(np.array(number))[0]]
         _, motion = run_point(job, model_of(bundle, job), self.axes.at(number)[0])
@@ -153,86 +158,34 @@ class Sweep:
         return motion
 
     def view(self, k: int, path: str | PathLike[str] = "run.html") -> Path:
-        """Run a point again and write a page of its motion.
+        """Run a point again, write a page of its motion (.html), and return the file's path.
 
-        Parameters
-        ----------
-        k : int
-            Number of the point, from 0.
-        path : str or path, default "run.html"
-            The .html file.
-
-        Returns
-        -------
-        Path
-            The path of the file.
-
-        Raises
-        ------
-        SweepError, ViewError
-            As of ``motion`` and ``serpentail.view``.
+        SweepError as of ``motion``, ViewError as of ``serpentail.view``.
         """
         page: Path = self.motion(k).view(path)
         return page
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Convert the rows to a pandas table with one row for each point; needs the extra "pandas".
+        """Return the rows as a pandas table with one row for each point.
 
-        Returns
-        -------
-        pandas.DataFrame
-            The table.
-
-        Raises
-        ------
-        ExtraMissing
-            pandas is not installed.
+        ExtraMissing unless the extra "pandas" is installed.
         """
-        from .tables import frame
-
-        return frame(self)
+        pandas = needed("pandas", "pandas")
+        return pandas.DataFrame([flat(row) for row in self])
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Convert the rows to an xarray dataset; needs the extra "xarray".
+        """Return the rows as an xarray dataset.
 
-        Returns
-        -------
-        xarray.Dataset
-            It has a dimension for each grid, and "sample" for all other axes together. Points that
-            failed or have no row are NaN.
-
-        Raises
-        ------
-        ExtraMissing
-            xarray is not installed.
+        It has a dimension for each grid, and "sample" for all other axes together. Points that
+        failed or have no row are NaN. ExtraMissing unless the extra "xarray" is installed.
         """
-        from .tables import dataset
-
         return dataset(self)
 
     def save(self, path: str | PathLike[str]) -> Path:
-        """Write the rows to a file, whole or not at all. A .nc file is made in memory, others are
-        not.
+        """Write the rows to a .parquet, .csv or .nc file, whole or not at all; return its path.
 
-        Parameters
-        ----------
-        path : str or path
-            A .parquet, .csv or .nc file.
-
-        Returns
-        -------
-        Path
-            The path of the file.
-
-        Raises
-        ------
-        SweepError
-            The suffix is another one.
-        ExtraMissing
-            The library for this file is not installed.
-        NotWritten
-            The file cannot be written.
+        A .nc file is made in memory, others are not. SweepError if the suffix is another one,
+        ExtraMissing if the library for this file is not installed, NotWritten if it cannot be
+        written.
         """
-        from .tables import write
-
         return write(self, path)

@@ -1,11 +1,12 @@
 """Runs the points of a sweep on one model: one after another, or flights side by side."""
 
 import json
-import math
 import time
-from collections.abc import Iterator, Sequence
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -13,190 +14,172 @@ from ...basics.errors import SerpentailError, SweepError
 from ...model.model import Model
 from ...motion.numbers import NUMBERS
 from ...motion.trajectory import Trajectory
+from ...scenes.file import size_of
 from ...scenes.overrides import changed
 from ...scenes.scenario import Scenario
 from ...scenes.simulate import scenario_of
 from ...simulation.controllers import Damping, TorqueCurve, TorqueTable
 from ...simulation.rollouts import Rollouts
 from ...simulation.simulate import simulate
-from .axes import Point
-from .job import STARTS, Job
+from .axis import array_as_list
+from .job import DATA, STARTS, Job
+from .points import Point
+from .shards import Row
 
 ENDS = ("end_s", "q_end", "v_end", "kinetic_end_J", "potential_end_J")  # outputs by default
 OUTPUTS = (*ENDS, *(number.name for number in NUMBERS))
-FEW = 2  # points that are not worth running side by side
 MOST_TEXT = 2000  # characters of an error
 SHARED = (type(None), Damping, TorqueTable, TorqueCurve)  # controllers that any parameters suit
+Outcome = tuple[str | None, str | None]  # JSON, or the error in place of it
 
 
-class Told(NamedTuple):
-    """Result of a point: its place in the block, outcome (JSON) or error, seconds."""
-
-    place: int
-    outcome: str | None
-    error: str | None
-    seconds: float
-
-
-def run_points(job: Job, model: Model | None, points: Sequence[Point]) -> Iterator[list[Told]]:
-    """Yield the results of points, in their order: one at a time, or all at once."""
-    if len(points) >= FEW and model is not None and job.run == "simulate":
+def run_points(job: Job, model: Model | None, points: Mapping[int, Point]) -> Iterator[list[Row]]:
+    """Yield the rows of points by their numbers, in their order: one at a time, or all at once."""
+    if len(points) > 1 and model is not None and job.run == "simulate":
         begun = time.perf_counter()
         try:
-            found = _side_by_side(job, model, points)
-        except SerpentailError:  # about one of them; running them one by one shows which
-            found = None
-        if found is not None:
-            each = (time.perf_counter() - begun) / len(points)
-            yield [Told(k, *one, each) for k, one in enumerate(found)]
+            outcomes = _side_by_side(job, model, list(points.values()))
+        except (SerpentailError, TypeError, ValueError):  # one by one, the point at fault shows
+            outcomes = None
+        if outcomes is not None:
+            seconds = (time.perf_counter() - begun) / len(points)
+            pairs = zip(points, outcomes, strict=True)
+            yield [Row(number, *outcome, seconds) for number, outcome in pairs]
             return
-    for k, point in enumerate(points):
+    for number, point in points.items():
         begun = time.perf_counter()
         try:
-            outcome, error = as_text(run_point(job, model, point)[0]), None
+            outcome, error = _as_text(run_point(job, model, point)[0]), None
         except Exception as reason:  # a failure is a row, too
-            outcome, error = None, error_text(reason)
-        yield [Told(k, outcome, error, time.perf_counter() - begun)]
+            outcome, error = None, _error_text(reason)
+        yield [Row(number, outcome, error, time.perf_counter() - begun)]
 
 
 def run_point(job: Job, model: Model | None, point: Point) -> tuple[dict[str, Any], Any]:
     """Return the outcome of a point, and its motion, plan or other object with a page, or None."""
-    if job.run == "simulate":
-        assert model is not None
-        motion = _simulated(job, model, point)
-        return outcome_of(motion, job.outputs), motion
-    if job.run == "plan":
-        assert model is not None
-        found = _planned(job, model, point)
-        return found.report | {"warnings": found.warnings}, found
-    if job.run == "identify":
-        from .identified import identified
-
-        assert model is not None
-        return identified(job, model, point)
-    assert not isinstance(job.run, str)
-    if model is None:
-        outcome = job.run(point)
-    else:
-        outcome = job.run(model.with_parameters(**job.own_parameters(point)), point)
-    if not isinstance(outcome, dict):
-        raise SweepError(
-            f"run: it returned a {type(outcome).__name__}: needs a dict of names and plain data"
-        )
-    return outcome, outcome.pop("motion", None)
+    if model is not None:
+        model = model.with_parameters(**job.parameters_of(point))
+    if not isinstance(job.run, str):
+        outcome = job.run(point) if model is None else job.run(model, point)
+        if not isinstance(outcome, dict):
+            raise SweepError(
+                f"run: it returned a {type(outcome).__name__}: needs a dict of names and plain data"
+            )
+        return outcome, outcome.pop("motion", None)
+    assert model is not None
+    return {"simulate": _simulated, "plan": _planned, "identify": _identified}[job.run](
+        job, model, point
+    )
 
 
-def _simulated(job: Job, model: Model, point: Point) -> Trajectory:
-    own = model.with_parameters(**job.own_parameters(point))
+def _simulated(job: Job, model: Model, point: Point) -> tuple[dict[str, Any], Trajectory]:
     if job.table is not None:
-        found = _scenario(job, own, point).simulate(**job.settings)
-        assert isinstance(found, Trajectory)
-        return found
-    arguments = job.settings | job.own_keys(point)
-    q0, v0 = (arguments.pop(name) for name in STARTS)
-    motion = simulate(own, q0, v0, **arguments)
+        motion = _scenario(job, model, point).simulate(**job.settings)
+    else:
+        motion = simulate(model, **{**job.settings, **job.keys_of(point)})
     assert isinstance(motion, Trajectory)
-    return motion
+    return _outputs(motion, job.outputs), motion
 
 
-def _planned(job: Job, model: Model, point: Point) -> Any:
+def _planned(job: Job, model: Model, point: Point) -> tuple[dict[str, Any], Any]:
     from ...planning.planner import plan
     from ...scenes.plan import arguments_for
 
-    own = model.with_parameters(**job.own_parameters(point))
     if job.table is not None:
-        table = changed(job.table, job.own_keys(point))
-        return plan(own, **arguments_for(own, table) | job.settings)
-    arguments = job.settings | job.own_keys(point)
-    start = tuple(arguments.pop(name) for name in STARTS)
-    return plan(own, start=start, **arguments)
+        table = changed(job.table, job.keys_of(point))
+        solution = plan(model, **{**arguments_for(model, table), **job.settings})
+    else:
+        arguments = {**job.settings, **job.keys_of(point)}
+        start = tuple(arguments.pop(name) for name in STARTS)
+        solution = plan(model, start=start, **arguments)
+    return solution.report | {"warnings": solution.warnings}, solution
+
+
+def _identified(job: Job, model: Model, point: Point) -> tuple[dict[str, Any], Any]:
+    from ...identification.identify import identify
+    from ...scenes.identify import identify_arguments
+
+    keys = {name: value for name, value in job.keys_of(point).items() if name != DATA}
+    if job.table is not None:
+        table = changed(job.table, keys)
+        arguments = {**identify_arguments(table, size_of(model)), **job.settings}
+    else:
+        arguments = {**job.settings, **keys}
+    arguments.pop(DATA, None)
+    markers, estimate = arguments.pop("markers"), arguments.pop("estimate", ())
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        result = identify(model, job.recordings(point), markers, estimate, **arguments)
+    report = result.report | {"warnings": [str(warning.message) for warning in caught]}
+    del report["seconds"]  # which each row has
+    return report, result
 
 
 def _scenario(job: Job, model: Model, point: Point) -> Scenario:
-    table = changed(job.table or {}, job.own_keys(point))
+    table = changed(job.table or {}, job.keys_of(point))
     return scenario_of(model, table, Path(job.parent), list(job.phases))
 
 
-def _side_by_side(
-    job: Job, model: Model, points: Sequence[Point]
-) -> list[tuple[str | None, str | None]] | None:
-    """Return outcomes and errors of flights that differ in parameters and starts alone; None if
-    these differ in more.
-    """
-    parameters = [job.own_parameters(point) for point in points]
-    runs: dict[str, Any] = {name: [each[name] for each in parameters] for name in parameters[0]}
+def _side_by_side(job: Job, model: Model, points: Sequence[Point]) -> list[Outcome] | None:
+    """Return the outcomes of flights that differ in parameters and starts alone; else None."""
+    settings = dict(job.settings)
     if job.table is None:
         if not job.keys <= set(STARTS):
             return None
-        fixed = dict(job.settings)
-        if not isinstance(fixed.get("controller"), SHARED):
-            return None
-        both = {
-            name: [p[name] for p in points] if name in job.keys else fixed.pop(name)
+        q0, v0 = (
+            np.array([p[name] for p in points] if name in job.keys else settings.pop(name), float)
             for name in STARTS
-        }
-        if not job.keys:  # one row for each run, because they are many
-            both["q0"] = np.broadcast_to(both["q0"], (len(points), model.nq))
-        fixed |= _samples(job, fixed, fixed.get("t_span", (0.0, 1.0)))
-        found = simulate(model, both["q0"], both["v0"], parameters=runs, **fixed)
+        )
+        flight = Scenario(model, q0, v0, 1.0)
     else:
         start = job.table.get("start")
         settles = isinstance(start, dict) and "settle" in start
         if settles or job.phases or any(key.split(".")[0] != "start" for key in job.keys):
             return None
-        scenes = [_scenario(job, model, p) for p in (points if job.keys else points[:1])]
-        if not isinstance(scenes[0].controller, SHARED):
-            return None
-        q0 = np.array([scene.q0 for scene in scenes])
-        v0 = np.array([scene.v0 for scene in scenes])
-        if not job.keys:
-            q0 = np.broadcast_to(q0, (len(points), model.nq))
-            v0 = np.broadcast_to(v0, (len(points), model.nv))
-        first = Scenario(model, q0, v0, scenes[0].duration, scenes[0].controller, scenes[0].legs)
-        fixed = scenes[0].settings | job.settings
-        fixed |= _samples(job, fixed, fixed.get("t_span", first.duration))
-        found = first.simulate(**fixed | {"parameters": runs})
-    assert isinstance(found, Rollouts)
-    return _outcomes(found, job.outputs)
+        flights = [_scenario(job, model, p) for p in (points if job.keys else points[:1])]
+        flight = flights[0]
+        q0, v0 = (np.array([getattr(each, name) for each in flights]) for name in STARTS)
+    settings = {"controller": flight.controller, "t_span": flight.duration} | (
+        flight.settings | settings
+    )
+    if not isinstance(settings["controller"], SHARED):
+        return None
+    if set(job.outputs) <= set(ENDS) and "output_step" not in settings:  # they need no other sample
+        settings["output_step"] = float(np.ptp([0.0, *np.atleast_1d(settings["t_span"])][-2:]))
+    flight = replace(
+        flight,
+        q0=np.broadcast_to(q0, (len(points), model.nq)),
+        v0=np.broadcast_to(v0, (len(points), model.nv)),
+    )
+    parameters = [job.parameters_of(point) for point in points]
+    runs = {name: [each[name] for each in parameters] for name in parameters[0]}
+    rollouts = flight.simulate(**settings, parameters=runs)
+    assert isinstance(rollouts, Rollouts)
+    return _outcomes(rollouts, job.outputs)
 
 
-def _samples(job: Job, settings: dict[str, Any], t_span: Any) -> dict[str, Any]:
-    """Return the setting to sample only the ends, if the outputs need no more."""
-    ends = np.asarray(t_span, float)
-    if (
-        "output_step" in settings
-        or not set(job.outputs) <= set(ENDS)
-        or ends.shape not in ((), (2,))
-    ):
-        return {}
-    return {"output_step": float(np.ptp(np.append(0.0, ends) if ends.ndim == 0 else ends))}
-
-
-def _outcomes(found: Rollouts, outputs: Sequence[str]) -> list[tuple[str | None, str | None]]:
-    """Return outcomes and errors of runs as text."""
-    last = np.maximum(np.isfinite(found.kinetic).sum(axis=1) - 1, 0)
-    every = np.arange(len(found))
-    arrays = (found.ends, found.q[every, last], found.v[every, last])
-    energies = (found.kinetic[every, last], found.potential[every, last])
-    ends = dict(zip(ENDS, (x.tolist() for x in (*arrays, *energies)), strict=True))
-    of_ends = [name for name in outputs if name in ENDS]
-    columns = zip(*(ends[name] for name in of_ends), strict=True) if of_ends else ((),) * len(found)
-    told: list[tuple[str | None, str | None]] = []
-    for k, (values, error) in enumerate(zip(columns, found.errors, strict=True)):
+def _outcomes(rollouts: Rollouts, outputs: Sequence[str]) -> list[Outcome]:
+    """Return the outcomes of runs."""
+    last = np.maximum(np.isfinite(rollouts.kinetic).sum(axis=1) - 1, 0)
+    every = np.arange(len(rollouts))
+    arrays = (rollouts.q, rollouts.v, rollouts.kinetic, rollouts.potential)
+    columns = [rollouts.ends.tolist(), *(x[every, last].tolist() for x in arrays)]
+    ends = dict(zip(ENDS, columns, strict=True))
+    outcomes: list[Outcome] = []
+    for k, error in enumerate(rollouts.errors):
         if error is not None:
-            told.append((None, error_text(error)))
-            continue
-        outcome = dict(zip(of_ends, values, strict=True))
-        if len(of_ends) < len(outputs):
-            outcome = outcome_of(found[k], outputs)
-        told.append((json.dumps(outcome), None))
-    return told
+            outcomes.append((None, _error_text(error)))
+        elif ends.keys() >= set(outputs):
+            outcomes.append((json.dumps({name: ends[name][k] for name in outputs}), None))
+        else:
+            outcomes.append((json.dumps(_outputs(rollouts[k], outputs)), None))
+    return outcomes
 
 
-def outcome_of(motion: Trajectory, outputs: Sequence[str]) -> dict[str, Any]:
+def _outputs(motion: Trajectory, outputs: Sequence[str]) -> dict[str, Any]:
     """Return the outputs of a motion by name."""
-    arrays = (motion.t[-1], motion.q[-1], motion.v[-1], motion.kinetic[-1], motion.potential[-1])
-    ends = dict(zip(ENDS, (np.asarray(x).tolist() for x in arrays), strict=True))
+    arrays = (motion.t, motion.q, motion.v, motion.kinetic, motion.potential)
+    ends = {name: x[-1].tolist() for name, x in zip(ENDS, arrays, strict=True)}
     numbers = {number.name: number for number in NUMBERS if number.name in outputs}
     return {
         name: ends[name] if name in ends else numbers[name].of(motion.model, motion)  # type: ignore[arg-type]
@@ -204,25 +187,17 @@ def outcome_of(motion: Trajectory, outputs: Sequence[str]) -> dict[str, Any]:
     }
 
 
-def as_text(outcome: dict[str, Any]) -> str:
-    """Return an outcome as JSON; SweepError if it is not plain data."""
+def _as_text(outcome: dict[str, Any]) -> str:
+    """Return an outcome as JSON, with null for what is not finite; SweepError if it is no data."""
     try:
-        return json.dumps(_ready(outcome), allow_nan=False)
+        text = json.dumps(outcome, default=array_as_list)
+        if "NaN" in text or "Infinity" in text:
+            text = json.dumps(json.loads(text, parse_constant=lambda _: None))
+        return text
     except (TypeError, ValueError) as reason:
         raise SweepError(f"run: its outcome is not plain data ({reason})") from None
 
 
-def _ready(value: Any) -> Any:
-    """Return a value for JSON: None for a number that is not finite."""
-    if isinstance(value, np.ndarray | np.generic):
-        value = value.tolist()
-    if isinstance(value, dict):
-        return {str(name): _ready(each) for name, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_ready(each) for each in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def error_text(reason: BaseException) -> str:
+def _error_text(reason: BaseException) -> str:
     """Return the text of a failure in a row."""
     return f"{type(reason).__name__}: {reason}"[:MOST_TEXT]

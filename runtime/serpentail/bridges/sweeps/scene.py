@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ...basics.checks import Refusals, none_of, refusal, shown
+from ...basics.checks import Refusals, none_of, refusal
 from ...basics.errors import SweepError
 from ...scenes.file import read_scene, subtable
 from ...scenes.keys import read
@@ -12,8 +12,7 @@ from ...scenes.sweep_keys import SWEEP
 from .axis import Grid, Spread, grid, latin, random, sobol
 from .job import RUNS
 
-WAYS = {"random": random, "latin": latin, "sobol": sobol}
-AXIS = ("grid", *WAYS, "law")
+SPREADS = {"random": random, "latin": latin, "sobol": sobol}
 
 
 def arguments_of(path: str) -> dict[str, Any]:
@@ -39,8 +38,8 @@ def arguments_of(path: str) -> dict[str, Any]:
     }
     refused.tell()
     store = place.parent / table.get("store", f"{place.stem}.rows")
-    given = {name: table[name] for name in ("points", "seed", "outputs", "limit") if name in table}
-    return {"model": str(place), "over": axes, "run": run, "store": Path(store)} | given
+    others = {name: table[name] for name in ("points", "seed", "outputs", "limit") if name in table}
+    return {"model": str(place), "over": axes, "run": run, "store": Path(store)} | others
 
 
 def axis_of(where: str, value: Any) -> Grid | Spread:
@@ -51,13 +50,14 @@ def axis_of(where: str, value: Any) -> Grid | Spread:
         raise refusal(
             where, value, "a list of values, or a table such as {random = [0, 1]}", SweepError
         )
-    ways = [name for name in value if name != "law"]
-    if len(ways) != 1 or any(name not in AXIS for name in value):
+    kinds = [name for name in value if name != "law"]
+    if len(kinds) != 1 or kinds[0] not in ("grid", *SPREADS):
         raise refusal(where, dict(value), "one of grid, random, latin and sobol", SweepError)
-    (way,) = ways
-    if way == "grid":
-        return grid(value["grid"])
-    bounds = value[way]
+    (kind,) = kinds
+    if kind == "grid":
+        return grid(value[kind])
+    bounds = value[kind]
     if not isinstance(bounds, list) or len(bounds) != 2:
-        raise SweepError(f"{where}.{way}: value {shown(bounds)}: needs two bounds, [low, high]")
-    return WAYS[way](bounds[0], bounds[1], value.get("law", "uniform"))
+        raise refusal(f"{where}.{kind}", bounds, "two bounds, [low, high]", SweepError)
+    low, high = bounds
+    return SPREADS[kind](low, high, value.get("law", "uniform"))

@@ -4,6 +4,7 @@ import os
 import re
 import zlib
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from heapq import heappop, heappush
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -53,21 +54,21 @@ class Shard(NamedTuple):
     def written(self, folder: Path) -> "Shard":
         """Return it as a file, which is there whole or not at all; NotWritten if it cannot be."""
         arrow, parquet = parquet_library()
+        schema = _schema(arrow)
         columns = list(zip(*self.where, strict=True))
-        kinds = arrow.schema(columns_of(arrow))
-        arrays = [arrow.array(x, kind.type) for x, kind in zip(columns, kinds, strict=True)]
-        table = arrow.Table.from_arrays(arrays, schema=kinds)
+        arrays = [arrow.array(x, kind.type) for x, kind in zip(columns, schema, strict=True)]
         check = zlib.crc32(np.array(columns[0], np.int64).tobytes())
         name = f"{self.first:08d}-{self.last:08d}-{self.size}-{self.failed}-{check:08x}.parquet"
         path = folder / f"{self.first // IN_FOLDER:03d}" / name
         with replacing(path) as part:
+            table = arrow.Table.from_arrays(arrays, schema=schema)
             parquet.write_table(table, part, compression="zstd")
         return self._replace(where=str(path))
 
-    def numbers(self) -> slice | np.ndarray:
+    def numbers(self) -> np.ndarray:
         """Return the numbers of its rows."""
         if self.size == self.last - self.first + 1:
-            return slice(self.first, self.last + 1)
+            return np.arange(self.first, self.last + 1)
         return np.array([row.number for row in self.rows()])
 
     def rows(self) -> Iterator[Row]:
@@ -78,29 +79,38 @@ class Shard(NamedTuple):
         arrow, parquet = parquet_library()
         try:
             with parquet.ParquetFile(self.where) as file:
-                if [(each.name, each.type) for each in file.schema_arrow] != columns_of(arrow):
+                if not file.schema_arrow.equals(_schema(arrow)):
                     raise ValueError("it has other columns")
                 for batch in file.iter_batches(AT_ONCE):
                     columns = (column.to_pylist() for column in batch.columns)
-                    yield from map(self._row, zip(*columns, strict=True))
+                    for row in map(Row, *columns):
+                        if not (self.first <= row.number <= self.last and row.seconds >= 0):
+                            raise ValueError(f"it has a row {row.number} of {row.seconds} s")
+                        yield row
         except (OSError, ValueError, TypeError, arrow.ArrowException) as reason:
             raise SweepError(
                 f"store: {self.where} cannot be read ({one_line(str(reason))}): delete it, and the "
                 "same call makes its rows again"
             ) from None
 
-    def _row(self, values: tuple) -> Row:
-        """Return the row of a file; ValueError or TypeError for what no sweep has written."""
-        row = Row._make(values)
-        if not (self.first <= row.number <= self.last and row.seconds >= 0):
-            raise ValueError(f"it has a row {row.number} of {row.seconds} s")
-        return row
 
+@dataclass(frozen=True)
+class ShardFolder:
+    """Where workers write shards: a sweep's folder, and a file that tells its store from others.
 
-def columns_of(arrow: Any) -> list[tuple[str, Any]]:
-    """Return the names and types of a shard's columns."""
-    kinds = (arrow.int64(), arrow.string(), arrow.string(), arrow.float64())
-    return list(zip(Row._fields, kinds, strict=True))
+    A worker that does not find this very store returns the rows to the driver.
+    """
+
+    folder: Path
+    marked: Path
+    mark: bytes
+
+    def is_here(self) -> bool:
+        """Tell if this process sees the store."""
+        try:
+            return self.marked.read_bytes() == self.mark
+        except OSError:
+            return False
 
 
 def parquet_library() -> tuple[Any, Any]:
@@ -108,20 +118,25 @@ def parquet_library() -> tuple[Any, Any]:
     return needed("pyarrow", "parquet"), needed("pyarrow.parquet", "parquet")
 
 
+def _schema(arrow: Any) -> Any:
+    """Return the names and types of a shard's columns."""
+    kinds = (arrow.int64(), arrow.string(), arrow.string(), arrow.float64())
+    return arrow.schema(list(zip(Row._fields, kinds, strict=True)))
+
+
 def in_order(shards: Sequence[Shard]) -> Iterator[Row]:
-    """Yield the rows of shards, in the order of their first numbers, in order of all numbers."""
-    opened: list[tuple[Row, Iterator[Row]]] = []  # next row of each, in order
-    for shard in [*shards, None]:
+    """Yield the rows of shards in order of their numbers; few files are open at a time."""
+    opened: list[tuple[Row, Iterator[Row]]] = []  # a heap of the next row of each
+
+    def push(rows: Iterator[Row]) -> None:
+        row = next(rows, None)
+        if row is not None:
+            heappush(opened, (row, rows))
+
+    for shard in [*sorted(shards, key=lambda shard: shard[:4]), None]:
         while opened and (shard is None or opened[0][0].number < shard.first):
-            row, rest = heappop(opened)
+            row, rows = heappop(opened)
             yield row
-            _push(opened, rest)
+            push(rows)
         if shard is not None:
-            _push(opened, shard.rows())
-
-
-def _push(opened: list, rows: Iterator[Row]) -> None:
-    """Add an iterator of rows by its next one, if it has one."""
-    row = next(rows, None)
-    if row is not None:
-        heappush(opened, (row, rows))
+            push(shard.rows())

@@ -4,7 +4,7 @@ import hashlib
 import json
 import os
 import secrets
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -14,10 +14,8 @@ from filelock import FileLock, Timeout
 
 from ...basics.errors import SweepError
 from ...basics.files import refuse_unusable, replacing
-from .adoption import Mapped
 from .axis import as_json
-from .shards import NAME, Row, Shard, in_order, parquet_library
-from .supervision import ShardFolder
+from .shards import NAME, Row, Shard, ShardFolder, in_order, parquet_library
 
 MARK = "store.json"  # tells that a folder is a store, and which one
 SPEC = "sweep.json"
@@ -38,14 +36,13 @@ class Store:
         self.spec = json.loads(as_json(spec))
         self.shards: list[Shard] = []
         self.done = np.zeros(total, bool)
-        if self.path is None:
-            return
-        parquet_library()
-        _refuse_other(self.path)
-        family, own = (
-            hashlib.sha256(as_json(x).encode()).hexdigest()[:16] for x in (spec["family"], spec)
-        )
-        self.folder = self.path / f"{family}-{own}"
+        if self.path is not None:
+            parquet_library()
+            _refuse_other(self.path)
+            family, sweep = (
+                hashlib.sha256(as_json(x).encode()).hexdigest()[:16] for x in (spec["family"], spec)
+            )
+            self.folder = self.path / f"{family}-{sweep}"
 
     @contextmanager
     def writing(self) -> Iterator[None]:
@@ -67,7 +64,9 @@ class Store:
         try:
             self._begin(self.path)
             yield
-            self._remove_others()
+            # the shards of workers that were thought to be lost: others have their rows
+            for path in set(_files(self.folder)) - {shard.where for shard in self.shards}:
+                Path(path).unlink(missing_ok=True)
         finally:
             lock.release()
 
@@ -81,22 +80,18 @@ class Store:
             _write(self.folder / SPEC, self.spec)
         self.look()
 
-    def _remove_others(self) -> None:
-        """Remove shards whose rows others have: of workers that were thought to be lost."""
-        own = {shard.where for shard in self.shards}
-        for path in set(_files(self.folder)) - own:
-            Path(path).unlink(missing_ok=True)
-
     def _adopt(self, other: Path) -> None:
         """Take the rows of another sweep that are rows of this one, too."""
         try:
-            mapped = Mapped(json.loads(other.read_bytes()), self.spec)
+            total, numbers_here = adopted_numbers(json.loads(other.read_bytes()), self.spec)
         except (ArithmeticError, LookupError, MemoryError, RecursionError, TypeError, ValueError):
             raise SweepError(f"store: {other} is damaged: delete its folder") from None
-        for shard in _accepted(other.parent, np.zeros(mapped.old_total, bool)):
+        for shard in _accepted(other.parent, np.zeros(total, bool)):
             rows = [
                 row._replace(number=number)
-                for row, number in zip(shard.rows(), mapped(shard), strict=True)
+                for row, number in zip(
+                    shard.rows(), numbers_here(shard.numbers()).tolist(), strict=True
+                )
                 if number >= 0 and not self.done[number]
             ]
             if rows:
@@ -130,47 +125,40 @@ class Store:
 
     def rows(self) -> Iterator[Row]:
         """Yield all rows in the order of their numbers."""
-        return in_order(sorted(self.shards, key=lambda shard: shard[:4]))
+        return in_order(self.shards)
 
     def row(self, number: int) -> Row | None:
         """Return the row of a number; None if it has none."""
-        for shard in self.shards:
-            if shard.first <= number <= shard.last:
-                for row in shard.rows():
-                    if row.number == number:
-                        return row
-        return None
+        near = (shard for shard in self.shards if shard.first <= number <= shard.last)
+        return next((row for shard in near for row in shard.rows() if row.number == number), None)
 
     def forget(self, numbers: Sequence[int] | None = None) -> None:
         """Delete rows, by default those of failures, so that they are made again."""
-        gone = None if numbers is None else set(numbers)
+        gone = np.zeros(len(self.done), bool)
+        if numbers is None:
+            failures = (shard for shard in self.shards if shard.failed)
+            numbers = [r.number for shard in failures for r in shard.rows() if r.error is not None]
+        gone[numbers] = True
         for shard in list(self.shards):
-            if shard.failed if gone is None else self.done[list(gone)].any():
-                kept = [
-                    row
-                    for row in shard.rows()
-                    if (row.error is None if gone is None else row.number not in gone)
-                ]
-                if len(kept) < shard.size:
-                    self._replace(shard, kept)
-
-    def _replace(self, shard: Shard, kept: Sequence[Row]) -> None:
-        """Have fewer rows in place of a shard."""
-        self.shards.remove(shard)
-        self.done[shard.numbers()] = False
-        if kept:
-            self.accept(Shard.of(kept))
-        if self.path is not None:
-            os.unlink(shard.where)
+            if not gone[shard.first : shard.last + 1].any():
+                continue
+            rows = [row for row in shard.rows() if not gone[row.number]]
+            if len(rows) < shard.size:
+                self.shards.remove(shard)
+                if rows:
+                    self.accept(Shard.of(rows))
+                if self.path is not None:
+                    os.unlink(shard.where)
+        self.done &= ~gone
 
 
 def _files(folder: Path) -> list[str]:
     """Return the paths of shards in a folder, in the order of their first numbers."""
-    found: list[str] = []
+    paths: list[str] = []
     for inner in folder.glob("[0-9]*"):
         with os.scandir(inner) as entries:
-            found += [entry.path for entry in entries if NAME.fullmatch(entry.name)]
-    return sorted(found)
+            paths += [entry.path for entry in entries if NAME.fullmatch(entry.name)]
+    return sorted(paths)
 
 
 def _accepted(folder: Path, done: np.ndarray) -> list[Shard]:
@@ -204,3 +192,56 @@ def _write(path: Path, value: Any) -> None:
     """Write plain data as JSON."""
     with replacing(path) as part:
         part.write_text(as_json(value), encoding="utf-8")
+
+
+def adopted_numbers(
+    old: Mapping[str, Any], new: Mapping[str, Any]
+) -> tuple[int, Callable[[np.ndarray], np.ndarray]]:
+    """Return how many points an old sweep has, and what finds their numbers in a new one.
+
+    It returns -1 for points that the new sweep does not have. Both sweeps are told by their "spec",
+    see ``pose``.
+    """
+    old_sizes, new_sizes = _sizes(old), _sizes(new)
+    old_models, new_models = (
+        np.broadcast_to(np.array(spec["models"]), sizes)
+        for spec, sizes in ((old, old_sizes), (new, new_sizes))
+    )
+    old_axes = {tuple(names): k for k, (names, _) in enumerate(old["grids"])}
+    possible = {tuple(names) for names, _ in new["grids"]} == old_axes.keys()
+    possible = possible and all(old[name] == new[name] for name in _same(new))
+
+    # for each new axis: which old one it was, and the new place of each old place
+    axes = []
+    for names, rows in new["grids"] if possible else ():
+        k = old_axes[tuple(names)]
+        places = {row: place for place, row in enumerate(rows)}
+        axes.append((k, np.array([places.get(row, -1) for row in old["grids"][k][1]])))
+    if new["spreads"]:
+        samples = np.arange(old["points"])
+        axes.append((-1, np.where(samples < new["points"], samples, -1)))
+
+    def numbers_in_new(numbers: np.ndarray) -> np.ndarray:
+        if not possible:
+            return np.full(len(numbers), -1)
+        places = np.unravel_index(numbers, old_sizes)
+        moved = [new_places[places[k]] for k, new_places in axes]
+        inside = tuple(np.maximum(x, 0) for x in moved)
+        there = np.all([x >= 0 for x in moved], axis=0)
+        there &= old_models[places] == new_models[inside]
+        return np.where(there, np.ravel_multi_index(inside, new_sizes), -1)
+
+    return int(np.prod(old_sizes)), numbers_in_new
+
+
+def _sizes(spec: Mapping[str, Any]) -> tuple[int, ...]:
+    """Return how many places each axis has."""
+    grids = tuple(len(rows) for _, rows in spec["grids"])
+    return (*grids, spec["points"]) if spec["spreads"] else grids
+
+
+def _same(spec: Mapping[str, Any]) -> list[str]:
+    """Return what another sweep must have equal so that equal samples have equal numbers."""
+    names = ["spreads", "seed"] if spec["spreads"] else ["spreads"]
+    latin = any(kind == "latin" for _, (kind, *_) in spec["spreads"])
+    return [*names, "points"] if latin else names

@@ -7,18 +7,19 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from ...basics.checks import none_of, number, refusal, shown
+from ...basics.checks import none_of, number, one_of, refusal, shown
 from ...basics.errors import SweepError
 from ...model.model import Model
-from .axes import axes_of
 from .axis import Grid, Spread, plain
-from .blocks import Missing
-from .driver import Driver, Group, Spent
-from .groups import pose
+from .driver import Driver
 from .job import RUNS, STARTS, Job
+from .points import axes_of
+from .pose import pose
 from .result import Sweep
+from .runs import ENDS, OUTPUTS
 from .store import Store
-from .supervision import importing
+from .supervision import BlockSettings
+from .worker import importing
 
 WITHOUT = ("watch", "threads", "parameters")  # settings of a run that a sweep has itself
 
@@ -107,89 +108,84 @@ def sweep(  # noqa: PLR0913 - the public face names all that it takes
             "the main program calls sweep where a worker imports its functions: put the call below "
             'the line if __name__ == "__main__":'
         )
-    found = posed(
+    rows = posed(
         model, over, run, store, points=points, seed=seed, settings=settings, outputs=outputs, of=of
     )
     limit = None if limit is None else number("limit", limit, SweepError, above=0)
-    own, store_ = found.posed, found.store
-    with store_.writing():
+    name = model.name if isinstance(model, Model) else Path(model or _function_name(run)).stem
+    job = rows.posed.job.pickled()
+    script = _script(job)
+    with rows.store.writing():
         if retry_failed:
-            store_.forget()
-        groups = [
-            Group(bundle, Missing(store_.done, own.models, k))
-            for k, bundle in enumerate(own.bundles)
-        ]
-        name = model.name if isinstance(model, Model) else Path(model or _function(run)).stem
-        script = _script(own.job.pickled())
-        driver = Driver(store_, own.axes, own.job, groups, limit, script, name, found.spent)
-        driver.drive(executor)
-    return found
+            rows.store.forget()
+        shared = BlockSettings(job, script, limit, run == "simulate", rows.store.place)
+        Driver(rows, shared, name).drive(executor)
+    return rows
 
 
-def posed(model: Any, over: Any, run: Any, store: Any, **rest: Any) -> Sweep:
+def posed(  # noqa: PLR0913 - the arguments of ``sweep`` on which rows depend
+    model: Any,
+    over: Any,
+    run: Any = "simulate",
+    store: Any = None,
+    *,
+    points: Any = None,
+    seed: Any = 0,
+    settings: Any = None,
+    outputs: Any = None,
+    of: Any = None,
+) -> Sweep:
     """Return a sweep with checked points; ``status`` finds the rows of its store. Run nothing."""
-    names = ("points", "settings", "outputs", "of")
-    points, settings, outputs, of = (rest.get(name) for name in names)
-    if isinstance(run, str):
-        wrong = none_of("run", run, RUNS)
-        if wrong:
-            raise SweepError(f"{wrong}, or a function")
-    axes = axes_of(over, points, rest.get("seed", 0))
-    own = _settings(settings, run)
-    job = Job(run, own, _outputs(outputs, run))
+    wrong = isinstance(run, str) and none_of("run", run, RUNS)
+    if wrong:
+        raise SweepError(f"{wrong}, or a function")
+    axes = axes_of(over, points, seed)
+    job = Job(run, _settings(settings, run), _outputs(outputs, run))
     job.identity()  # refuses functions that other processes cannot import
     job.pickled()
-    found = pose(model, axes, job, of)
-    return Sweep(found, Store(store, found.spec, len(found.axes)), Spent())
+    problem = pose(model, axes, job, of)
+    return Sweep(problem, Store(store, problem.spec, len(axes)))
 
 
 def _settings(settings: Any, run: Any) -> dict[str, Any]:
     """Return the settings of a run."""
     if not isinstance(settings, Mapping | None):
         raise refusal("settings", settings, "a table of arguments by name", SweepError)
-    own = dict(settings or {})
-    if own and not isinstance(run, str):
+    checked = dict(settings or {})
+    if checked and not isinstance(run, str):
         raise SweepError("settings: a function has none: pass what it needs by functools.partial")
     for name in WITHOUT:
-        if name in own:
+        if name in checked:
             raise SweepError(f"settings: {name}: is set by the sweep: leave it out")
     for name in STARTS:
-        if name in own:
-            own[name] = plain(f"settings: {name}", own[name])
-    return own
+        if name in checked:
+            checked[name] = plain(f"settings: {name}", checked[name])
+    return checked
 
 
 def _outputs(outputs: Any, run: Any) -> tuple[str, ...]:
     """Return the names of the outputs of a simulation; none for other runs."""
-    from .runs import ENDS, OUTPUTS
-
-    if run != "simulate":
-        if outputs is not None:
-            raise SweepError(
-                f"outputs: value {shown(outputs)}: only run='simulate' has a choice: leave it out"
-            )
-        return ()
     if outputs is None:
-        return ENDS
+        return ENDS if run == "simulate" else ()
+    if run != "simulate":
+        raise SweepError(
+            f"outputs: value {shown(outputs)}: only run='simulate' has a choice: leave it out"
+        )
     if isinstance(outputs, str) or not isinstance(outputs, Sequence) or not outputs:
         raise refusal("outputs", outputs, "a list of names", SweepError)
-    for name in outputs:
-        wrong = none_of("outputs", name, OUTPUTS)
-        if wrong:
-            raise SweepError(wrong)
-    return tuple(outputs)
+    return tuple(one_of("outputs", name, OUTPUTS, SweepError) for name in outputs)
 
 
-def _function(run: Any) -> str:
+def _function_name(run: Any) -> str:
     """Return the name of a function."""
     while isinstance(run, partial):
         run = run.func
     return str(getattr(run, "__name__", type(run).__name__))
 
 
-def _script(data: bytes) -> str | None:
+def _script(job: bytes) -> str | None:
     """Return the path of the main program if a pickled job has functions of it, else None."""
-    if b"__main__" not in data:
+    if b"__main__" not in job:
         return None
     script = getattr(sys.modules["__main__"], "__file__", None)
     if script is None:

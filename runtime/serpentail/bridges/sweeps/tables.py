@@ -1,7 +1,7 @@
 """The rows of a sweep in the forms that other tools take."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain, islice
 from os import PathLike
 from pathlib import Path
@@ -16,12 +16,11 @@ from ...basics.files import refuse_unwritable, replacing, write_csv
 from .shards import AT_ONCE, parquet_library
 
 if TYPE_CHECKING:
-    import pandas
     import xarray
 
     from .result import Sweep
 
-ENDINGS = (".parquet", ".csv", ".nc")
+ENDINGS = {".parquet": ("pyarrow", "parquet"), ".csv": None, ".nc": ("xarray", "xarray")}
 SAMPLE = "sample"
 Rows = list[dict[str, Any]]
 
@@ -33,12 +32,8 @@ def checked(path: str | PathLike[str]) -> Path:
         raise SweepError(
             f"export: value {shown(str(path))}: needs a name that ends in .parquet, .csv or .nc"
         )
-    for module, extra, ending in (
-        ("pyarrow", "parquet", ".parquet"),
-        ("xarray", "xarray", ".nc"),
-    ):
-        if ending == target.suffix:
-            needed(module, extra)
+    if library := ENDINGS[target.suffix]:
+        needed(*library)
     try:
         refuse_unwritable(target)
     except OSError as reason:
@@ -50,20 +45,16 @@ def write(sweep: "Sweep", path: str | PathLike[str]) -> Path:
     """Write the rows to a file, whole or not at all, and return its path."""
     target = checked(path)
     if target.suffix == ".csv":
-        return _write_csv(sweep, target)
+        # one line for each row; numbers have all their digits, missing values are empty
+        names = list(dict.fromkeys(name for row in sweep for name in flat(row)))
+        lines = ([row.get(name, "") for name in names] for row in map(flat, sweep))
+        return write_csv(target, chain([names], lines))
     with replacing(target) as part:
         if target.suffix == ".parquet":
             _write_parquet(sweep, part)
         else:
             dataset(sweep).to_netcdf(part, engine="scipy", format="NETCDF3_64BIT")
     return target
-
-
-def _write_csv(sweep: "Sweep", path: Path) -> Path:
-    """Write one line for each row; numbers have all their digits, missing values are empty."""
-    names = list(dict.fromkeys(name for row in sweep for name in flat(row)))
-    rows = ([row.get(name, "") for name in names] for row in map(flat, sweep))
-    return write_csv(path, chain([names], rows))
 
 
 def _write_parquet(sweep: "Sweep", path: Path) -> None:
@@ -96,21 +87,15 @@ def _columns(part: Rows, names: Iterable[str] = ()) -> dict[str, list]:
 
 def flat(row: dict[str, Any], before: str = "") -> dict[str, Any]:
     """Return a row with a column for each entry of its lists (q_end_2) and tables (a.b)."""
-    found: dict[str, Any] = {}
+    columns: dict[str, Any] = {}
     for name, value in row.items():
         if isinstance(value, list):
-            found |= flat({f"{name}_{k}": x for k, x in enumerate(value)}, before)
+            columns |= flat({f"{name}_{k}": x for k, x in enumerate(value)}, before)
         elif isinstance(value, dict):
-            found |= flat(value, f"{before}{name}.")
+            columns |= flat(value, f"{before}{name}.")
         else:
-            found[before + name] = value
-    return found
-
-
-def frame(sweep: "Sweep") -> "pandas.DataFrame":
-    """Return the rows as a table of pandas."""
-    pandas = needed("pandas", "pandas")
-    return pandas.DataFrame([flat(row) for row in sweep])
+            columns[before + name] = value
+    return columns
 
 
 def dataset(sweep: "Sweep") -> "xarray.Dataset":
@@ -119,52 +104,39 @@ def dataset(sweep: "Sweep") -> "xarray.Dataset":
     axes = sweep.axes
     dims = ["_".join(names) for names in axes.grids]
     coordinates: dict[str, Any] = {}
-    for dim, (names, each) in zip(dims, axes.grids.items(), strict=True):
-        coordinates |= _grid_coordinates(dim, names, each.values)
-    if axes.spreads:
-        dims = [*dims, SAMPLE]
-        for name, numbers in axes.samples(np.arange(axes.points)).items():
-            coordinates |= _entries(name, np.array(numbers))
-    given = set(axes.names) | {"number"}
-    columns: dict[str, np.ndarray] = {}
+    for dim, (names, columns) in zip(dims, axes.grids.items(), strict=True):
+        coordinates |= _grid_coordinates(dim, names, columns)
+    for name, samples in axes.samples(np.arange(axes.points)).items():
+        entries = _columns([flat({name: sample}) for sample in samples])
+        coordinates |= {entry: (SAMPLE, numbers) for entry, numbers in entries.items()}
+    outputs: dict[str, list] = {}
     for row in sweep:
-        for name, value in flat(row).items():
-            if not any(name == one or name.startswith(f"{one}_") for one in given):
-                _put(columns, name, len(sweep), row["number"], value)
-    variables = {name: (dims, each.reshape(axes.sizes)) for name, each in columns.items()}
+        number = row.pop("number")
+        for name, value in flat({k: x for k, x in row.items() if k not in axes.names}).items():
+            outputs.setdefault(name, [None] * len(sweep))[number] = value
+    dims += [SAMPLE] if axes.spreads else []
+    variables = {
+        name: (dims, _column(name, values).reshape(axes.sizes)) for name, values in outputs.items()
+    }
     return xarray.Dataset(variables, coordinates)
 
 
-def _put(columns: dict[str, np.ndarray], name: str, count: int, place: int, value: Any) -> None:
-    """Put a value into its column: of numbers, NaN where there is none, or else of texts."""
-    if name not in columns:
-        columns[name] = np.full(count, "", object) if name == "error" else np.full(count, math.nan)
-    if value is None:
-        return
-    number = isinstance(value, int | float) and columns[name].dtype != object
-    if not number and columns[name].dtype != object:
-        texts = ["" if math.isnan(x) else str(x) for x in columns[name].tolist()]
-        columns[name] = np.array(texts, object)
-    columns[name][place] = value if number else str(value)
+def _column(name: str, values: Sequence) -> np.ndarray:
+    """Return numbers, nan where there is none; or texts, if there are some."""
+    if name == "error" or any(isinstance(x, str) for x in values):
+        return np.array(["" if x is None else str(x) for x in values], object)
+    return np.array([math.nan if x is None else x for x in values], float)
 
 
-def _grid_coordinates(dim: str, names: tuple[str, ...], values: tuple) -> dict[str, Any]:
+def _grid_coordinates(
+    dim: str, names: tuple[str, ...], columns: Sequence[Sequence]
+) -> dict[str, Any]:
     """Return the coordinates of one grid: its values, or their numbers and a coordinate a name."""
-    if len(names) == 1 and all(isinstance(value, int | float | str) for value in values):
-        return {dim: (dim, list(values))}
-    found: dict[str, Any] = {dim: (dim, np.arange(len(values)))}
-    if len(names) == 1:
-        return found | {f"{dim}_value": (dim, [str(value) for value in values])}
-    for k, name in enumerate(names):
-        column = [value[k] for value in values]
-        plain = all(isinstance(x, int | float | str) for x in column)
-        found[name] = (dim, column if plain else [str(x) for x in column])
-    return found
-
-
-def _entries(name: str, numbers: np.ndarray) -> dict[str, Any]:
-    """Return the coordinates of an axis that is spread, one an entry of its arrays."""
-    if numbers.ndim == 1:
-        return {name: (SAMPLE, numbers)}
-    columns = numbers.reshape(len(numbers), -1)
-    return {f"{name}_{k}": (SAMPLE, column) for k, column in enumerate(columns.T)}
+    found: dict[str, Any] = {}
+    for name, values in zip(names, columns, strict=True):
+        simple = all(isinstance(x, int | float | str) for x in values)
+        if simple and len(names) == 1:
+            return {dim: (dim, list(values))}
+        key = name if len(names) > 1 else f"{name}_value"
+        found[key] = (dim, list(values) if simple else [str(x) for x in values])
+    return {dim: (dim, np.arange(len(columns[0]))), **found}

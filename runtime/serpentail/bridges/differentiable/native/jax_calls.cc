@@ -32,11 +32,11 @@ struct Call {
 
 using Function = int (*)(Call *);
 
-// A function of a model: for states one by one, and several at once where `together` is there.
+// A function of a model: for states one by one, and several at once where `many` is there.
 struct Entry {
-  Function single, together;
+  Function single, many;
   const void *parameters;
-  size_t single_work, together_work;  // bytes
+  size_t single_work, many_work;  // bytes
   size_t states;                      // at once
   size_t bytes;                       // of a number
   size_t least;                       // states that are worth a thread
@@ -81,11 +81,11 @@ struct Arrays {
 
 // States [first, last); those among which one fails in lanes are evaluated again, one by one.
 void evaluate(const Entry &entry, const Arrays &arrays, size_t first, size_t last) {
-  const Memory single = aligned(entry.single_work), together = aligned(entry.together_work);
+  const Memory single = aligned(entry.single_work), many = aligned(entry.many_work);
   while (first < last) {
-    const bool lanes = entry.together && last - first >= entry.states;
-    Call call = arrays.from(entry, first, last - first, lanes ? together.get() : single.get());
-    if ((lanes ? entry.together : entry.single)(&call) == 0) {
+    const bool lanes = entry.many && last - first >= entry.states;
+    Call call = arrays.from(entry, first, last - first, lanes ? many.get() : single.get());
+    if ((lanes ? entry.many : entry.single)(&call) == 0) {
       return;
     }
     first += call.failed;
@@ -122,23 +122,21 @@ ffi::Error call(ffi::RemainingArgs inputs, ffi::RemainingRets outputs, std::stri
     entry = found->second;
   }
   // every array is rows of as many states as the first one
-  Arrays arrays;
-  arrays.inputs = inputs.size();
   size_t count = 1;
+  const auto leading = inputs.get<ffi::AnyBuffer>(0)->dimensions();
+  for (size_t axis = 0; axis + 1 < leading.size(); ++axis) {
+    count *= static_cast<size_t>(leading[axis]);
+  }
+  Arrays arrays{{}, {}, inputs.size()};
+  const auto add = [&](ffi::AnyBuffer buffer) {
+    arrays.data.push_back(static_cast<char *>(buffer.untyped_data()));
+    arrays.row.push_back(count ? buffer.element_count() / count * entry.bytes : 0);
+  };
   for (size_t k = 0; k < inputs.size(); ++k) {
-    const auto buffer = inputs.get<ffi::AnyBuffer>(k);
-    if (k == 0) {
-      for (size_t axis = 0; axis + 1 < buffer->dimensions().size(); ++axis) {
-        count *= static_cast<size_t>(buffer->dimensions()[axis]);
-      }
-    }
-    arrays.data.push_back(static_cast<char *>(buffer->untyped_data()));
-    arrays.row.push_back(count ? buffer->element_count() / count * entry.bytes : 0);
+    add(*inputs.get<ffi::AnyBuffer>(k));
   }
   for (size_t k = 0; k < outputs.size(); ++k) {
-    auto buffer = outputs.get<ffi::AnyBuffer>(k);
-    arrays.data.push_back(static_cast<char *>((*buffer)->untyped_data()));
-    arrays.row.push_back(count ? (*buffer)->element_count() / count * entry.bytes : 0);
+    add(**outputs.get<ffi::AnyBuffer>(k));
   }
   evaluate_in_threads(entry, arrays, count);
   return ffi::Error::Success();

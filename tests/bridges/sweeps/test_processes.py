@@ -15,7 +15,7 @@ from serpentail.bridges.sweeps import supervision
 from serpentail.bridges.sweeps.result import Status
 from tests.support import swept
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.mark.slow
@@ -36,14 +36,14 @@ def test_dask_needs_no_main_guard_and_functions_of_the_program_tell_that_they_do
 
 
 def test_a_worker_process_does_not_hear_ctrl_c_while_it_starts(capfd):
-    child = supervision.Child()
+    process = supervision.Process()
     try:
         for _ in range(20):
-            child.process.send_signal(signal.SIGINT)
+            process.child.send_signal(signal.SIGINT)
             time.sleep(0.02)
-        assert child.process.poll() is None
+        assert process.child.poll() is None
     finally:
-        child.end()
+        process.end()
     assert capfd.readouterr().err == ""
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.bridges.sweeps import driver, supervision
+from serpentail.bridges.sweeps import driver, shards, supervision
 from serpentail.bridges.sweeps.executors import Place
 from serpentail.bridges.sweeps.result import Status
 from serpentail.bridges.sweeps.shards import Row, Shard
@@ -134,7 +134,7 @@ def test_other_grids_orders_and_numbers_of_points_keep_the_rows_they_have(worker
 
 
 def test_rows_of_workers_that_do_not_see_the_store_are_written_here(worker, tmp_path, monkeypatch):
-    monkeypatch.setattr(supervision.ShardFolder, "is_here", lambda _: False)
+    monkeypatch.setattr(shards.ShardFolder, "is_here", lambda _: False)
     given = {"over": {"x": st.grid([3, 4])}, "run": swept.square, "store": tmp_path / "rows"}
     for points in (2, 0):
         found = st.sweep(None, **given, executor=worker)

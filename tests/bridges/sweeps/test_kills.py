@@ -24,7 +24,7 @@ from tests.support.rows import row
 
 parquet = pytest.importorskip("pyarrow.parquet")
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 PATIENCE = 120  # s
 FAILED = {*swept.HANGS, *swept.CRASHES, *swept.RAISES}
 SPEC = {"family": [], "grids": [[["x"], ["1", "2"]]], "spreads": [], "points": 1, "seed": 0}

@@ -145,13 +145,13 @@ def test_what_cannot_be_is_told_before_anything_runs(study, capsys, monkeypatch)
     page = study.with_name("page.html")
     for row in ("8", "-1"):
         status, out, err = told(capsys, study, "--row", row, "--view", page)
-        assert status == 2 and out is None and f"row {row}: there are 8, 0 to 7" in err
+        assert status == 2 and out is None and f"row: value {row}: needs" in err
     assert not study.with_suffix(".rows").exists()
     found = st.sweep(study, {"tail_mass": st.grid([0.003])})
     for row in (1, -1, True, 0.0):
-        with pytest.raises(st.SweepError, match=f"row {row}: there are 1, 0 to 0"):
+        with pytest.raises(st.SweepError, match=f"row: value {row}: needs.* to 0"):
             found.motion(row)
-    monkeypatch.setattr("serpentail.bridges.sweeps.groups.built", lambda *_: pytest.fail("a model"))
+    monkeypatch.setattr("serpentail.bridges.sweeps.pose.built", lambda *_: pytest.fail("a model"))
     with pytest.raises(st.SweepError, match="did you mean 'tail_length'"):
         st.sweep(study, {"tail_lenght": st.grid([0.1])})
 

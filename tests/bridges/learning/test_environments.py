@@ -6,9 +6,8 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import serpentail as st
-
-from ..support import zoo
-from ..support.rows import row
+from tests.support import zoo
+from tests.support.rows import row
 
 ACTIONS = np.random.default_rng(1).uniform(-1.2, 1.2, (25, 9, 2))
 TASKS = {"righting": "m1_n3", "landing": "ground", "self_recovery": "ground"}
@@ -108,7 +107,9 @@ def test_starts_are_spread_as_asked_for(flyer):
     lying, walker = many("self_recovery", 50, tilt=0.2), zoo.model("ground")
     seen, _ = lying.reset(seed=0)
     assert (seen[:, 2] < -np.cos(0.3)).all()
-    points, _ = walker.contact_points(lying.worlds.q, lying.worlds.v, lying.worlds.given["legs"])
+    points, _ = walker.contact_points(
+        lying.worlds.q, lying.worlds.v, lying.worlds.step_settings["legs"]
+    )
     np.testing.assert_allclose(points[..., 2].min(axis=1), 1e-3, atol=1e-9)
 
 

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 import serpentail as st
-
-from ..support import zoo
-from ..support.rows import row
+from tests.support import zoo
+from tests.support.rows import row
 
 FUNCTIONS = ("forward_dynamics", "inverse_dynamics")
 RUNS = 21

@@ -1,0 +1,253 @@
+"""What a sweep is of: a model or a scene, with its axes in SI and the models of its points."""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ... import __version__
+from ...basics.checks import Refusals, did_you_mean, numbers_in, shown
+from ...basics.errors import IdentificationError, PlanningError, SimulationError, SweepError
+from ...building.build import built
+from ...building.options import Parameters
+from ...model.model import Model
+from ...model.parameters import independent
+from ...scenes.file import MADE_OF, read_scene, subtable
+from ...scenes.identify_keys import IDENTIFY
+from ...scenes.keys import Key, read
+from ...scenes.overrides import changed
+from ...scenes.plan_keys import PLAN
+from ...scenes.simulate_keys import SIMULATE
+from .axis import as_json, plain
+from .job import DATA, STARTS, Job
+from .points import Axes, Point, Units
+from .worker import Bundle
+
+TABLES: Mapping[str, tuple[Key, type[Exception]]] = {
+    "simulate": (SIMULATE, SimulationError),
+    "plan": (PLAN, PlanningError),
+    "identify": (IDENTIFY, IdentificationError),
+}
+NEEDED = {  # of a run of a model: settings, and what they are
+    "simulate": (STARTS, "where a motion starts"),
+    "plan": (STARTS, "where a motion starts"),
+    "identify": ((DATA, "markers"), "tracks, and where the markers are"),
+}
+NO_SHAPE = "the shape of a model is fixed: give the sweep a scene, or a function without a model"
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What a sweep is of: its job, the units of its axes, and what finds the model of a point."""
+
+    job: Job
+    units: Units
+    bundle: Callable[[Point], Bundle | None]
+
+
+@dataclass(frozen=True)
+class Posed:
+    """A sweep that is well posed: its axes in SI, its job, and its models.
+
+    model_places: which of the bundles the points have, an array that has a place for each value of
+    the axes that decide on the model, and one for all values of the others. spec: plain data that
+    tells this sweep from others, see ``Store``.
+    """
+
+    axes: Axes
+    job: Job
+    bundles: list[Bundle | None]
+    model_places: np.ndarray
+    spec: dict[str, Any]
+
+    def models(self, numbers: np.ndarray) -> np.ndarray:
+        """Return which of the bundles the points of some numbers have."""
+        if len(self.bundles) == 1:
+            return np.zeros(len(numbers), int)
+        places = self.axes.places(numbers)
+        found: np.ndarray = np.broadcast_to(self.model_places, self.axes.sizes)[places]
+        return found
+
+
+def pose(what: Any, axes: Axes, job: Job, of: Any) -> Posed:
+    """Return the axes with numbers in SI, the job and the models of a sweep.
+
+    SweepError if two points are the same.
+
+    what: a model, a scene's path or example, or None for a function of points alone. of: what else
+    rows depend on.
+    """
+    if isinstance(what, Model):
+        subject = _of_model(what, axes, job)
+    elif what is not None:
+        subject = _of_scene(what, axes, job)
+    elif isinstance(job.run, str):
+        raise SweepError(f"model: None: run = {job.run!r} needs a model or a scene")
+    else:
+        subject = Subject(job, {}, lambda _: None)
+    job, axes = subject.job, axes.measured(subject.units)
+    if isinstance(what, Model):
+        _refuse_shapes(what, axes)
+    grids = [[names, _row_texts(names, columns, job)] for names, columns in axes.grids.items()]
+    _refuse_twice(axes, [texts for _, texts in grids])
+
+    # one model for each place on the axes that decide on it; the last axis has all spreads
+    decides = [not job.built.isdisjoint(names) for names in axes.grids]
+    decides += [not job.built.isdisjoint(axes.spreads)] if axes.spreads else []
+    shape = [size if several else 1 for several, size in zip(decides, axes.sizes, strict=True)]
+    models = np.arange(np.prod(shape))
+    firsts = np.ravel_multi_index(np.unravel_index(models, shape), axes.sizes)
+    bundles = [subject.bundle(point) for point in axes.at(firsts)]
+
+    hashes = np.array([bundle.manifest_hash if bundle else "" for bundle in bundles])
+    files = job.digest_of({}) if job.run == "identify" and DATA not in axes.names else ""
+    spec = {
+        "family": [__version__, job.identity(), plain("of", of), files, sorted(job.built)],
+        "grids": grids,
+        "spreads": [
+            [name, [axis.kind, axis.low.tolist(), axis.high.tolist(), axis.law]]
+            for name, axis in axes.spreads.items()
+        ],
+        "points": axes.points,
+        "seed": axes.seed,
+        "models": hashes.reshape(shape).tolist(),
+    }
+    return Posed(axes, job, bundles, models.reshape(shape), spec)
+
+
+def _row_texts(names: tuple[str, ...], columns: Sequence[Sequence], job: Job) -> list[str]:
+    """Return what tells each place of a grid from others; of a file, also its content."""
+    texts = [as_json(values) for values in zip(*columns, strict=True)]
+    if job.run != "identify" or DATA not in names:
+        return texts
+    digests = [job.digest_of({DATA: file}) for file in columns[names.index(DATA)]]
+    return [f"{text}\n{digest}" for text, digest in zip(texts, digests, strict=True)]
+
+
+def _refuse_twice(axes: Axes, texts: Sequence[Sequence[str]]) -> None:
+    """SweepError for a grid that has a row twice."""
+    for k, rows in enumerate(texts):
+        if len(set(rows)) < len(rows):
+            place = next(i for i, row in enumerate(rows) if row in rows[:i])
+            number = place * int(np.prod(axes.sizes[k + 1 :]))
+            point = shown(axes.at([number])[0])
+            raise SweepError(f"over: point {number} occurs twice, {point}: needs each once")
+
+
+def _of_model(model: Model, axes: Axes, job: Job) -> Subject:
+    """Points that change parameters, the start or settings of one model."""
+    known = _parameter_units(model.manifest)
+    others = frozenset(axes.names) - known.keys()
+    for name in others:
+        if name in MADE_OF:
+            raise SweepError(f"over: {name}: {NO_SHAPE}")
+    units: dict[str, Any] = {name: known[name] for name in axes.names if name in known}
+    if isinstance(job.run, str):
+        needed, what = NEEDED[job.run]
+        missing = [name for name in needed if name not in {*job.settings, *others}]
+        if missing:
+            raise SweepError(
+                f"settings: no {' and no '.join(missing)}: needs {what}, here or in over"
+            )
+        units |= dict.fromkeys(others - {DATA})
+    baked = model.manifest["scene"]["baked"]
+    parameters = {} if baked else independent(model.manifest, model.parameters)
+    job = replace(
+        job, keys=others, parameters=parameters, profile=model.profile, parent=str(Path.cwd())
+    )
+    bundle = Bundle.of(model.checked)
+    return Subject(job, units, lambda _: bundle)
+
+
+def _of_scene(scene: Any, axes: Axes, job: Job) -> Subject:
+    """Points that change parameters, keys of the model, or keys of the scene's table."""
+    tables, path = read_scene(scene, SweepError)
+    first = axes.at([0])[0]
+    shape = [name for name in axes.names if name in MADE_OF]
+    keys: list[str] = []
+    units: dict[str, Any] = {}
+    if isinstance(job.run, str):
+        key, error = TABLES[job.run]
+        table = subtable(tables, job.run, path, error)
+        keys = [name for name in axes.names if name.split(".")[0] in key.keys]
+        units = {name: _unit_at(key, name) for name in keys}
+        # an unknown key is refused before a model is built
+        refused = Refusals(SweepError)
+        read(changed(table, {name: first[name] for name in keys}), key, job.run, refused)
+        refused.tell()
+        job = replace(job, table=table)
+    if job.run == "identify":
+        from ...scenes.identify import with_functions
+
+        tables = with_functions(tables)
+        if DATA not in {*axes.names, *job.settings}:
+            raise SweepError(f"over: no {DATA}: needs files of marker tracks, here or in settings")
+        keys += [DATA] if DATA in axes.names else []
+
+    # which other names are parameters, and which of these need other code
+    others = [name for name in axes.names if name not in {*keys, *shape}]
+    if isinstance(job.run, str):
+        _refuse_unknown(others, job.run, Parameters.__annotations__)  # before a model is made
+    first_scene = tables | {name: first[name] for name in shape}
+    checked, left = built(first_scene, path.stem, {name: first[name] for name in others})
+    known = _parameter_units(checked.manifest)
+    units |= {name: known[name] for name in others if name in known}
+    if isinstance(job.run, str):
+        _refuse_unknown(others, job.run, known)
+    else:
+        keys = [name for name in others if name not in known]
+    making = [name for name in others if name not in keys and name not in (left or {})]
+
+    def bundle(point: Point) -> Bundle:
+        scene = tables | {name: point[name] for name in shape}
+        checked, _ = built(scene, path.stem, {name: point[name] for name in making})
+        return Bundle.of(checked)
+
+    job = replace(
+        job,
+        phases=tables.get("phase", []) if job.run == "simulate" else (),
+        parent=str(path.parent.absolute()),
+        keys=frozenset(keys),
+        built=frozenset((*shape, *making)),
+    )
+    return Subject(job, units, bundle)
+
+
+def _parameter_units(manifest: Mapping[str, Any]) -> dict[str, str]:
+    """Return the units of a model's parameters by name."""
+    return {entry["name"]: entry["unit"] for entry in manifest["parameters"]}
+
+
+def _unit_at(key: Key, name: str) -> str | Sequence[str]:
+    """Return the unit of a name such as "start.pitch" below a table's key; "" where it has none."""
+    for part in name.split("."):
+        if part.isdecimal():
+            key = key.each or key  # a table in an array, or a number in one
+            continue
+        tables = [key, *key.kinds.values()]
+        key = next((table.keys[part] for table in tables if part in table.keys), Key())
+    return key.unit
+
+
+def _refuse_shapes(model: Model, axes: Axes) -> None:
+    """SweepError for a start whose values at the first point have a wrong shape."""
+    first = axes.at([0])[0]
+    for name, size in zip(STARTS, (model.nq, model.nv), strict=True):
+        start = numbers_in(first.get(name))
+        if name in first and (start is None or start.shape != (size,)):
+            what = "not numbers" if start is None else f"of shape {start.shape}"
+            raise SweepError(
+                f"over: {name}: values are {what}: needs {size} numbers at each point, such as "
+                f"st.random([-1] * {size}, [1] * {size})"
+            )
+
+
+def _refuse_unknown(names: Collection[str], run: str, known: Collection[str]) -> None:
+    """SweepError for a name that is neither a parameter nor a key of the table."""
+    for name in names:
+        if name not in known:
+            near = did_you_mean(name.split(".")[0], [*known, *MADE_OF, *TABLES[run][0].keys])
+            remedy = near or f"the parameters are {', '.join(sorted(known))}"
+            raise SweepError(f"over: {shown(name)}: no parameter and no key of [{run}]; {remedy}")
