@@ -160,16 +160,16 @@ bench: $(READY)
 	$(PY) -m benchmarks.bench
 
 stress: $(READY)
-	$(PY) -m stress.stress --calls $(CALLS)
+	$(PY) -m checks.stress
 
 mutants: $(READY)
-	$(PY) -m mutants.run --mutants $(MUTANTS) --seed $(SEED) --jobs $(JOBS)
+	$(PY) -m checks.mutants.run --mutants $(MUTANTS) --seed $(SEED) --jobs $(JOBS)
 
 embedded: $(READY) model
-	$(PY) -m embedded.check $(FOLDER) --board $(CPU)
+	$(PY) -m checks.embedded.check $(FOLDER) --board $(CPU)
 
 size-report: $(READY)
-	$(PY) -m embedded.size_report
+	$(PY) -m checks.embedded.size_report
 
 study-models: $(READY)
 	$(PY) -m examples.studies.models

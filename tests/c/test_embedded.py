@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from embedded import boards, comparison, image, mpc_image, results, stack
+from checks.embedded import boards, comparison, image, mpc_image, results, stack
 from tests.support import zoo
 from tests.support.models import folder_of
 from tests.support.predictive import plan_of
@@ -65,7 +65,7 @@ def test_fast_models_keep_their_promises_in_every_form(tmp_path):
 @pytest.mark.slow
 def test_forward_dynamics_keeps_its_budget(tmp_path):
     """Of a form and a size, which are the point: instructions, flash and stack."""
-    from embedded import size_tables
+    from checks.embedded import size_tables
 
     sizes = [
         ("m4", "m1_n3", "loops", 7000, 6 * 1024),
@@ -211,8 +211,8 @@ def test_stack_adds_up_along_calls_or_is_unknown(tmp_path):
 def test_missing_tools_are_named_with_their_packages(tmp_path):
     document = ROOT / "docs" / "embedded.md"
     before, bare = document.read_bytes(), str(zoo.folder("bare"))
-    commands = {name: ["embedded.check", bare, "--board", name] for name in CROSS}
-    commands["report"] = ["embedded.size_report"]
+    commands = {name: ["checks.embedded.check", bare, "--board", name] for name in CROSS}
+    commands["report"] = ["checks.embedded.size_report"]
     settings = {"cwd": tmp_path, "env": {"PATH": "", "PYTHONPATH": str(ROOT)}, "text": True}
     for name, words in commands.items():
         command = [sys.executable, "-m", *words]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from embedded import misra
+from checks.embedded import misra
 from tests.c.target.emitted import C99, bits, library_of, model_of, needs, run, states_of
 from tests.support import zoo
 from tests.support.rows import row

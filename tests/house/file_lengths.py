@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-FOLDERS = ("codegen", "runtime", "tests", "benchmarks", "embedded", "examples", "mutants", "stress")
+FOLDERS = ("codegen", "runtime", "tests", "benchmarks", "checks", "examples")
 MOST_LINES = 300
 
 

@@ -111,7 +111,7 @@ def test_wrong_usage_is_status_2_and_help_names_every_verb(capsys):
 
 # Scripts.
 
-FOLDERS = ("benchmarks", "embedded", "examples", "mutants", "stress")
+FOLDERS = ("benchmarks", "checks", "examples")
 HEAVY = {"casadi", "matplotlib", "numpy", "scipy", "serpentail_codegen.pipeline", "sympy"}
 # Runs each module of the words as a program with an argument, in a process that this one forks: it
 # prints its status, and the packages that it has loaded.

@@ -5,8 +5,8 @@ in CI.
 import shutil
 from functools import partial
 
-from embedded import misra
-from embedded.boards import BOARDS, ToolchainMissing
+from checks.embedded import misra
+from checks.embedded.boards import BOARDS, ToolchainMissing
 from tests.support.page import need
 
 
