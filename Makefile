@@ -157,7 +157,7 @@ verify: $(READY) model
 	$(PY) -m tests.verification $(FOLDER)
 
 bench: $(READY)
-	$(PY) -m benchmarks.bench
+	$(PY) -m benchmarks
 
 stress: $(READY)
 	$(PY) -m checks.stress

@@ -1,9 +1,7 @@
-"""How large the page of a run is, and how fast a browser without a graphics processor plays it."""
+"""Bytes of pages of 600 samples, seconds until they are ready, and frames a second.
 
-if __name__ == "__main__":
-    from benchmarks import alone
-
-    alone.main("pages", __doc__)
+In Chromium, without a graphics processor.
+"""
 
 import time
 from pathlib import Path
@@ -11,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import serpentail as st
-from benchmarks.fixtures import built, label
+from benchmarks.models import built, label
 from tests.support.chromium import chromium, opened
 
 SIZES = ((1, 3), (4, 10))
@@ -31,8 +29,8 @@ FRAMES = """
 """
 
 
-def page_speed(folder: Path) -> list[dict]:
-    """Bytes of pages of 600 samples, seconds until they are ready, frames a second in Chromium."""
+def measured(folder: Path) -> list[dict]:
+    """Return a row for each tail."""
     rows = []
     with chromium() as driver:
         for size in SIZES:
@@ -42,8 +40,8 @@ def page_speed(folder: Path) -> list[dict]:
             opened(driver, page)
             ready = time.perf_counter() - begun
             frames = driver.execute_async_script(FRAMES, WATCHED)
-            row = {"model": label(*size), "page_bytes": page.stat().st_size}
-            rows.append(row | {"ready_s": ready, "frames_per_s": frames})
+            row = {"model": label(*size), "page, bytes": page.stat().st_size}
+            rows.append(row | {"ready, s": ready, "frames a second": frames})
     return rows
 
 

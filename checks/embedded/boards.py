@@ -5,26 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 HERE = Path(__file__).parent
-SEMIHOSTING = (
-    "-display",
-    "none",
-    "-monitor",
-    "none",
-    "-serial",
-    "none",
-    "-chardev",
-    "stdio,id=out",
-)
+SEMIHOSTING = ("-display", "none", "-monitor", "none", "-serial", "none")
+SEMIHOSTING += ("-chardev", "stdio,id=out")
 SEMIHOSTING += ("-semihosting-config", "enable=on,target=native,chardev=out")
-WARNINGS = (
-    "-pedantic",
-    "-Wall",
-    "-Wextra",
-    "-Wconversion",
-    "-Wdouble-promotion",
-    "-Wshadow",
-    "-Werror",
-)
+COUNTED = (*SEMIHOSTING, "-icount", "shift=0", "-kernel")  # an instruction takes 1 ns
+WARNINGS = ("-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Wshadow")
+WARNINGS += ("-Werror",)
 # Flags as in the runtime's profiles; `fast` lets the compiler fuse a * b + c.
 PROFILES = {
     "fast": ("-O2", "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math"),
@@ -54,11 +40,8 @@ class Board:
 
     def need(self) -> None:
         """Raise ToolchainMissing unless compiler and emulator are on PATH."""
-        absent = [
-            program
-            for program in (self.compiler, *self.emulator[:1])
-            if shutil.which(program) is None
-        ]
+        programs = self.compiler, *self.emulator[:1]
+        absent = [program for program in programs if shutil.which(program) is None]
         if absent:
             raise ToolchainMissing(
                 f"{self.name}: {' and '.join(absent)} not on PATH; Debian, Ubuntu: "
@@ -67,11 +50,9 @@ class Board:
 
 
 def cortex(name: str, title: str, real: str, machine: str, fpu: str) -> Board:
-    """Return a Cortex-M of QEMU's mps2 boards; each instruction takes 1 ns there, so that SysTick
-    counts them.
-    """
+    """Return a Cortex-M of QEMU's mps2 boards, whose SysTick counts nanoseconds."""
     cpu = ("-mthumb", f"-mcpu=cortex-{name}", f"-mfpu={fpu}", "-mfloat-abi=hard")
-    emulator = ("qemu-system-arm", "-M", machine, *SEMIHOSTING, "-icount", "shift=0", "-kernel")
+    emulator = ("qemu-system-arm", "-M", machine, *COUNTED)
     packages = ("gcc-arm-none-eabi", "libnewlib-arm-none-eabi", "qemu-system-arm")
     link = ("-nostartfiles", "-T", "arm.ld")
     return Board(name, title, real, "arm-none-eabi-gcc", cpu, "arm.c", link, emulator, packages)
@@ -79,31 +60,12 @@ def cortex(name: str, title: str, real: str, machine: str, fpu: str) -> Board:
 
 def riscv() -> Board:
     """Return the 32-bit RISC-V of QEMU's virt board."""
+    compiler, link = "riscv64-unknown-elf-gcc", ("-nostartfiles", "-T", "riscv.ld")
     cpu = ("--specs=picolibc.specs", "-march=rv32imafdc", "-mabi=ilp32d", "-mcmodel=medany")
-    emulator = (
-        "qemu-system-riscv32",
-        "-M",
-        "virt",
-        "-bios",
-        "none",
-        *SEMIHOSTING,
-        "-icount",
-        "shift=0",
-        "-kernel",
-    )
+    emulator = ("qemu-system-riscv32", "-M", "virt", "-bios", "none", *COUNTED)
     packages = ("gcc-riscv64-unknown-elf", "picolibc-riscv64-unknown-elf", "qemu-system-misc")
-    link = ("-nostartfiles", "-T", "riscv.ld")
-    return Board(
-        "rv32",
-        "RV32GC",
-        "double",
-        "riscv64-unknown-elf-gcc",
-        cpu,
-        "riscv.c",
-        link,
-        emulator,
-        packages,
-    )
+    own = compiler, cpu, "riscv.c", link, emulator, packages
+    return Board("rv32", "RV32GC", "double", *own)
 
 
 BOARDS = {

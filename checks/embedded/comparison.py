@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from checks.embedded.boards import BOARDS, ToolchainMissing
-from checks.embedded.flash import flash
+from checks.embedded.costs import deepest, flash
 from checks.embedded.image import Image, build, manifest_of
 from checks.embedded.results import Result, blocks, run
-from checks.embedded.stack import deepest
 from serpentail_codegen.ir.program import padded
 
 # ulp of an output's largest entry: largest difference of the fast profile

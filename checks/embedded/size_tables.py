@@ -2,7 +2,6 @@
 
 import re
 import sys
-from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -10,11 +9,9 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from checks.embedded.boards import BOARDS, ToolchainMissing
-from checks.embedded.flash import flash
+from checks.embedded.costs import deepest, flash
 from checks.embedded.image import Image, build
-from checks.embedded.misra import summary
 from checks.embedded.results import blocks, run
-from checks.embedded.stack import deepest
 from serpentail.basics.progress import Stage
 from serpentail_codegen.pipeline import generate
 from serpentail_codegen.scene.parse import scene_for
@@ -28,40 +25,8 @@ STRAIGHT_DERIVATIVES = ((1, 3), (1, None))
 IMPLICIT = ("implicit_factor", "implicit_solve")
 CONTACTS = ["feet", "tail"]
 REAL = {"m4": "float", "m7": "double"}
-HEAD = (
-    "tail",
-    "form",
-    "function",
-    "flash, bytes",
-    "workspace, bytes",
-    "stack, bytes",
-    "instructions",
-)
-
-
-@dataclass(frozen=True)
-class Cost:
-    """What one function of one model costs on one board."""
-
-    tail: str
-    form: str
-    function: str
-    flash: int
-    work: int
-    stack: int
-    instructions: int
-
-    def cells(self) -> tuple:
-        """Return the row of its table."""
-        return (
-            self.tail,
-            self.form,
-            f"`{self.function}`",
-            self.flash,
-            self.work,
-            self.stack,
-            self.instructions,
-        )
+HEAD = ("tail", "form", "function", "flash, bytes", "workspace, bytes", "stack, bytes")
+HEAD += ("instructions",)
 
 
 def label(segments: int, links: int | None) -> str:
@@ -71,37 +36,28 @@ def label(segments: int, links: int | None) -> str:
 
 def made(parent: Path, tail: tuple, form: str, real: str) -> Path:
     """Generate one model; return its folder."""
-    wanted = [
-        *FUNCTIONS,
-        *([DERIVATIVES] if form == "loops" or tail in STRAIGHT_DERIVATIVES else []),
-    ]
-    wanted += (
-        ["implicit"] if form == "loops" else []
-    )  # without loops, every point is computed, in the ground or not
+    wanted = [*FUNCTIONS]
+    if form == "loops" or tail in STRAIGHT_DERIVATIVES:
+        wanted.append(DERIVATIVES)
+    if form == "loops":  # without loops, every point is computed, in the ground or not
+        wanted.append("implicit")
     options = {"functions": wanted, "contacts": CONTACTS, "emission": form, "real": real}
     scene = scene_for("articulated" if tail[1] else "continuum", *tail, **options)
     generate(scene, parent / form / real)
     return parent / form / real / scene.name
 
 
-def costs(tail: tuple, form: str, board: str, parent: Path) -> tuple[list[Cost], Image]:
-    """Generate, build and run one model on one board."""
+def costs(tail: tuple, form: str, board: str, parent: Path) -> tuple[list[tuple], Image]:
+    """Generate, build and run one model on one board; return the rows of its table."""
     folder = made(parent, tail, form, REAL[board])
     image = build(folder, BOARDS[board], folder / "build" / board)
-    depths, found = deepest(sorted(image.path.parent.glob("*.ci"))), run(image)
-    size = {"float": 4, "double": 8}[image.manifest["real"]]
-    return [
-        Cost(
-            label(*tail),
-            form,
-            name,
-            flash(image, name),
-            size * image.manifest["work"][name],
-            depths[f"{image.manifest['prefix']}_{name}"],
-            max(result.instructions),
-        )
-        for name, result in found.items()
-    ], image
+    depths, prefix = deepest(sorted(image.path.parent.glob("*.ci"))), image.manifest["prefix"]
+    size, rows = {"float": 4, "double": 8}[image.manifest["real"]], []
+    for name, result in run(image).items():
+        work, stack = size * image.manifest["work"][name], depths[f"{prefix}_{name}"]
+        cells = flash(image, name), work, stack, max(result.instructions)
+        rows.append((label(*tail), form, f"`{name}`", *cells))
+    return rows, image
 
 
 def float_errors(image: Image, parent: Path) -> list[tuple]:
@@ -114,9 +70,8 @@ def float_errors(image: Image, parent: Path) -> list[tuple]:
     rows = []
     for name, result in found.items():
         for output, part in blocks(image, name).items() if name not in IMPLICIT else ():
-            rows += _block_errors(
-                name, output, result.values[:, part], exact[name].values[:, part], image
-            )
+            both = result.values[:, part], exact[name].values[:, part]
+            rows += _block_errors(name, output, *both, image)
     return rows
 
 
@@ -126,10 +81,8 @@ def _block_errors(
     nv = image.manifest["dimensions"]["nv"]
     if name == "H":
         scale = np.sqrt(np.einsum("sii->si", exact.reshape(-1, nv, nv)))
-        error = (
-            np.abs(some - exact).reshape(-1, nv, nv) / scale[:, :, None] / scale[:, None, :]
-        ).max()
-        return [("H, relative to sqrt(H_ii H_jj)", error)]
+        error = np.abs(some - exact).reshape(-1, nv, nv) / scale[:, :, None] / scale[:, None, :]
+        return [("H, relative to sqrt(H_ii H_jj)", error.max())]
     if name == "v_dot":
         parts = {"p_ddot": slice(0, 3), "omega_dot": slice(3, 6), "q_t_ddot": slice(6, nv)}
         where = " in contact" if function == "contact_dynamics" else ""
@@ -165,13 +118,9 @@ def markdown(head: tuple, rows: list[tuple]) -> list[str]:
 
 def cell(value) -> str:
     """Return a cell: whole numbers with separators, others to two digits."""
-    return (
-        f"{value:,}"
-        if isinstance(value, int)
-        else f"{value:.1e}"
-        if isinstance(value, float)
-        else str(value)
-    )
+    if isinstance(value, float):
+        return f"{value:.1e}"
+    return f"{value:,}" if isinstance(value, int) else value
 
 
 def report(parent: Path) -> str:
@@ -183,7 +132,7 @@ def report(parent: Path) -> str:
         for done, (board, tail, form) in enumerate(wanted):
             stage.tell(done / len(wanted), f"{label(*tail)} {form} {board}")
             found, image = costs(tail, form, board, parent)
-            rows[board] += [cost.cells() for cost in found]
+            rows[board] += found
             if (board, form) == ("m4", "loops"):
                 errors[label(*tail)] = image
     for board, real in REAL.items():
@@ -202,19 +151,7 @@ def report(parent: Path) -> str:
         soft_double(parent),
         "",
     ]
-    folder = parent / "loops" / "float" / "articulated_m1_n3"
-    return "\n".join(
-        [
-            *lines,
-            "### MISRA C:2012, for information",
-            "",
-            "Hits of cppcheck's MISRA addon in the C of (1, 3), `float`, in loops. They are "
-            "information, not a verdict.",
-            "",
-            *markdown(("rule", "it asks for", "hits"), summary(folder)),
-            "",
-        ]
-    )
+    return "\n".join(lines)
 
 
 def write() -> int:
@@ -227,8 +164,7 @@ def write() -> int:
         return 2
     document = DOCUMENT.read_text(encoding="utf-8")
     marks = r"(<!-- size-report -->\n).*?(<!-- /size-report -->)"
-    DOCUMENT.write_text(
-        re.sub(marks, lambda m: f"{m[1]}{text}{m[2]}", document, flags=re.DOTALL), encoding="utf-8"
-    )
+    document = re.sub(marks, lambda m: f"{m[1]}{text}{m[2]}", document, flags=re.DOTALL)
+    DOCUMENT.write_text(document, encoding="utf-8")
     print(text)
     return 0

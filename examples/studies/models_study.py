@@ -7,8 +7,8 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from benchmarks.fixtures import built, fixture
-from benchmarks.peers import timing
+from benchmarks import timing
+from benchmarks.models import built, timed_function
 from examples.front import ROOT
 from examples.studies.models_figures import draw_cost, draw_figure_8
 from examples.studies.models_motion import SHOWN, STEPS, THIN, yaw_motion
@@ -48,10 +48,10 @@ def run_times() -> list[float]:
     """Return the least ns of one forward dynamics call: of the continuum, then of LINKS."""
     with TemporaryDirectory() as folder:
         tails = [built(1, links, functions=FUNCTIONS) for links in (None, *LINKS)]
-        timed = [fixture(tail, Path(folder)) for tail in tails]  # whose memory the calls use
+        timed = [timed_function(tail, Path(folder)) for tail in tails]  # whose memory the calls use
         states = timing.random_states(1)
         times = timing.time_rounds([each.closure for each in timed], states, ROUNDS, CALLS)
-        return [least for least, _ in times]
+        return times
 
 
 def measured(folder: Path) -> dict:

@@ -5,7 +5,6 @@ in CI.
 import shutil
 from functools import partial
 
-from checks.embedded import misra
 from checks.embedded.boards import BOARDS, ToolchainMissing
 from tests.support.page import need
 
@@ -18,7 +17,7 @@ def board(name: str):
 
 def cppcheck() -> None:
     """Ask for cppcheck."""
-    need(misra.need)
+    need(partial(_need, "cppcheck", "cppcheck"))
 
 
 def valgrind() -> None:

@@ -1,8 +1,10 @@
-"""The deepest chain of calls of each function, from gcc's call graphs."""
+"""What a function of a model costs with all that it calls: bytes of flash, and of stack."""
 
 import re
 from collections import defaultdict
 from pathlib import Path
+
+from checks.embedded.image import Image, command
 
 NODE = re.compile(r'^node: \{ title: "([^"]*)" label: "([^"]*)"', re.MULTILINE)
 EDGE = re.compile(r'^edge: \{ sourcename: "([^"]*)" targetname: "([^"]*)"', re.MULTILINE)
@@ -15,9 +17,21 @@ class StackUnknown(RuntimeError):
     """
 
 
+def flash(image: Image, name: str) -> int:
+    """Return bytes of code and constants of one function with all that it calls, without libc."""
+    prefix, board = image.manifest["prefix"], image.board
+    linked = str(image.path.with_name(f"{name}.elf"))
+    options = ["-nostdlib", "-Wl,--gc-sections", f"-Wl,-e,{prefix}_{name}"]
+    options += ["-Wl,--unresolved-symbols=ignore-all"]
+    source = str(image.path.with_name(f"{prefix}.o"))
+    command([board.compiler, *board.cpu, *options, source, "-o", linked])
+    size = board.compiler.replace("gcc", "size")
+    return int(command([size, linked]).splitlines()[1].split()[0])
+
+
 def deepest(graphs: list[Path]) -> dict[str, int]:
-    """Return bytes of stack by function, with all that it calls; functions of libc and libgcc count
-    nothing.
+    """Return bytes of stack by function, along its deepest chain of calls in gcc's call graphs;
+    functions of libc and libgcc count nothing.
     """
     frames, calls = {}, defaultdict(set)
     for path in graphs:

@@ -1,4 +1,7 @@
-"""Runs a model on an emulated board and compares every result with the host's."""
+"""Runs a model on an emulated board and compares every result with the host's.
+
+What functions cost on boards, in the tables of docs/embedded.md: `python -m checks.embedded.sizes`.
+"""
 
 from pathlib import Path
 
@@ -21,7 +24,7 @@ if __name__ == "__main__":
     parser.add_argument(
         "--profile", choices=PROFILES, help="how to compile (default: as the scene says)"
     )
-    told = "parent of the folder of what is built (default: output/embedded)"
-    parser.add_argument("--output", type=front.usable, default="output/embedded", help=told)
+    words = "parent of the folder of what is built (default: output/embedded)"
+    parser.add_argument("--output", type=front.usable, default="output/embedded", help=words)
     given = parser.parse_args()
     front.run(main, given.folder, given.board, given.profile, given.output)

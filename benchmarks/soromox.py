@@ -1,9 +1,9 @@
-"""Times SoRoMoX (JAX) beside the continuum's forward dynamics."""
+"""Nanoseconds of a continuum's forward dynamics beside SoRoMoX's, one state, double, interleaved.
 
-if __name__ == "__main__":
-    from benchmarks import alone
-
-    alone.main("peers.soromox", __doc__)
+SoRoMoX (JAX): floating, constant curvature, bending alone, five Gauss points a segment, jax.jit on
+the CPU; one call from Python, and one inside a compiled loop, where Python costs nothing. The
+models differ: its rod has no torso, and its state derivative includes the rates of q.
+"""
 
 import importlib.util
 import math
@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.batches import best
-from benchmarks.fixtures import Fixture, built, fixture, label
-from benchmarks.peers import timing
+import serpentail as st
+from benchmarks.models import built, label, timed_function
+from benchmarks.timing import States, best, random_states, time_rounds
 
 SIZES = (1, 3, 6)
 ROUNDS, CALLS, REPEATS, LOOP = 15, 256, 20, 64
@@ -23,13 +23,8 @@ RADIUS = 0.004  # m, of SoRoMoX's rod; ours has none
 ABSENT = "SoRoMoX is not installed, and left out: .venv/bin/pip install --editable '.[soromox]'"
 
 
-def continuum_peer(folder: Path) -> list[dict]:
-    """Nanoseconds of a continuum's forward dynamics beside SoRoMoX's, one state, double, rounds
-    interleaved. SoRoMoX: floating, constant curvature, bending alone, five Gauss points a segment,
-    jax.jit on the CPU; one call from Python, and one inside a compiled loop, where Python costs
-    nothing. The models differ: its rod has no torso, and its state derivative includes the rates of
-    q. Target: 100x.
-    """
+def measured(folder: Path) -> list[dict]:
+    """Return a row for each number of segments; what to install, where SoRoMoX is missing."""
     if importlib.util.find_spec("soromox") is None:
         print(ABSENT, file=sys.stderr)
         return [{"left out": ABSENT}]
@@ -38,23 +33,20 @@ def continuum_peer(folder: Path) -> list[dict]:
 
 def row(folder: Path, segments: int) -> dict:
     """Return the figures of one tail."""
-    ours, states = fixture(built(segments), folder), timing.random_states(segments)
-    call, loop = compiled(robot(ours), states)
+    model, states = built(segments), random_states(segments)
+    ours = timed_function(model, folder)
+    call, loop = compiled(robot(model), states)
     times = []
     for _ in range(ROUNDS):
-        single = timing.time_rounds([ours.closure], states, 1, CALLS)[0][0]
+        single = time_rounds([ours.closure], states, 1, CALLS)[0]
         times.append((single, best(call, REPEATS), best(loop, REPEATS) / LOOP))
-    least, median = np.min(times, axis=0), np.median(times, axis=0)
-    found = {"model": label(segments, None), "ns": least[0]}
-    for k, name in enumerate(("SoRoMoX, a call", "in a compiled loop"), 1):
-        found[f"{name}, ns"] = least[k]
-        found[f"{name}: times slower"] = (
-            f"{least[k] / least[0]:.0f}x ({median[k] / median[0]:.0f}x)"
-        )
-    return found
+    ns, of_call, in_loop = np.min(times, axis=0)
+    found = {"model": label(segments, None), "ns": ns, "SoRoMoX, a call, ns": of_call}
+    found |= {"ratio": of_call / ns, "in a compiled loop, ns": in_loop}
+    return found | {"ratio in a loop": in_loop / ns}
 
 
-def robot(ours: Fixture):
+def robot(model: st.Model):
     """Return SoRoMoX's floating rod of the model's mass and length, without stiffness."""
     import jax
 
@@ -63,7 +55,7 @@ def robot(ours: Fixture):
     from soromox.systems.pcs.pcs import PCS
     from soromox.systems.pcs.structures import PCSStructure
 
-    p, segments = ours.parameters, ours.model.segments
+    p, segments = model.parameters, model.segments
     link = LinkSpec.circular(
         length=p["tail_length"] / segments,
         density=p["tail_mass"] / (math.pi * RADIUS**2 * p["tail_length"]),
@@ -80,7 +72,7 @@ def robot(ours: Fixture):
     )
 
 
-def compiled(rod, states: timing.States) -> tuple[Callable, Callable]:
+def compiled(rod, states: States) -> tuple[Callable, Callable]:
     """Return calls of the rod's compiled dynamics: of one state, and of LOOP states one after the
     other.
     """

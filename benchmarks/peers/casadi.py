@@ -1,16 +1,14 @@
-"""CasADi's own C of Jacobians and Hessians, as closures to time."""
+"""CasADi's own C of forward dynamics, its Jacobians and the Hessian, as closures to time."""
 
 import ctypes
 from pathlib import Path
-from types import ModuleType
 
 import casadi as ca
 import numpy as np
 
 import serpentail as st
-
-from . import build, timing
-from .compilers import Compiler
+from benchmarks.peers.build import Compiler, build_library, by_each
+from benchmarks.timing import Closure
 
 IN_SX = ("mass_matrix", "bias_force", "inverse_dynamics")  # what CasADi differentiates
 CASADI_CALL = """
@@ -36,22 +34,20 @@ class InCasadi:
 
     def __init__(self, source: Path, function: ca.Function, model: st.Model, compiler: Compiler):
         """Compile; TookTooLong where that takes too long."""
-        library = build.build_library(source, build.CACHE, compiler, ("-lm",))
+        library = build_library(source, compiler, ("-lm",))
         self.function = ctypes.CDLL(str(library)).measured
         sizes = lengths(function, model)
-        self.context = np.zeros(
-            sum(sizes[name] for name in ("parameters", "out", "work", "integers")) + 2
-        )
+        held = ("parameters", "out", "work", "integers")
+        self.context = np.zeros(sum(sizes[name] for name in held) + 2)
         self.context[: sizes["parameters"]] = model.parameter_vector
         self.out = self.context[sizes["parameters"] :][: sizes["out"]]
         self.sparsities = [function.sparsity_out(k) for k in range(2)]
 
     @property
-    def closure(self) -> timing.Closure:
+    def closure(self) -> Closure:
         """What the timer calls."""
-        return timing.Closure(
-            ctypes.cast(self.function, ctypes.c_void_p).value, self.context.ctypes.data
-        )
+        address = ctypes.cast(self.function, ctypes.c_void_p).value
+        return Closure(address, self.context.ctypes.data)
 
     def __call__(self, *arrays) -> list[np.ndarray]:
         """Both matrices."""
@@ -76,7 +72,7 @@ class Graph:
     """Symbols of a state of one model, and its equations of motion as SX expressions of them."""
 
     def __init__(self, model: st.Model):
-        self.module, self.nv, self.nt = casadi_module(model), model.nv, model.nv - 6
+        self.module, self.nv, self.nt = model.checked.casadi_module, model.nv, model.nv - 6
         self.q, self.v = ca.SX.sym("q", model.nq), ca.SX.sym("v", model.nv)
         self.turn = ca.SX.sym("turn", 3)
         self.parameters = ca.SX.sym("parameters", len(model.parameter_vector))
@@ -110,16 +106,18 @@ class Graph:
         return ca.Function("differentiated", [self.q, self.v, rest, self.parameters], results)
 
 
-def casadi_module(model: st.Model) -> ModuleType:
-    """Return the generated module that builds SX expressions."""
-    return model.checked.casadi_module
+def acceleration(model: st.Model) -> ca.Function:
+    """Return v_dot, and an empty second output, because the timer's adapter needs two."""
+    g = Graph(model)
+    tau = ca.SX.sym("tau", g.nt)
+    arguments = {name: ca.vertsplit(x) for name, x in (("q", g.q), ("v", g.v), ("tau", tau))}
+    v_dot = ca.vertcat(*g.module.forward_dynamics(g.fields, **arguments)["v_dot"])
+    return g.finished(tau, [v_dot, ca.SX.zeros(1)])
 
 
-def jacobians(model: st.Model, turn_by_hand: bool) -> ca.Function:
+def jacobians(model: st.Model) -> ca.Function:
     """-H^-1 dID in SX: columns of tail coordinates, omega and rates, torques; then those of a turn
-    of the torso.
-
-    A turn of the torso moves p_b_ddot + g z along and leaves all else; by hand, it is written so.
+    of the torso, by hand: it moves p_b_ddot + g z along and leaves all else.
     """
     g = Graph(model)
     tau, v_dot = ca.SX.sym("tau", g.nt), ca.SX.sym("v_dot", g.nv)
@@ -131,28 +129,19 @@ def jacobians(model: st.Model, turn_by_hand: bool) -> ca.Function:
         return ca.vertcat(*g.module.ldl_solve(factor, ca.vertsplit(column), g.nv))
 
     solved = solve(ca.vertcat(ca.SX(6, 1), tau) - bias)
-    directions = [g.q[7:], g.v[3:]] + ([] if turn_by_hand else [g.turn])
-    J = ca.jacobian(g.force(q if turn_by_hand else g.turned(), v_dot), ca.vertcat(*directions))
+    J = ca.jacobian(g.force(q, v_dot), ca.vertcat(g.q[7:], g.v[3:]))
     J = ca.horzsplit(ca.substitute(J, v_dot, solved))
     columns = [solve(-ca.densify(column)) for column in J]
-    torques = [
-        solve(column)
-        for column in ca.horzsplit(ca.densify(ca.vertcat(ca.SX(6, g.nt), ca.SX.eye(g.nt))))
-    ]
-    rest = ca.horzcat(*columns[: 2 * g.nt + 3], *torques)
-    if turn_by_hand:
-        R = ca.reshape(ca.vertcat(*g.module.quaternion_rotation(q[3:7])[0]), 3, 3).T
-        turn = -R @ ca.skew(R.T @ (solved[:3] + ca.vertcat(0, 0, *g.fields["gravity"])))
-    else:
-        turn = ca.horzcat(*columns[2 * g.nt + 3 :])
+    unit = ca.horzsplit(ca.densify(ca.vertcat(ca.SX(6, g.nt), ca.SX.eye(g.nt))))
+    rest = ca.horzcat(*columns, *(solve(column) for column in unit))
+    R = ca.reshape(ca.vertcat(*g.module.quaternion_rotation(q[3:7])[0]), 3, 3).T
+    turn = -R @ ca.skew(R.T @ (solved[:3] + ca.vertcat(0, 0, *g.fields["gravity"])))
     return g.finished(tau, [ca.densify(rest), ca.densify(turn)])
 
 
-def hessian(model: st.Model, dense: bool) -> ca.Function:
-    """Second derivatives of lambda^T ID in SX.
-
-    sparse: what is not zero of the lower triangle for turn, tail, omega, rates, and of the rows of
-    v_dot for q.  dense: the four square blocks that the generated function writes, side by side.
+def hessian(model: st.Model) -> ca.Function:
+    """Return second derivatives of lambda^T ID in SX: the four square blocks that the generated
+    function writes, side by side, and an empty second output.
     """
     g = Graph(model)
     both = ca.SX.sym("v_dot_and_multiplier", 2 * g.nv)
@@ -162,8 +151,6 @@ def hessian(model: st.Model, dense: bool) -> ca.Function:
     directions = ca.vertcat(of_q, g.v[3:])
     second = ca.tril(ca.jacobian(ca.cse(ca.gradient(power, directions)), directions))
     mixed = ca.jacobian(ca.cse(ca.gradient(power, both)[: g.nv]), of_q)
-    if not dense:
-        return g.finished(both, [second, mixed])
     whole, k = ca.tril2symm(second), g.nv - 3
 
     def square(block):
@@ -183,4 +170,4 @@ def in_casadi(
     text = Path(source.name).read_text() + CASADI_CALL.format(**lengths(function, model))
     source.write_text(text)
     Path(source.name).unlink()
-    return build.by_each(lambda compiler: InCasadi(source, function, model, compiler))
+    return by_each(lambda compiler: InCasadi(source, function, model, compiler))
