@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import NamedTuple, TypeVar
 
 from benchmarks.processors import march
+from serpentail.basics.errors import SerpentailError
 from serpentail.compiling.commands import run_all
 
 Made = TypeVar("Made")
@@ -41,7 +42,7 @@ HEADERS = (
 )
 
 
-class PeerUnavailable(RuntimeError):
+class PeerUnavailable(SerpentailError):
     """A peer cannot be built or timed on this machine; the message says what to install."""
 
 
