@@ -17,7 +17,7 @@ from serpentail_codegen.pipeline import generate
 from serpentail_codegen.scene.parse import scene_for
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "embedded.md"
-TAILS = ((1, 3), (3, 4), (6, 4), (1, None), (3, None))  # segments, links; None: continuum
+TAILS = ((1, 3), (3, 4), (1, None))  # segments, links; None: continuum
 FUNCTIONS = ("mass_matrix", "forward_dynamics", "pfl", "contact_dynamics")
 DERIVATIVES = "forward_dynamics_derivatives"
 STRAIGHT_DERIVATIVES = ((1, 3), (1, None))
