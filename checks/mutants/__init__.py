@@ -1,1 +1,1 @@
-"""`make mutants`: makes one small change at a time in the sources, and checks that tests notice."""
+"""`make mutants`: would the tests notice a fault?"""

@@ -1,5 +1,12 @@
-"""`make mutants`: runs a sample of mutants, each against the tests that run its line; prints a
-score and the survivors. After an interruption the same command goes on.
+"""Makes one small change at a time in the sources, and checks that a test notices: `make mutants`.
+
+A mutant has another comparison, operator, number, condition, call or result, or lacks a statement.
+Mutants are drawn in equal parts from the generator, its templates and the runtime, never from
+docstrings, messages or types. The tests that run the changed line are run, those named like the file
+first; the first that fails kills the mutant. Tests that compare texts do not count. Controls come
+first: a broken file must be noticed, and the same file unbroken must not. Below 95 % the command
+fails; equivalent.toml says which survivors no test can notice. Verdicts are kept in output/mutants:
+after an interruption the same command goes on.
 """
 
 import argparse
