@@ -10,9 +10,9 @@ from examples import front
 # in this order
 NAMES = ("forward_dynamics", "jacobians", "hessians", "batches", "nodes", "meshes", "long_tails")
 NAMES += ("python_overhead", "flights", "rollouts", "environments", "ground_batches")
-NAMES += ("ground_steps", "operations", "generation", "derivative_code", "tails", "soromox")
-NAMES += ("precisions", "drift", "work_precision", "simulations", "contact_costs")
-NAMES += ("contact_shares", "polar_errors", "polar_times", "planning", "pages")
+NAMES += ("ground_steps", "operations", "generation", "tails", "soromox", "precisions")
+NAMES += ("simulations", "contact_costs", "contact_shares", "polar_errors", "polar_times")
+NAMES += ("planning",)
 LONG = ("forms",)
 
 

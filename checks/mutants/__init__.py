@@ -1,1 +1,1 @@
-"""`make mutants`: would the tests notice a fault?"""
+"""`make mutants` tells whether the tests would notice a fault."""

@@ -14,7 +14,6 @@ from .python_source import with_first
 from .recorded import Recorder
 from .sample import part_of
 
-GOLDEN = "tests/house/test_golden.py"
 STARTING = 40.0  # s that a process may take in addition to its tests
 SLOWER = 6.0  # factor by which a mutant's tests may be slower
 FIRST = 15.0  # s of tests that the first process of a mutant runs; each other four times as many
@@ -46,14 +45,6 @@ class Tree:
                 if found:
                     return True, *found, ran
             return False, "", "" if ran else "no test runs this line", ran
-        finally:
-            shutil.copy2(tree.BASE / mutation.path, self.root / mutation.path)
-
-    def golden(self, mutation: Mutation) -> bool:
-        """Tell if a mutant in the generator changes the golden models."""
-        self._plant(mutation, mutation.of((tree.BASE / mutation.path).read_bytes()))
-        try:
-            return bool(self._failed(mutation, [GOLDEN]))
         finally:
             shutil.copy2(tree.BASE / mutation.path, self.root / mutation.path)
 

@@ -5,10 +5,11 @@ import os
 import signal
 import subprocess
 import threading
+import time
 from pathlib import Path
 
-stopped = threading.Event()
-running: set[subprocess.Popen] = set()
+stopped = threading.Event()  # set when the run of mutants is interrupted
+TICK = 0.2  # s
 
 
 class Stopped(Exception):
@@ -16,46 +17,17 @@ class Stopped(Exception):
 
 
 def run(words: list[str], cwd: Path, env: dict, limit: float) -> tuple[int | None, str]:
-    """Run a process; return its status, or None if it took too long, and its output.
-
-    Stopped if ``stop`` ended it, or was called before.
-    """
-    if stopped.is_set():
-        raise Stopped
-    begun = subprocess.Popen(
-        words,
-        cwd=cwd,
-        env=env,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        start_new_session=True,
-    )
-    with begun as process:
-        running.add(process)
-        if stopped.is_set():  # since it was asked above
-            kill(process)
+    """Run a process; return its status, or None if it took too long (s), and its output."""
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+    end, output = time.monotonic() + limit, None
+    with subprocess.Popen(words, cwd=cwd, env=env, start_new_session=True, **pipes) as process:
         try:
-            output, _ = process.communicate(timeout=limit)
-            found = process.returncode, output
-        except subprocess.TimeoutExpired:
-            found = None, ""
+            while output is None and time.monotonic() < end and not stopped.is_set():
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    output, _ = process.communicate(timeout=TICK)
         finally:
-            kill(process)
-            running.discard(process)
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
     if stopped.is_set():
         raise Stopped
-    return found
-
-
-def stop() -> None:
-    """End all processes, also those of other threads, and let none begin."""
-    stopped.set()
-    for process in tuple(running):
-        kill(process)
-
-
-def kill(process: subprocess.Popen) -> None:
-    """End a process and those that it started."""
-    with contextlib.suppress(ProcessLookupError):
-        os.killpg(process.pid, signal.SIGKILL)
+    return (None, "") if output is None else (process.returncode, output)
