@@ -1,1 +1,1 @@
-"""`make bench`: run time, accuracy and size, compared with other engines (peers)."""
+"""`python -m benchmarks`: how fast and how accurate, beside peers."""

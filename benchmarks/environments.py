@@ -1,9 +1,9 @@
-"""Steps per second of environments beside MuJoCo's, on the same tail with equalities of joints."""
+"""Steps of 1 ms a second, on one core, beside MuJoCo's on the same tail with equalities of joints.
 
-if __name__ == "__main__":
-    from benchmarks import alone
-
-    alone.main("environments", __doc__)
+Of 4096 environments of righting, including observations, rewards and new episodes, with five steps
+for each action; of `model.step` alone; and of MuJoCo's mj_step on the MJCF that `st.export` writes,
+by its own integrator and by Runge-Kutta.
+"""
 
 import tempfile
 import time
@@ -13,20 +13,17 @@ from pathlib import Path
 import numpy as np
 
 import serpentail as st
-from benchmarks.fixtures import built, label
+from benchmarks.models import built, label
 
+PER_PROCESSOR = True
 # environments; rounds of each, alternately; MuJoCo's steps in one round
 COUNT, ROUNDS, STEPS = 4096, 20, 400
 SIZES = ((1, 3), (3, 4))
 WANTED = ["forward_dynamics", "rollout"]
 
 
-def environment_rates(folder: Path) -> list[dict]:
-    """Steps of 1 ms a second, on one core: of 4096 environments of righting, including
-    observations, rewards and new episodes, with five steps for each action; of `model.step` alone;
-    and of MuJoCo's mj_step on the MJCF that `st.export` writes, by its own integrator and by
-    Runge-Kutta.
-    """
+def measured(folder: Path) -> list[dict]:
+    """Return a row for each tail."""
     return [rates(size) for size in SIZES]
 
 

@@ -1,13 +1,10 @@
-"""Times all nodes of a mesh at once: CasADi functions of the dynamics, and FATROP's stages."""
+"""Nanoseconds a node of forward dynamics at 64 nodes, in one thread.
 
-if __name__ == "__main__":
-    from benchmarks import alone
+``model.casadi.nodes``, ``external`` in a map, and the SX function in a map, whose C CasADi
+generated and gcc compiled.
+"""
 
-    alone.main("meshes", __doc__)
-
-import ctypes
 import subprocess
-import time
 from collections.abc import Callable
 from itertools import chain
 from pathlib import Path
@@ -16,28 +13,23 @@ from typing import Any
 import numpy as np
 
 import serpentail as st
-from benchmarks.fixtures import built, label
-from examples import righting
-from serpentail.planning.staged import fatrop
-from serpentail.planning.staged.thread_pool import helped
-from serpentail_scene.signatures.table import AIRBORNE, EXACT_DERIVATIVES
+from benchmarks.models import built, label
+from benchmarks.timing import best_of
+from serpentail_scene.signatures.table import EXACT_DERIVATIVES
 
+PER_PROCESSOR = True
 NODES, ROUNDS = 64, 300
-DYNAMICS = ((1, 3), (3, 4))
+SIZES = ((1, 3), (3, 4))
 COMPILED = ((1, 3),)  # the compiler works for minutes on longer tails
-STAGED, INTERVALS, EVALUATIONS = ((1, 3), (3, 2), (6, 2)), 40, 200
-THREADS = (1, 2)
 KINDS = ("value", "Jacobian", "Jacobian of the gradient")
 
 
-def mesh_times(folder: Path) -> list[dict]:
-    """Nanoseconds a node of forward dynamics at 64 nodes, in one thread: ``model.casadi.nodes``,
-    ``external`` in a map, and the SX function in a map, whose C CasADi generated and gcc compiled.
-    """
-    return [row for size in DYNAMICS for row in dynamics_rows(size, folder)]
+def measured(folder: Path) -> list[dict]:
+    """Return a row for each tail and derivative."""
+    return [row for size in SIZES for row in rows_of(size, folder)]
 
 
-def dynamics_rows(size: tuple, folder: Path) -> list[dict]:
+def rows_of(size: tuple, folder: Path) -> list[dict]:
     """Return the rows of one tail."""
     exact = {n for name, orders in EXACT_DERIVATIVES.items() for n in (name, *chain(*orders))}
     model = built(*size, functions=sorted(exact))
@@ -50,9 +42,9 @@ def dynamics_rows(size: tuple, folder: Path) -> list[dict]:
     calls = {way: [call_of(g, model) for g in functions] for way, functions in ways.items()}
     rows = []
     for k, kind in enumerate(KINDS):
-        times = alternately({way: own[k] for way, own in calls.items()}, ROUNDS)
+        times = best_of([own[k] for own in calls.values()], ROUNDS)
         row: dict = {"model": label(*size), "function": kind}
-        rows.append(row | {f"{way}, ns": 1e9 * s / NODES for way, s in times.items()})
+        rows.append(row | {f"{way}, ns": ns / NODES for way, ns in zip(calls, times, strict=True)})
     return rows
 
 
@@ -107,84 +99,3 @@ def call_of(f: Any, model: st.Model) -> Callable[[], Any]:
         call()
 
     return run
-
-
-def alternately(calls: dict[str, Callable[[], Any]], rounds: int) -> dict[str, float]:
-    """Return the least seconds of each call, taken in turns."""
-    least = dict.fromkeys(calls, np.inf)
-    for _ in range(rounds):
-        for name, call in calls.items():
-            begun = time.perf_counter()
-            call()
-            least[name] = min(least[name], time.perf_counter() - begun)
-    return least
-
-
-class _Captured(Exception):
-    """Raised with the arguments of FATROP's first run."""
-
-
-def stage_times(folder: Path) -> list[dict]:
-    """Milliseconds in which all stages of 40 intervals give values, slopes and Hessians once, as
-    FATROP asks for them in an iteration, from the kick, close to passive flight.
-    """
-    return [stage_row(size) for size in STAGED]
-
-
-def stage_row(size: tuple) -> dict:
-    """Return the row of one tail."""
-    model = built(*size, functions=[*righting.FUNCTIONS.split(","), *AIRBORNE])
-    task, w, states = captured(model, size)
-    code, random = fatrop.kernel(), np.random.default_rng(1)
-    pointer, zeros = ctypes.c_void_p, np.zeros(INTERVALS, np.intc)
-    code.program_values.argtypes = code.program_slopes.argtypes = (pointer, pointer)
-    code.program_curve.argtypes = (pointer, pointer, ctypes.c_double, *(pointer,) * 3)
-    programs, weights = {}, random.normal(size=len(w))
-    for count in THREADS:
-        programs[count] = code.program_new(ctypes.byref(task.task))
-        code.program_guess(programs[count], states.ctypes.data)
-    row: dict = {"model": label(*size)}
-    least = dict.fromkeys(THREADS, np.inf)
-    one, two = (programs[count] for count in THREADS)
-    with helped(code, one, THREADS[0] - 1), helped(code, two, THREADS[1] - 1):
-        for _ in range(EVALUATIONS):
-            near = w + 1e-3 * random.normal(size=len(w))
-            for count, program in programs.items():
-                begun = time.perf_counter()
-                code.program_values(program, near.ctypes.data)
-                code.program_slopes(program, near.ctypes.data)
-                code.program_curve(
-                    *(program, near.ctypes.data, 1.0, weights.ctypes.data),
-                    *(zeros.ctypes.data, zeros.ctypes.data),
-                )
-                least[count] = min(least[count], time.perf_counter() - begun)
-    for count, program in programs.items():
-        code.program_free(program)
-        row[f"{count} thread{'s' if count > 1 else ''}, ms"] = 1e3 * least[count]
-    return row | {"ratio": least[THREADS[0]] / least[THREADS[1]]}
-
-
-def captured(model: st.Model, size: tuple) -> tuple:
-    """Return the task of the first program, its variables and the states at its nodes."""
-    run = fatrop._run
-
-    def note(task, variables, states, *_):
-        raise _Captured(task, variables, np.ascontiguousarray(states))
-
-    fatrop._run = note
-    try:
-        st.plan(
-            model,
-            start=righting.kicked(model),
-            duration=(0.3, righting.FLIGHT),
-            bounds=righting.bounds(model, np.pi if size[0] == 1 else 2 * np.pi),
-            solver="fatrop",
-            intervals=INTERVALS,
-            tolerance=None,
-            track=False,
-        )
-    except _Captured as found:
-        return found.args
-    finally:
-        fatrop._run = run
-    raise AssertionError("the plan was made without FATROP")

@@ -1,9 +1,9 @@
-"""Times a plan's nodes: emitted functions beside the operations that CasADi derives."""
+"""Nanoseconds a node of a plan, on one core: rates, then with Jacobian, then with Hessian.
 
-if __name__ == "__main__":
-    from benchmarks import alone
-
-    alone.main("nodes", __doc__)
+Emitted: in C, one by one and side by side. CasADi: values, Jacobians and Hessians of the node of
+the airborne formulation, whose dynamics is our C, 64 nodes in a map; drift and omega are among its
+unknowns, and the cost is in it.
+"""
 
 from itertools import chain
 from pathlib import Path
@@ -11,49 +11,36 @@ from pathlib import Path
 import numpy as np
 
 import serpentail as st
-from benchmarks.batches import best, c_times
-from benchmarks.fixtures import built, label
-from benchmarks.operations import needed
+from benchmarks.batches import STATES, ns_a_state, random_inputs
+from benchmarks.models import built, label
+from benchmarks.timing import best
 from serpentail.planning.nlp.coordinates import attitude
 from serpentail.planning.nlp.equations import equations_of_motion
 from serpentail.planning.nlp.node import PARAMETERS, node_function, variables_of
 from serpentail.planning.nlp.node_calls import MappedNode
 from serpentail.planning.problem import SMOOTHING, PlanningProblem
-from serpentail_codegen.functions.catalogue import CATALOGUE
-from serpentail_codegen.functions.tail import Tail
 from serpentail_scene.signatures.table import AIRBORNE, EXACT_DERIVATIVES
 
+PER_PROCESSOR = True
 SIZES = ((1, 3), (3, 2), (6, 2), (2, None))
 NODES, ROUNDS = 64, 20
 
 
-def node_times(folder: Path) -> list[dict]:
-    """Nanoseconds a node, on one core: rates, with the Jacobian, with the Hessian of a weighted
-    sum, too.
-
-    Emitted: in C, one by one and side by side.  CasADi: values, Jacobians and Hessians of the node
-    of the airborne formulation, whose dynamics is our C, 64 nodes in a map; drift and omega are
-    among its unknowns, and the cost is in it.  Operations: those that a line without loops needs.
-    """
-    return [row for size in SIZES for row in node_rows(size)]
-
-
-def node_rows(size: tuple) -> list[dict]:
-    """Return the rows of one tail."""
-    exact = {n for name, orders in EXACT_DERIVATIVES.items() for n in (name, *chain(*orders))}
-    model = built(*size, functions=[*AIRBORNE, *sorted(exact)])
-    casadi = casadi_times(model)
-    return [node_row(model, size, name, casadi[name]) for name in AIRBORNE]
-
-
-def node_row(model: st.Model, size: tuple, name: str, casadi: float) -> dict:
-    """Return the times and operations of one function."""
-    alone, together = c_times(model, name)
-    row = {"function": name, "model": label(*size), "one by one, ns": alone}
-    row |= {"side by side, ns": together, "CasADi, ns": casadi, "ratio": casadi / together}
-    segments, links = size
-    tail = Tail(segments, links or 1, "articulated" if links else "continuum")
-    return row | {"operations": needed(CATALOGUE[name].of(tail), tail)}
+def measured(folder: Path) -> list[dict]:
+    """Return a row for each tail and function."""
+    rows, exact = (
+        [],
+        {n for name, orders in EXACT_DERIVATIVES.items() for n in (name, *chain(*orders))},
+    )
+    for size in SIZES:
+        model = built(*size, functions=[*AIRBORNE, *sorted(exact)])
+        beside = casadi_times(model)
+        for name in AIRBORNE:
+            single, batch = ns_a_state(model, name, random_inputs(model, name, STATES))
+            row = {"function": name, "model": label(*size), "one by one, ns": single}
+            row |= {"side by side, ns": batch, "CasADi, ns": beside[name]}
+            rows.append(row | {"ratio": beside[name] / batch})
+    return rows
 
 
 def casadi_times(model: st.Model) -> dict[str, float]:

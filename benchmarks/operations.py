@@ -1,15 +1,12 @@
-"""Operations that batches execute, over those that a line without zeros needs."""
+"""Additions, multiplications and divisions a state of a batch, executed and needed.
 
-if __name__ == "__main__":
-    from benchmarks import alone
-
-    alone.main("operations", __doc__)
+Executed: by its C. Needed: those of a line without loops, from which all zeros are gone.
+"""
 
 from pathlib import Path
 from types import SimpleNamespace
 
-from benchmarks.batches import DFD, FD, HESSIAN
-from benchmarks.fixtures import label
+from benchmarks.models import DFD, FD, HESSIAN, label
 from serpentail_codegen.functions.catalogue import CATALOGUE
 from serpentail_codegen.functions.function import Function, assemble
 from serpentail_codegen.functions.tail import Tail
@@ -24,10 +21,8 @@ from serpentail_codegen.targets.c.batch import batches
 SIZES = ((1, 3), (3, 4))
 
 
-def operation_counts(folder: Path) -> list[dict]:
-    """Additions, multiplications and divisions a state of a batch: those that its C executes, and
-    those that a line without loops needs, from which all zeros are gone.
-    """
+def measured(folder: Path) -> list[dict]:
+    """Return a row for each tail and function."""
     return [counts(name, size) for size in SIZES for name in (FD, DFD, HESSIAN)]
 
 

@@ -1,70 +1,64 @@
-"""Measures planning against its targets and against other ways to solve the same problem.
+"""Planning by FATROP and by IPOPT with MUMPS, against the targets, in CPU time of the whole call.
 
-All times are CPU seconds of this process. The problem of one plan is that of Sect. 4.2 from a
-random tumbling start, with 59 nodes (Hermite-Simpson, 29 intervals). All ways of solving it start
-from passive flight.
+An iteration on the same mesh; random tumbling starts, upright and at rest; the kick's state; other
+objectives; one problem of 59 nodes (Hermite-Simpson) with the exact Hessian and L-BFGS, and the
+paper's program; planning again from states up to 1 % away, by IPOPT and by `st.Mpc`. True: within
+0.01 deg when the torques are applied. Passive flight is the first guess.
 """
 
-if __name__ == "__main__":
-    from benchmarks import alone
-
-    alone.main("planning", __doc__)
-
-import importlib.util
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 import serpentail as st
+from benchmarks.models import label
 from examples import righting
-from serpentail.planning import backends as ways
-from serpentail.planning.nlp.equations import equations_of_motion
-from serpentail.planning.problem import SMOOTHING
-from serpentail_codegen.scene.parse import scene_for
+from examples.studies.righting_kinds import is_true
 
-SLOWER, CAP = (
-    500,
-    300.0,
-)  # times slower than the best, or s of CPU: endless solves are cut at the lesser of both
 EXAMPLE = 4  # the random start
-REPEATS = 5
-NODES = {
-    "rule": "hermite-simpson",
-    "intervals": 29,
-    "tolerance": None,
-    "retries": 0,
-    "track": False,
-}
-PAPER = righting.PAPER | {"intervals": 58, "track": False}
+SOLVERS = {"FATROP": {"solver": "fatrop"}, "IPOPT": {"solver": "ipopt"}}
+MESHES = {(1, 3): (40, 4), (6, 2): (83, 5)}  # intervals, times as fast as IPOPT
+STARTS = {(1, 3): 200, (2, 3): 50, (3, 2): 50}
+MEDIAN, WITHIN, SHARE = 0.05, 0.2, 95  # s, s, % of the starts of (1, 3)
+KICKED = {(3, 2): 0.5, (4, 2): 2.0, (6, 2): 30.0}  # s
+OBJECTIVES, BESIDE = 50, 10  # starts, and those of them from which IPOPT plans, too
+LIMIT = 300.0  # s of wall clock that a plan may take
+PLAIN = {"tolerance": None, "retries": 0, "track": False}
+NODES = PLAIN | {"rule": "hermite-simpson", "intervals": 29}
 LIMITED = {"options": {"ipopt.hessian_approximation": "limited-memory", "ipopt.max_iter": 3000}}
-STARTS = {
-    (1, 3): (200, 0.5, 95),
-    (2, 3): (50, 10.0, 80),
-    (3, 2): (50, 10.0, 80),
-}  # starts, s, % of them
+WAYS = {
+    "exact Hessian": NODES,
+    "L-BFGS Hessian": NODES | LIMITED,
+    "paper's program, exact Hessian": righting.PAPER | {"intervals": 58, "track": False},
+}
 
 
-class Cut(Exception):
-    """Raised when a solve has taken long enough."""
+@dataclass(frozen=True)
+class Call:
+    """A plan, and the CPU time of the call that made it (s)."""
+
+    plan: st.Plan
+    cpu_s: float
+
+    @property
+    def true(self) -> bool:
+        """Tell if its torques bring the torso to the goal."""
+        return is_true(self.plan.report)
 
 
-def planning(folder: Path) -> list[dict]:
-    """Ways to solve one problem of 59 nodes; how often, and how fast, plans become true (<= 0.01
-    deg); planning again. The paper's method is SciPy's SLSQP with finite differences of the
-    trapezoidal program in Euler angles; it is cut, unsolved, at 500 times the best way's time, at
-    most 5 minutes.
-    """
-    models = {size: righting.model(*size) for size in STARTS}
-    rat, free = models[1, 3], st.Goal(torso_rate=None)
-    rows = [
-        *one_problem(rat),
-        *replanned(rat),
-        true_plans(rat, "(1, 3), upright at any rate", STARTS[1, 3], goal=free),
-    ]
-    return rows + [
-        true_plans(models[m, n], f"({m}, {n}), at rest", STARTS[m, n]) for m, n in STARTS
-    ]
+def measured(folder: Path) -> list[dict]:
+    """Return a row for each figure."""
+    sizes = {*MESHES, *STARTS, *KICKED}
+    models = {size: righting.model(*size, righting.STAGED) for size in sizes}
+    rat = models[1, 3]
+    rows = [iteration(models[size], *MESHES[size]) for size in MESHES]
+    for size, count in STARTS.items():
+        rows += random_starts(models[size], count)
+    rows += [from_the_kick(models[size], most) for size, most in KICKED.items()]
+    rows += [objective(rat, name) for name in ("energy", "time")]
+    return [*rows, *one_problem(rat), again(rat), *ticks(rat)]
 
 
 def plan(rat: st.Model, seed: int = EXAMPLE, **settings) -> st.Plan:
@@ -72,156 +66,127 @@ def plan(rat: st.Model, seed: int = EXAMPLE, **settings) -> st.Plan:
     4.3.
     """
     limits = righting.bounds(rat, np.pi if rat.segments == 1 else 2 * np.pi)
-    common = {
-        "start": righting.tumbling(rat, seed),
-        "duration": (0.3, righting.FLIGHT),
-        "bounds": limits,
-    }
-    return st.plan(rat, **(common | settings))
+    common = {"start": righting.tumbling(rat, seed), "duration": (0.3, righting.FLIGHT)}
+    return st.plan(rat, **(common | {"bounds": limits, "track": False} | settings))
 
 
-def one_problem(rat: st.Model) -> list[dict]:
-    """Return the rows of one program solved in several ways, alternately."""
-    ways = {
-        "exact Hessian": NODES,
-        "L-BFGS Hessian": NODES | LIMITED,
-        "paper's program, exact Hessian": PAPER,
-    }
-    reports = {way: [] for way in ways}
-    for _ in range(REPEATS):
-        for way, settings in ways.items():
-            reports[way].append(plan(rat, **settings).report)
-    rows, best = [], min(r["solve_cpu_s"] for r in reports["exact Hessian"])
-    for way, found in reports.items():
-        least, target = (
-            min(r["solve_cpu_s"] for r in found),
-            "<= 0.15 s" if way == "exact Hessian" else "",
-        )
-        about = f"{found[0]['iterations']} iterations, {least / best:.1f}x, {found[0]['status']}"
-        rows.append(figure(f"(1, 3), 59 nodes, {way}", f"{least:.3f} s", target, about))
-    spent, about = finite_differences(rat, min(SLOWER * best, CAP))
-    about = f"{spent / best:.0f}x, {about}"
-    rows.append(figure("(1, 3), 59 nodes, paper's method", f"{spent:.1f} s", ">= 500x", about))
-    return [*rows, opty(rat, best)]
+def timed(rat: st.Model, seed: int = EXAMPLE, **settings) -> Call:
+    """Return a plan and the CPU time of making it."""
+    begun = time.process_time()
+    found = plan(rat, seed, **settings)
+    return Call(found, time.process_time() - begun)
 
 
-def figure(name: str, value: str, target: str, about: str = "") -> dict:
+def figure(rat: st.Model, name: str, value: str, target: str, about: str = "") -> dict:
     """Return a row."""
+    name = f"{label(rat.segments, rat.links)}, {name}"
     return {"figure": name, "value": value, "target": target, "about": about}
 
 
-def opty(rat: st.Model, best: float) -> dict:
-    """Return the row of opty: 59 nodes, passive flight as the guess, the duration fixed."""
-    name = "(1, 3), 59 nodes, opty"
-    if any(importlib.util.find_spec(needed) is None for needed in ("opty", "cyipopt")):
-        return figure(name, "not measured", "", "opty or cyipopt is not installed")
-    from benchmarks.peers.opty_righting import solved
-
-    flight = righting.passive(rat, righting.tumbling(rat, EXAMPLE), righting.FLIGHT)
-    guess = flight.resample(np.linspace(0, righting.FLIGHT, 59))
-    found = solved(
-        scene_for("articulated", rat.segments, rat.links), guess, righting.bounds(rat), SMOOTHING
-    )
-    about = f"{found['solve_s'] / best:.0f}x, {found['status']}; {found['setup_s']:.0f} s before"
-    return figure(name, f"{found['solve_s']:.1f} s", "", about)
-
-
-def finite_differences(rat: st.Model, cap: float) -> tuple[float, str]:
-    """Return CPU seconds of SLSQP without derivatives on the paper's program, at most `cap`, and
-    its outcome.
-    """
-    transcription, limits, w, p = captured(rat)
-    nlp, fixed = transcription.functions["nlp"], limits.lbg == limits.ubg
-    begun = time.process_time()
-
-    def both(x):
-        if time.process_time() - begun > cap:
-            raise Cut
-        return nlp(x, p)
-
-    from scipy.optimize import Bounds, minimize
-
-    constraint = {
-        "type": "eq",
-        "fun": lambda x: (np.array(both(x)[1]).ravel() - limits.lbg)[fixed],
-    }
-    box, most = Bounds(limits.lbx, limits.ubx), {"maxiter": 10000}
-    try:
-        found = minimize(
-            lambda x: float(both(x)[0]),
-            w,
-            method="SLSQP",
-            bounds=box,
-            constraints=constraint,
-            options=most,
-        )
-        status = f"{found.nit} iterations, success {found.success}"
-    except Cut:
-        status = f"unsolved: cut at {cap:.0f} s"
-    return time.process_time() - begun, status
+def iteration(rat: st.Model, intervals: int, least: float) -> dict:
+    """Time an iteration from passive flight, torques and states on one mesh."""
+    each = dict.fromkeys(SOLVERS, np.inf)
+    for _ in range(3):
+        for name, way in SOLVERS.items():
+            most = {"options": {f"{way['solver']}.max_iter": 30}}
+            report = plan(
+                rat, intervals=intervals, controls=intervals, **PLAIN, **way, **most
+            ).report
+            each[name] = min(each[name], report["solve_cpu_s"] / report["iterations"])
+    about = ", ".join(f"{name} {1e3 * s:.2f} ms" for name, s in each.items())
+    ratio = f"{each['IPOPT'] / each['FATROP']:.1f}x"
+    return figure(rat, f"{intervals} intervals, an iteration", ratio, f">= {least:g}x", about)
 
 
-def captured(rat: st.Model) -> tuple:
-    """Return the paper's program, its limits, passive flight as the guess and the parameters, as
-    ``plan`` forms them.
-    """
-    seen, solve = [], ways.solve
-
-    def note(engine, limits, w, p, multipliers=None):
-        seen.append((limits, np.clip(w, limits.lbx, limits.ubx), p))
-        return solve(engine, limits, w, p, multipliers)
-
-    ways.solve = note
-    try:
-        found = plan(rat, **PAPER)
-    finally:
-        ways.solve = solve
-    transcription = ways.transcription_of(
-        rat, found.problem, found.mesh, found.rule, equations_of_motion(rat)
-    )
-    return transcription, *seen[0]
+def random_starts(rat: st.Model, count: int) -> list[dict]:
+    """Plan from random starts by both solvers."""
+    rows, targets = [], rat.segments == 1
+    for name, way in SOLVERS.items():
+        calls = [timed(rat, seed, **way) for seed in range(1, count + 1)]
+        times = np.array([one.cpu_s if one.true else np.inf for one in calls])
+        about = f"{100 * np.isfinite(times).mean():.1f} % true at all"
+        median = f"{np.median([one.cpu_s for one in calls]):.3f} s"
+        share = f"{100 * (times <= WITHIN).mean():.1f} %"
+        head = f"{count} starts, at rest, {name}"
+        target = f"<= {MEDIAN} s" if targets else ""
+        rows.append(figure(rat, f"{head}, median", median, target, about))
+        target = f">= {SHARE} %" if targets else ""
+        rows.append(figure(rat, f"{head}, true within {WITHIN} s", share, target))
+    return rows
 
 
-def replanned(rat: st.Model) -> list[dict]:
-    """Plan again from states up to 1 % away, with the previous plan as the guess: the whole call,
-    including the true flight.
+def from_the_kick(rat: st.Model, most: float) -> dict:
+    """Plan from the kick's state, the torso at rest at the end."""
+    start = righting.kicked(rat)
+    calls = {name: timed(rat, start=start, time_limit=LIMIT, **w) for name, w in SOLVERS.items()}
+    error = {k: righting.row(one.plan)["open_loop_attitude_error_deg"] for k, one in calls.items()}
+    ours, other = calls["FATROP"], calls["IPOPT"]
+    about = f"{error['FATROP']:.4f} deg; IPOPT {other.cpu_s:.2f} s, {error['IPOPT']:.4f} deg"
+    value = f"{ours.cpu_s:.2f} s{'' if ours.true else ', not true'}"
+    return figure(rat, "from the kick", value, f"<= {most:g} s", about)
+
+
+def objective(rat: st.Model, name: str) -> dict:
+    """Plan for another objective from random starts."""
+    given, found = {"objective": name, "time_limit": LIMIT}, {}
+    for solver, way in SOLVERS.items():
+        seeds = range(1, (OBJECTIVES if solver == "FATROP" else BESIDE) + 1)
+        found[solver] = [timed(rat, seed, **given, **way) for seed in seeds]
+    median = {solver: np.median([one.cpu_s for one in calls]) for solver, calls in found.items()}
+    true = {solver: sum(one.true for one in calls) for solver, calls in found.items()}
+    about = f"median {median['FATROP']:.2f} s; IPOPT, the first {BESIDE}: {true['IPOPT']} true, "
+    about += f"{median['IPOPT']:.2f} s"
+    share = f"{100 * true['FATROP'] / OBJECTIVES:.0f} %"
+    return figure(rat, f"{name}, {OBJECTIVES} starts, true", share, f">= {SHARE} %", about)
+
+
+def one_problem(rat: st.Model) -> list[dict]:
+    """Return the rows of one problem of 59 nodes, solved in several ways, alternately."""
+    reports: dict[str, list[dict]] = {way: [] for way in WAYS}
+    for _ in range(5):
+        for way, settings in WAYS.items():
+            reports[way].append(plan(rat, **settings).report)
+    least = {way: min(r["solve_cpu_s"] for r in found) for way, found in reports.items()}
+    rows, best = [], least["exact Hessian"]
+    for way, (first, *_) in reports.items():
+        about = f"{first['iterations']} iterations, {least[way] / best:.1f}x, {first['status']}"
+        target = "<= 0.15 s" if way == "exact Hessian" else ""
+        rows.append(figure(rat, f"59 nodes, {way}", f"{least[way]:.3f} s", target, about))
+    return rows
+
+
+def again(rat: st.Model) -> dict:
+    """Plan again from near states, with the previous plan as the guess: the whole call, including
+    the true flight.
     """
     q, v = righting.tumbling(rat, EXAMPLE)
-    first, random, times = plan(rat, track=False), np.random.default_rng(0), []
+    first, random, calls = plan(rat), np.random.default_rng(0), []
     for _ in range(20):
         near = q, v * (1 + random.uniform(-0.01, 0.01, v.size))
-        begun = time.process_time()
-        again = plan(rat, start=near, guess=first, tolerance=None, track=False)
-        times.append(
-            (time.process_time() - begun, again.report["solve_cpu_s"], again.report["converged"])
-        )
-    call, solver, good = np.array(times[1:]).T
+        calls.append(timed(rat, start=near, guess=first, tolerance=None))
+    spent = np.array([call.cpu_s for call in calls[1:]])
+    solver = np.median([call.plan.report["solve_cpu_s"] for call in calls[1:]])
+    good = sum(call.plan.report["converged"] for call in calls[1:])
     about = (
-        f"least {1e3 * call.min():.1f} ms; solver {1e3 * np.median(solver):.1f} ms; "
-        f"{int(good.sum())} of {len(good)}"
+        f"least {1e3 * spent.min():.1f} ms; solver {1e3 * solver:.1f} ms; {good} of {spent.size}"
     )
-    return [figure("(1, 3), planning again", f"{1e3 * np.median(call):.1f} ms", "<= 30 ms", about)]
+    return figure(rat, "planning again", f"{1e3 * np.median(spent):.1f} ms", "<= 30 ms", about)
 
 
-def true_plans(rat: st.Model, name: str, target: tuple, **settings) -> dict:
-    """Plans that become true within a time, from random tumbling starts, upright and, by default,
-    at rest.
-    """
-    starts, seconds, share = target
-    times, errors = [], []
-    for seed in range(1, starts + 1):
-        begun = time.process_time()
-        found = plan(rat, seed, track=False, **settings)
-        times.append(time.process_time() - begun if found.success else np.inf)
-        errors.append(found.report["open_loop_attitude_error_deg"] or np.inf)
-    within, true = np.mean(np.array(times) <= seconds), np.mean(np.isfinite(times))
-    about = (
-        f"{100 * true:.1f} % true at all; median {np.median(times):.2f} s, {np.median(errors):.4f} "
-        "deg"
-    )
-    return figure(
-        f"{name}, {starts} starts, within {seconds:g} s",
-        f"{100 * within:.1f} %",
-        f">= {share} %",
-        about,
-    )
+def ticks(rat: st.Model) -> list[dict]:
+    """Time `st.Mpc` from near states: one step, and the two that plan again."""
+    q, v = righting.tumbling(rat, EXAMPLE)
+    first, random = plan(rat, goal=st.Goal(torso_rate=None)), np.random.default_rng(0)
+    rows = []
+    for steps, what, most in ((1, "a tick", 2.0), (2, "planning again by two steps", 3.0)):
+        mpc, least = st.Mpc(rat, first, iterations=steps), np.inf
+        for _ in range(60):
+            near = v * (1 + random.uniform(-0.01, 0.01, v.size))
+            mpc.begin()
+            begun = time.process_time()
+            mpc.tick(0.0, q, near)
+            least = min(least, time.process_time() - begun)
+        about = f"{mpc.settings.intervals} intervals, {first.duration:.2f} s ahead"
+        name = f"predictive control, {what}"
+        rows.append(figure(rat, name, f"{1e3 * least:.2f} ms", f"<= {most:g} ms", about))
+    return rows

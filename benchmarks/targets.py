@@ -1,121 +1,111 @@
 """The project's performance targets, and which of them a report meets."""
 
-from typing import NamedTuple
+from dataclasses import dataclass
+
+from benchmarks.models import DFD, FD, HESSIAN
 
 
-class Target(NamedTuple):
-    """A bound of a column of a measure, or of the ratio of two columns.
+@dataclass(frozen=True)
+class Target:
+    """A bound of a column of a measure: at least, or at most.
 
-    of: only in the rows of these models; on: only on these processors; where: the value that
-    another column must have.
+    of: only in the rows of these models; on: only on this processor; where: the value that another
+    column must have.
     """
 
     what: str
     measure: str
-    slow: str
+    column: str
     bound: float
     of: tuple[str, ...] = ()
-    fast: str | None = "ns"
-    on: tuple[str, ...] = ()
+    on: str = ""
     where: tuple[str, str] | None = None
-    most: bool = False
+    at_most: bool = False
+
+    def concerns(self, row: dict) -> bool:
+        """Tell whether the target is about a row."""
+        if self.column not in row or (self.where and row.get(self.where[0]) != self.where[1]):
+            return False
+        of_model = not self.of or row.get("model") in self.of
+        return of_model and self.on in ("", row.get("processor"))
+
+    def judged(self, row: dict) -> dict:
+        """Return what is asked, what a row has, and the verdict."""
+        found = row[self.column]
+        met = found <= self.bound if self.at_most else found >= self.bound
+        return {
+            "target": self.what,
+            "model": row.get("model", ""),
+            "processor": row.get("processor", "any"),
+            "asked": f"{'at most' if self.at_most else 'at least'} {self.bound:g}",
+            "found": float(found),
+            "verdict": "met" if met else "MISSED",
+        }
 
 
-SHORTER, SHORT, LONG = ("(1, 3)", "(3, 4)", "(6, 6)"), ("(1, 3)", "(3, 4)"), ("(8, 16)",)
-ALONE, BESIDE = "one by one, ns", "side by side, ns"
-FD = ("function", "forward_dynamics")
-DFD = ("function", "forward_dynamics_derivatives")
-HESSIAN = ("function", "inverse_dynamics_hessian")
-EIGHT, FOUR = ("AVX-512",), ("AVX2",)  # lanes of double
+SHORT, SHORTER, LONG = ("(1, 3)", "(3, 4)"), ("(1, 3)", "(3, 4)", "(6, 6)"), ("(8, 16)",)
 
 
-def batch(what: str, bound: float, of: tuple, on: tuple, where: tuple[str, str]) -> Target:
+def batch(what: str, function: str, bound: float, of: tuple[str, ...], on: str = "") -> Target:
     """Return the target of a batch over single calls."""
-    return Target(
-        f"{what}, batch over one by one", "batch_times", ALONE, bound, of, BESIDE, on, where
-    )
+    where = "function", function
+    return Target(f"{what}, batch over one by one", "batches", "ratio", bound, of, on, where)
 
 
-def scene(name: str, column: str, bound: float, most: bool = False) -> Target:
+def operations(what: str, function: str) -> Target:
+    """Return the target of operations executed over needed."""
+    words, where = f"{what}, operations of a batch over needed", ("function", function)
+    return Target(words, "operations", "ratio", 1.2, SHORT, where=where, at_most=True)
+
+
+def flight(what: str, column: str, bound: float, of: tuple[str, ...], at_most=False) -> Target:
     """Return the target of a run for its caller."""
-    return Target(name, "flight_times", column, bound, (), None, (), ("scene", name), most)
+    return Target(what, "flights", column, bound, of, "", ("scene", what), at_most)
 
 
+PEERS = "times as long as ours"
 TARGETS = (
-    Target("v_dot: Pinocchio, coupled, as documented", "speed", "plain_ns", 13, SHORTER),
-    Target("v_dot: Pinocchio, coupled, as documented", "speed", "plain_ns", 18, LONG),
-    Target("v_dot: Pinocchio, coupled, tuned", "speed", "tuned_ns", 13, SHORTER),
-    Target("v_dot: Pinocchio, coupled, tuned", "speed", "tuned_ns", 18, LONG),
-    Target("v_dot: MuJoCo, reduced", "other_peers", "mujoco_ns", 11),
-    Target("v_dot: CasADi's C", "other_peers", "casadi_ns", 1.25, ("(1, 3)",)),
-    Target("v_dot: CasADi's C", "other_peers", "casadi_ns", 1.7, ("(3, 4)",)),
-    Target("v_dot: SoRoMoX, a call", "continuum_peer", "SoRoMoX, a call, ns", 100),
-    Target("v_dot: SoRoMoX, in a compiled loop", "continuum_peer", "in a compiled loop, ns", 100),
-    Target("Jacobians: Pinocchio, as documented", "jacobian_times", "plain_ns", 14),
-    Target("Jacobians: Pinocchio, tuned", "jacobian_times", "revolutes_ns", 14),
-    Target("Hessian: CasADi's C, in like terms", "hessian_times", "casadi_ns", 1.5, ("(1, 3)",)),
-    Target("Hessian: CasADi's C, in like terms", "hessian_times", "casadi_ns", 2, ("(3, 4)",)),
-    batch("v_dot", 6, SHORTER, EIGHT, FD),
-    batch("v_dot", 2.5, LONG, (), FD),
-    batch("Jacobians", 3, SHORT, EIGHT, DFD),
-    batch("Jacobians", 2, SHORT, FOUR, DFD),
-    batch("Hessian", 4, SHORT, EIGHT, HESSIAN),
-    batch("Hessian", 2.5, SHORT, FOUR, HESSIAN),
-    Target(
-        "operations executed over needed, Jacobians, batch",
-        *("operation_counts", "executed", 1.2, SHORT, "needed"),
-        where=DFD,
-        most=True,
-    ),
-    Target(
-        "operations executed over needed, Hessian, batch",
-        *("operation_counts", "executed", 1.2, SHORT, "needed"),
-        where=HESSIAN,
-        most=True,
-    ),
+    Target(f"v_dot: Pinocchio, {PEERS}", "forward_dynamics", "Pinocchio, ratio", 13, SHORTER),
+    Target(f"v_dot: Pinocchio, {PEERS}", "forward_dynamics", "Pinocchio, ratio", 18, LONG),
+    Target("v_dot: Pinocchio tuned", "forward_dynamics", "Pinocchio tuned, ratio", 13, SHORTER),
+    Target("v_dot: Pinocchio tuned", "forward_dynamics", "Pinocchio tuned, ratio", 18, LONG),
+    Target("v_dot: MuJoCo, reduced", "forward_dynamics", "MuJoCo, ratio", 11),
+    Target("v_dot: CasADi's C", "forward_dynamics", "CasADi, ratio", 1.25, ("(1, 3)",)),
+    Target("v_dot: CasADi's C", "forward_dynamics", "CasADi, ratio", 1.7, ("(3, 4)",)),
+    Target("v_dot: SoRoMoX, a call", "soromox", "ratio", 100),
+    Target("v_dot: SoRoMoX, in a compiled loop", "soromox", "ratio in a loop", 100),
+    Target("Jacobians: Pinocchio", "jacobians", "Pinocchio, ratio", 14),
+    Target("Jacobians: Pinocchio tuned", "jacobians", "Pinocchio tuned, ratio", 14),
+    Target("Hessian: CasADi's C", "hessians", "CasADi, ratio", 1.5, ("(1, 3)",)),
+    Target("Hessian: CasADi's C", "hessians", "CasADi, ratio", 2, ("(3, 4)",)),
+    batch("v_dot", FD, 6, SHORTER, "AVX-512"),
+    batch("v_dot", FD, 2.5, LONG),
+    batch("Jacobians", DFD, 3, SHORT, "AVX-512"),
+    batch("Jacobians", DFD, 2, SHORT, "AVX2"),
+    batch("Hessian", HESSIAN, 4, SHORT, "AVX-512"),
+    batch("Hessian", HESSIAN, 2.5, SHORT, "AVX2"),
+    operations("Jacobians", DFD),
+    operations("Hessian", HESSIAN),
     Target(
         "v_dot, a call from Python, us outside C",
-        *("call_times", "overhead_us", 0.6, (), None),
-        where=FD,
-        most=True,
+        *("python_overhead", "outside C, us", 0.6),
+        where=("function", FD),
+        at_most=True,
     ),
-    scene("(1, 3), flight of 0.03 s", "overhead_us", 60, most=True),
-    scene("(3, 4), flight of 0.03 s", "overhead_us", 60, most=True),
-    scene("(1, 3), flight of 0.6 s", "real_time_factor", 5000),
-    scene("(3, 4), flight of 0.6 s", "real_time_factor", 1000),
-    scene("(3, 4), impact", "real_time_factor", 150),
+    flight("flight of 0.03 s", "outside C, us", 60, SHORT, at_most=True),
+    flight("flight of 0.6 s", "times real time", 5000, ("(1, 3)",)),
+    flight("flight of 0.6 s", "times real time", 1000, ("(3, 4)",)),
+    flight("impact", "times real time", 150, ("(3, 4)",)),
 )
 
 
 def judged(report: dict) -> list[dict]:
-    """Return what is demanded and what was found for each target, processor and model; nothing
-    about measures that were left out.
+    """Return what is asked and what was found for each target, processor and model; nothing about
+    measures that were left out.
     """
     return [
-        judgement(target, row)
+        target.judged(row)
         for target in TARGETS
         for row in report.get(target.measure, [])
-        if concerns(target, row)
+        if target.concerns(row)
     ]
-
-
-def concerns(target: Target, row: dict) -> bool:
-    """Tell whether a target is about a row."""
-    if target.slow not in row or (target.where and row.get(target.where[0]) != target.where[1]):
-        return False
-    chosen = (("model", target.of), ("processor", target.on))
-    return all(not some or row.get(column) in some for column, some in chosen)
-
-
-def judgement(target: Target, row: dict) -> dict:
-    """Return one row."""
-    found = row[target.slow] / row[target.fast] if target.fast else row[target.slow]
-    met = found <= target.bound if target.most else found >= target.bound
-    return {
-        "target": target.what,
-        "model": row.get("model", ""),
-        "processor": row.get("processor", "any"),
-        "asked": f"{'at most' if target.most else 'at least'} {target.bound:g}",
-        "found": float(found),
-        "verdict": "met" if met else "MISSED",
-    }

@@ -23,8 +23,9 @@ def parser(words: str | None, output: str | None = None) -> argparse.ArgumentPar
     words: the script's docstring; output: that folder by default, below the root; None: no such
     argument.
     """
-    text = argparse.RawDescriptionHelpFormatter
-    p = argparse.ArgumentParser(description=words, allow_abbrev=False, formatter_class=text)
+    text, module = argparse.RawDescriptionHelpFormatter, sys.modules["__main__"].__spec__
+    prog = f"python -m {module.name.removesuffix('.__main__')}" if module else None
+    p = argparse.ArgumentParser(prog, None, words, allow_abbrev=False, formatter_class=text)
     if output is not None:
         told = f"where results go (default: {output} of the checkout)"
         default = str(ROOT / output)

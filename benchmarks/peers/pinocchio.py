@@ -1,139 +1,89 @@
-"""Pinocchio's forward dynamics of the same tails, in several configurations, for timing."""
-
-from __future__ import annotations
+"""Pinocchio's forward dynamics of the same tails and its Jacobians, as documented and tuned."""
 
 import ctypes
 from collections.abc import Mapping
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from .compilers import PeerUnavailable
-from .timing import Closure, pointer
+import serpentail as st
+from benchmarks.peers.build import PeerUnavailable, build_library, by_each
+from benchmarks.timing import Closure, pointer
 
-# In the order of the array that pinocchio_chain_new takes.
-PARAMETERS = (
-    "gravity",
-    "torso_mass",
-    "torso_inertia",
-    "tail_mount",
-    "tail_mass",
-    "tail_length",
-    "link_inertia",
-)
+HERE = Path(__file__).parent
+# figures for these are at the top of pinocchio_tuned.cpp; clang has no more of them
+BY_GCC = ("-fno-tree-slp-vectorize", "-finline-limit=2000")
+BY_GCC += ("--param=inline-unit-growth=400", "--param=large-function-growth=2000")
+TUNED: dict = {"by_gcc": BY_GCC, "by_clang": ("-fno-slp-vectorize",)}
+# in the order of the array that pinocchio_chain_new takes
+PARAMETERS = ("gravity", "torso_mass", "torso_inertia", "tail_mount", "tail_mass", "tail_length")
+PARAMETERS += ("link_inertia",)
 
 
-class PinocchioBench:
-    """The articulated tail in Pinocchio: v_dot, H and C of one state, and closures for the
-    timer.
-    """
+class PinocchioChain:
+    """An articulated tail in one library of Pinocchio; the timer calls its closures."""
 
-    def __init__(self, segments: int, links: int, parameters: Mapping, library: Path):
-        """Build the chain from parameters by name (SI), link_inertia among them."""
-        self.nv = 6 + 2 * segments
-        self._library = _declared(library)
+    def __init__(self, library: Path, size: tuple[int, int], parameters: Mapping, function: str):
+        """Build the chain from parameters by name (SI), link_inertia among them.
+
+        function: what is timed, "forward_dynamics" or "forward_dynamics_derivatives".
+        """
+        self.library, self.nv = ctypes.CDLL(str(library)), 6 + 2 * size[0]
+        self.function = function
+        self.library.pinocchio_chain_new.restype = ctypes.c_void_p
         values = np.hstack([parameters[name] for name in PARAMETERS])
-        self._chain = self._library.pinocchio_chain_new(segments, links, pointer(values))
-        if not self._chain:
-            raise PeerUnavailable(
-                f"Pinocchio could not build a chain of {segments} x {links} links."
-            )
+        self.chain = self.library.pinocchio_chain_new(*size, ctypes.c_void_p(pointer(values)))
+        if not self.chain:
+            raise PeerUnavailable(f"Pinocchio could not build a chain of {size} links")
 
     @property
     def closure(self) -> Closure:
-        """The fastest path to v_dot."""
-        return self._closure("pinocchio_forward_dynamics")
-
-    @property
-    def crba_closure(self) -> Closure:
-        """The path through Pinocchio's CRBA of the full chain."""
-        return self._closure("pinocchio_forward_dynamics_crba")
-
-    @property
-    def derivatives_closure(self) -> Closure:
-        """The path to the Jacobians of v_dot through computeRNEADerivatives; of PLAIN and
-        DERIVATIVES.
-        """
-        return self._closure("pinocchio_forward_dynamics_derivatives")
-
-    @property
-    def own_derivatives_closure(self) -> Closure:
-        """The path to the Jacobians of v_dot by own sums; of DERIVATIVES."""
-        return self._closure("pinocchio_forward_dynamics_derivatives_own")
-
-    def forward_dynamics_derivatives(self, q, v, tau, path: str = "") -> tuple[np.ndarray, ...]:
-        """Jacobians of v_dot, all relative to the torso: dq (nv, nv), dv (nv, nv), dtau (nv, nv -
-        6); path: "_own".
-        """
-        self._call(f"pinocchio_forward_dynamics_derivatives{path}", (self.nv,), q, v, tau)
-        results = tuple(np.empty((self.nv, columns)) for columns in (self.nv, self.nv, self.nv - 6))
-        self._library.pinocchio_derivatives_result(self._chain, *map(pointer, results))
-        return results
+        """What the timer calls."""
+        address = ctypes.cast(getattr(self.library, f"pinocchio_{self.function}"), ctypes.c_void_p)
+        return Closure(address.value, self.chain)
 
     def forward_dynamics(self, q, v, tau) -> np.ndarray:
-        """v_dot (nv) by the fastest path."""
-        return self._call("pinocchio_forward_dynamics", (self.nv,), q, v, tau)
+        """Return v_dot (nv), torso first, in world axes."""
+        v_dot = np.empty(self.nv)
+        if self._call(self.function, *map(np.ascontiguousarray, (q, v, tau)), v_dot):
+            raise FloatingPointError("Pinocchio: the mass matrix is not positive definite")
+        return v_dot
 
-    def forward_dynamics_crba(self, q, v, tau) -> np.ndarray:
-        """v_dot (nv) by the path through CRBA."""
-        return self._call("pinocchio_forward_dynamics_crba", (self.nv,), q, v, tau)
+    def jacobians(self, q, v, tau) -> tuple[np.ndarray, ...]:
+        """Return dq (nv, nv), dv (nv, nv) and dtau (nv, nv - 6), all relative to the torso."""
+        self.forward_dynamics(q, v, tau)
+        results = tuple(np.empty((self.nv, columns)) for columns in (self.nv, self.nv, self.nv - 6))
+        self._call("derivatives_result", *results)
+        return results
 
-    def mass_matrix(self, q) -> np.ndarray:
-        """H (nv, nv)."""
-        return self._call("pinocchio_mass_matrix", (self.nv, self.nv), q)
+    def free(self) -> None:
+        """Free the chain; its closures must not be called any more."""
+        self._call("chain_free")
 
-    def bias_force(self, q, v) -> np.ndarray:
-        """C (nv), gravity included."""
-        return self._call("pinocchio_bias_force", (self.nv,), q, v)
-
-    def close(self) -> None:
-        """Free the chain; closures of it must not be called any more."""
-        self._library.pinocchio_chain_free(self._chain)
-        self._chain = None
-
-    def __enter__(self) -> PinocchioBench:
-        """Return itself."""
-        return self
-
-    def __exit__(self, *_error) -> None:
-        """Free the chain."""
-        self.close()
-
-    def _closure(self, name: str) -> Closure:
-        return Closure(
-            ctypes.cast(getattr(self._library, name), ctypes.c_void_p).value, self._chain
-        )
-
-    def _call(self, name: str, shape: tuple[int, ...], *inputs) -> np.ndarray:
-        arrays = [np.ascontiguousarray(x, dtype=float) for x in inputs]
-        out = np.empty(shape)
-        if getattr(self._library, name)(self._chain, *map(pointer, arrays), pointer(out)):
-            raise FloatingPointError(f"{name}: the mass matrix is not positive definite")
-        return out
+    def _call(self, name: str, *arrays: np.ndarray) -> int:
+        addresses = [ctypes.c_void_p(pointer(array)) for array in arrays]
+        return getattr(self.library, f"pinocchio_{name}")(ctypes.c_void_p(self.chain), *addresses)
 
 
-def chains(freed: ExitStack, made: Mapping[str, Path], size, ours) -> dict[str, PinocchioBench]:
-    """Return the chain of a fixture in each library, by compiler; the stack frees them."""
-    return {
-        by: freed.enter_context(PinocchioBench(*size, ours.parameters, library))
-        for by, library in made.items()
+def chains(
+    freed: ExitStack, model: st.Model, function: str
+) -> dict[str, dict[str, PinocchioChain]]:
+    """Return the chain of a model as documented and tuned, by compiler; the stack frees them."""
+    flags = ("-DJACOBIANS",) if function == "forward_dynamics_derivatives" else ()
+    sources = {
+        "Pinocchio": partial(build_library, HERE / "pinocchio_plain.cpp"),
+        "Pinocchio tuned": partial(
+            build_library, HERE / "pinocchio_tuned.cpp", flags=flags, **TUNED
+        ),
     }
-
-
-def _declared(path: Path) -> ctypes.CDLL:
-    """Return the library of a Pinocchio source; every pointer is passed as an address."""
-    library = ctypes.CDLL(str(path))
-    library.pinocchio_chain_new.restype = ctypes.c_void_p
-    library.pinocchio_chain_new.argtypes = [ctypes.c_int, ctypes.c_int, ctypes.c_void_p]
-    library.pinocchio_chain_free.restype = None
-    pointers = {"chain_free": 1, "mass_matrix": 3, "bias_force": 4}
-    pointers |= {
-        "forward_dynamics": 5,
-        "forward_dynamics_crba": 5,
-        "forward_dynamics_derivatives": 5,
-    }
-    pointers |= {"forward_dynamics_derivatives_own": 5, "derivatives_result": 4}
-    for name in (name for name in pointers if hasattr(library, f"pinocchio_{name}")):
-        getattr(library, f"pinocchio_{name}").argtypes = [ctypes.c_void_p] * pointers[name]
-    return library
+    size, found = (model.segments, model.links), {}
+    for name, make in sources.items():
+        found[name] = {
+            by: PinocchioChain(library, size, model.parameters, function)
+            for by, library in by_each(make).items()
+        }
+        for chain in found[name].values():
+            freed.callback(chain.free)
+    return found

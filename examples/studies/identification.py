@@ -5,17 +5,19 @@ estimates is compared with the Cramer-Rao bound. Unknown torques: each trial dra
 stated prior; geometry, the position of a marker and the torques are estimated. Prints both tables.
 """
 
-import argparse
 import json
-import sys
 import time
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # for a run by the path of this file
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.special import ndtri
 
-from examples import front
+import serpentail as st
+from serpentail.basics.progress import Stage
+from serpentail.identification.placement import placements
+from serpentail.identification.unknowns import unknowns
 
-OUTPUT = "output/studies/identification"
 FRAMES, RATE, NOISE, GAPS = 31, 200.0, 5e-4, 0.1
 KNOWN = ("tail_mass", "tail_length", "tail_stiffness[same]", "tail_damping[same]")
 UNKNOWN = ("tail_mass", "tail_length", "marker:tail2")
@@ -27,8 +29,6 @@ def scene(segments: int, links: int | None):
     """Return the model, and the positions of its markers: four on the torso, four along the
     tail.
     """
-    import serpentail as st
-
     kind = {"tail": "articulated", "links": links} if links else {"tail": "continuum"}
     model = st.build(
         segments=segments,
@@ -52,8 +52,6 @@ def scene(segments: int, links: int | None):
 
 def start(model):
     """Return a tumbling state with a bent tail."""
-    import numpy as np
-
     rng = np.random.default_rng(7)
     q = np.concatenate([[0, 0, 0.5, 1, 0, 0, 0], 0.2 * rng.standard_normal(model.nq - 7)])
     v = np.concatenate([[0, 0.3, 1.5, 4, 2, -3], 6 * rng.standard_normal(model.nq - 7)])
@@ -62,8 +60,6 @@ def start(model):
 
 def flown(model, times, torques, fine):
     """Return states at times under torques (K, 2m) at fine times, linear in between, by SciPy."""
-    import numpy as np
-    from scipy.integrate import solve_ivp
 
     def rate(t, x):
         return model.x_dot(x, [np.interp(t, fine, each) for each in torques.T])
@@ -81,8 +77,6 @@ def flown(model, times, torques, fine):
 
 def drawn(fine, nt, rng):
     """Return torques (K, 2m) of the prior: an Ornstein-Uhlenbeck process, exact at fine times."""
-    import numpy as np
-
     decay = np.exp(-(fine[1] - fine[0]) / TIME)
     tau = STD * rng.standard_normal((len(fine), nt))
     for k in range(1, len(fine)):
@@ -92,22 +86,16 @@ def drawn(fine, nt, rng):
 
 def seen(model, markers, times, states, rng):
     """Return noisy tracks with gaps."""
-    import numpy as np
-
-    import serpentail as st
-
     points = st.marker_positions(model, states[:, : model.nq], markers)
     points = points + NOISE * rng.standard_normal(points.shape)
     points[rng.random(points.shape[:2]) < GAPS] = np.nan
     return st.marker_tracks(times, points, list(markers), unit="m")
 
 
-def trials(count: int, case: str, size: tuple[int, int | None], folder: Path) -> dict:
+def coverage(count: int, case: str, size: tuple[int, int | None], folder: Path) -> dict:
     """Return coverage, spread and time of a number of trials, resuming from those that are
     stored.
     """
-    from serpentail.basics.progress import Stage
-
     model, markers = scene(*size)
     names = KNOWN if case == "known" else UNKNOWN
     kept = folder / f"{case}_{'x'.join(map(str, size))}.jsonl"
@@ -123,10 +111,6 @@ def trials(count: int, case: str, size: tuple[int, int | None], folder: Path) ->
 
 def trial(model, markers, case: str, seed: int) -> dict:
     """Return estimates, their standard deviations and the processor time of one trial."""
-    import numpy as np
-
-    import serpentail as st
-
     rng, nt = np.random.default_rng([seed, 20]), model.nq - 7
     times = np.arange(FRAMES) / RATE
     fine = np.linspace(0, times[-1], 10 * (FRAMES - 1) + 1)
@@ -151,17 +135,11 @@ def trial(model, markers, case: str, seed: int) -> dict:
 
 def found_names(model, markers, names):
     """Return the estimated numbers."""
-    from serpentail.identification.placement import placements
-    from serpentail.identification.unknowns import unknowns
-
     return unknowns(placements(model, markers), names).each
 
 
 def judged(rows: list[dict], names: list[str], model) -> dict:
     """Return how often intervals cover the truth, and variances over the bound."""
-    import numpy as np
-    from scipy.special import ndtri
-
     p, reach = model.parameters, ndtri((1 + LEVEL) / 2)
     known = {"tail_mass": p["tail_mass"], "tail_length": p["tail_length"]}
     known |= {"tail_stiffness[same]": p["tail_stiffness"][0]}
@@ -184,21 +162,9 @@ def judged(rows: list[dict], names: list[str], model) -> dict:
     return report
 
 
-def main(arguments: argparse.Namespace) -> None:
+def study(folder: Path, trials: int, segments: int, links: int) -> None:
     """Run both cases and print them."""
-    arguments.folder.mkdir(parents=True, exist_ok=True)
-    size = arguments.segments, arguments.links or None
-    for case in arguments.cases:
-        found = trials(arguments.trials, case, size, arguments.folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    for case in ("known", "unknown"):
+        found = coverage(trials, case, (segments, links or None), folder)
         print(case, json.dumps(found, indent=1), flush=True)
-
-
-if __name__ == "__main__":
-    words = front.parser(__doc__, OUTPUT)
-    words.add_argument("--trials", type=front.count, default=400)
-    words.add_argument("--segments", type=front.count, default=1)
-    words.add_argument("--links", type=int, default=3, help="0: a continuum")
-    words.add_argument(
-        "--cases", nargs="+", choices=["known", "unknown"], default=["known", "unknown"]
-    )
-    front.run(main, words.parse_args(), after="each trial is kept")

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from embedded import boards, comparison, image, mpc_image, results, stack
+from checks.embedded import boards, comparison, costs, image, mpc_image, results
 from tests.support import zoo
 from tests.support.models import folder_of
 from tests.support.predictive import plan_of
 from tests.support.rows import row
 from tests.support.toolchains import board
 
-ROOT = boards.HERE.parent
+ROOT = boards.HERE.parents[1]
 CROSS = [name for name in boards.BOARDS if name != "host"]
 LIBC_STACK = 16  # bytes: what memset and memcpy push, which no call graph of ours has
 # bytes: branches that the stored states do not take, such as angles beyond all reason
@@ -65,8 +65,6 @@ def test_fast_models_keep_their_promises_in_every_form(tmp_path):
 @pytest.mark.slow
 def test_forward_dynamics_keeps_its_budget(tmp_path):
     """Of a form and a size, which are the point: instructions, flash and stack."""
-    from embedded import size_tables
-
     sizes = [
         ("m4", "m1_n3", "loops", 7000, 6 * 1024),
         ("m4", "m1_n3", "straight", 3500, np.inf),
@@ -83,7 +81,7 @@ def test_forward_dynamics_keeps_its_budget(tmp_path):
             found = compared(folder, name, place, "fast")["forward_dynamics"]
             assert found.instructions <= instructions and found.stack <= 2560
             built = image.build(folder, board(name), place)
-            assert size_tables.flash(built, "forward_dynamics") == found.flash <= flash
+            assert costs.flash(built, "forward_dynamics") == found.flash <= flash
 
 
 # Predictive control
@@ -200,19 +198,19 @@ def test_stack_adds_up_along_calls_or_is_unknown(tmp_path):
     def deepest(size=100, kind="static", callee="sin"):
         path = tmp_path / "a.ci"
         path.write_text(GRAPH.format(size=size, kind=kind, callee=callee))
-        return stack.deepest([path])
+        return costs.deepest([path])
 
     assert deepest() == {"f": 140, "g": 40}
     for change, words in (({"callee": "f"}, "calls itself"), ({"kind": "dynamic"}, "dynamic")):
-        with pytest.raises(stack.StackUnknown, match=words):
+        with pytest.raises(costs.StackUnknown, match=words):
             deepest(**change)
 
 
 def test_missing_tools_are_named_with_their_packages(tmp_path):
     document = ROOT / "docs" / "embedded.md"
     before, bare = document.read_bytes(), str(zoo.folder("bare"))
-    commands = {name: ["embedded.check", bare, "--board", name] for name in CROSS}
-    commands["report"] = ["embedded.size_report"]
+    commands = {name: ["checks.embedded", bare, "--board", name] for name in CROSS}
+    commands["report"] = ["checks.embedded.sizes"]
     settings = {"cwd": tmp_path, "env": {"PATH": "", "PYTHONPATH": str(ROOT)}, "text": True}
     for name, words in commands.items():
         command = [sys.executable, "-m", *words]

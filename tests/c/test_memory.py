@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from stress import memory
+from checks.stress import memory
 from tests.support import toolchains, zoo
 from tests.support.compile_once import compile_once
 

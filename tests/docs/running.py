@@ -36,8 +36,8 @@ DIRECTIVE = re.compile(r"\{[\w-]+\}")  # of the site: a list of pages, an includ
 FENCE = re.compile(r"^```([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 NOT_RUN = "not-run:"
 STRICT = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror")
-LINKED = ("runtime", "codegen", "scenes", "tests", "embedded", "benchmarks", "docs", "stress")
-LINKED += ("Makefile", "pyproject.toml", "hatch_build.py", "viewer", "mutants")
+LINKED = ("runtime", "codegen", "scenes", "tests", "checks", "benchmarks", "docs")
+LINKED += ("Makefile", "pyproject.toml", "hatch_build.py", "viewer")
 OF_RUNTIME = ("simulate", "plan", "identify", "sweep", "phase")  # tables that the runtime reads
 
 

@@ -9,6 +9,8 @@ LONG = (b"9" * 5000, b"0x" + b"f" * 5000, b"[" * 5000, b"a." * 200, b"x" * 200_0
 HOSTILE = (
     *(b"nan", b"inf", b"-1", b"0", b"1e38", b"1e308", b"-1e999", b"1_0", b"true", b"1979-05-27"),
     *(b"", b" ", b'"', b"'", b"\t", b",", b"\r", b"\0", b"\x1b[2J", b"\xff\xfe", b"\xe2\x80\xa8"),
+    *(b"=", b"[[", b"'''", b"\\", b"#", b"\n", b"\xef\xbb\xbf", b"-0.0", b"1e-320", b"[nan]"),
+    *(b'"all"', b'"continuum"', b'"polar"', b'"float"', b"[plan]", b"[simulate]", b"[parameters]"),
     *(b"{}", b"[]", b"[[]]", b'"3 kg"', b"=cmd|' /C calc'!A0", b"%n%s", b"../../etc/passwd"),
 )
 

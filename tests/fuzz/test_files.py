@@ -20,10 +20,12 @@ from serpentail.bridges.sweeps.result import Sweep
 from serpentail.bridges.sweeps.scene import arguments_of
 from serpentail.bridges.sweeps.shards import Row, Shard
 from serpentail.bridges.sweeps.sweep import posed
+from serpentail.cli import cli
 from serpentail.identification import c3d, c3d_child
 from serpentail.scenes.file import read_scene, subtable
 from serpentail.scenes.identify import identify_arguments
 from serpentail.scenes.plan import plan_arguments
+from serpentail_codegen.__main__ import parser, scene_of
 from serpentail_codegen.scene.parse import load_scene
 from serpentail_codegen.scene.problems import SceneError
 from tests.identification.test_c3d import c3d as c3d_of
@@ -179,3 +181,26 @@ def test_any_file_is_read_or_refused_in_a_line(name, many, tmp_path, monkeypatch
                 for line in str(error).splitlines():
                     assert line.isprintable() and 10 < len(line) < 2000, line
     assert refused > many // 4
+
+
+def generated(path):
+    """Read a scene as the generator's command does, up to the derivation."""
+    with contextlib.suppress(SceneError):
+        scene_of(parser().parse_args([str(path)]))
+
+
+@pytest.mark.parametrize("many", [100, pytest.param(2000, marks=pytest.mark.slow)])
+def test_commands_read_or_refuse_any_scene_in_words(many, tmp_path, capsys):
+    """The folder has no model, so `simulate` and `plan` must refuse each of them."""
+    path, empty = tmp_path / "damaged.toml", tmp_path / "empty"
+    empty.mkdir()
+    scenes = sorted(SCENES.glob("*.toml"))
+    for scene in scenes:
+        for mutant in mutants(scene.read_bytes(), -(-many // len(scenes))):
+            path.write_bytes(mutant)
+            with row(scene.name, mutant[:2000]), in_time(), warnings.catch_warnings():
+                warnings.simplefilter("ignore", st.UnusualSize)
+                generated(path)
+                for verb in ("plan", "simulate"):
+                    assert cli.main([verb, str(path), "--folder", str(empty)]) == 2
+                    assert capsys.readouterr().err.strip()

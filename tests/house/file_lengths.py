@@ -7,7 +7,7 @@ from collections import defaultdict
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-FOLDERS = ("codegen", "runtime", "tests", "benchmarks", "embedded", "examples", "mutants", "stress")
+FOLDERS = ("codegen", "runtime", "tests", "benchmarks", "checks", "examples")
 MOST_LINES = 300
 CLASS = re.compile(r"^class (\w+)", re.MULTILINE)
 

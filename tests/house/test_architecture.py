@@ -13,8 +13,8 @@ import pytest
 
 import serpentail
 import serpentail_codegen
-from mutants import results, sample
-from mutants.recorded import NO_JUDGES
+from checks.mutants import results, sample
+from checks.mutants.recorded import NO_JUDGES
 from tests.house import file_lengths
 from tests.support.makes import away_from_make, stand_in
 from tests.support.rows import row

@@ -111,7 +111,7 @@ def test_wrong_usage_is_status_2_and_help_names_every_verb(capsys):
 
 # Scripts.
 
-FOLDERS = ("benchmarks", "embedded", "examples", "mutants", "stress")
+FOLDERS = ("benchmarks", "checks", "examples")
 HEAVY = {"casadi", "matplotlib", "numpy", "scipy", "serpentail_codegen.pipeline", "sympy"}
 # Runs each module of the words as a program with an argument, in a process that this one forks: it
 # prints its status, and the packages that it has loaded.
@@ -142,7 +142,7 @@ def scripts():
 
 def test_scripts_answer_help_nonsense_and_folders_that_cannot_be_without_work(tmp_path):
     names = scripts()
-    assert {"examples.studies.contact", "benchmarks.bench", "tests.verification"} <= {*names}
+    assert {"examples.studies.__main__", "benchmarks.__main__", "tests.verification"} <= {*names}
     (tmp_path / "file").write_text("")
     writers = [name for name in names if name.startswith(("examples.", "bench"))]
     for word, of, status in [("--help", names, 0), ("--nonsense", names, 2), ("file", writers, 2)]:

@@ -9,7 +9,7 @@ from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.support.ui import WebDriverWait
 
-from embedded.boards import ToolchainMissing
+from checks.embedded.boards import ToolchainMissing
 from tests.support.page import need_page
 
 OPTIONS = (

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from embedded.boards import ToolchainMissing
+from checks.embedded.boards import ToolchainMissing
 from serpentail.show.page import view
 
 

@@ -5,8 +5,7 @@ in CI.
 import shutil
 from functools import partial
 
-from embedded import misra
-from embedded.boards import BOARDS, ToolchainMissing
+from checks.embedded.boards import BOARDS, ToolchainMissing
 from tests.support.page import need
 
 
@@ -18,7 +17,7 @@ def board(name: str):
 
 def cppcheck() -> None:
     """Ask for cppcheck."""
-    need(misra.need)
+    need(partial(_need, "cppcheck", "cppcheck"))
 
 
 def valgrind() -> None:

@@ -82,7 +82,7 @@ def test_bends_have_the_wanted_directions():
 
 @pytest.mark.slow
 def test_the_study_runs_anywhere_and_writes_its_files(tmp_path):
-    command = [sys.executable, "-m", "examples.studies.models", "study"]
+    command = [sys.executable, "-m", "examples.studies", "models", "study"]
     path = {"PYTHONPATH": str(ROOT)}
     done = subprocess.run(
         command, cwd=tmp_path, env=os.environ | path, capture_output=True, text=True, check=False

@@ -101,7 +101,7 @@ def view(arguments: argparse.Namespace) -> VerbOutcome:
 
 def sweep(arguments: argparse.Namespace) -> VerbOutcome:
     """Run the missing points of a scene's sweep, and return how far it is."""
-    from ..bridges.sweeps.axes import axes_of, checked_row
+    from ..bridges.sweeps.points import axes_of, checked_row
     from ..bridges.sweeps.scene import arguments_of
     from ..bridges.sweeps.sweep import posed
     from ..bridges.sweeps.sweep import sweep as swept

@@ -1,0 +1,1 @@
+"""What holds beyond the tests: limits, boards, and whether the tests would notice a fault."""

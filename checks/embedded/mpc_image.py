@@ -1,0 +1,167 @@
+"""Builds and runs the program that checks a predictive controller on a board."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+import serpentail as st
+from checks.embedded.boards import BOARDS, HERE, PROFILES, WARNINGS, Board
+from checks.embedded.image import BARE, C_LINES, CASE, Image, command, compiled, manifest_of
+from checks.embedded.results import run
+
+TIMES = (0.0, 0.1, 0.2)  # s, times of the ticks
+SHOWN = 4  # number of times at which the torques of a tick are read
+HEAD = (
+    """/* States at which ticks are computed: t, then q, v, then q, v of the next tick. */
+#ifndef CASES_H
+#define CASES_H
+
+#include <stdint.h>
+
+#include "{prefix}.h"
+#include "{prefix}_mpc.h"
+
+typedef double real;
+#define REAL_IS_FLOAT 0
+enum {{ STATES = {states}, NQ = {nq}, NV = {nv}, NT = NV - 6, INPUTS = 1 + 2 * (NQ + NV) }};
+enum {{ SHOWN = {shown}, OUTPUTS = SHOWN * NT, WORK = 1, CASES = 4 }};
+
+"""
+    + CASE
+    + """static double memory[{upper}_MPC_MEMORY];
+static {prefix}_mpc_state controller;
+
+static void prepare(void)
+{{
+}}
+
+"""
+    + BARE
+    + """
+/* Torques from t to the end of the plan. */
+static int torques(real t, real *outputs)
+{{
+  for (int k = 0; k < SHOWN; ++k) {{
+    const real at = t + k * ({prefix}_mpc_plan.end - t) / SHOWN;
+    {prefix}_mpc_torque(&controller, at, at, outputs + k * NT);
+  }}
+  return (int)controller.failed;
+}}
+
+static int call_tick(const real *state, real *outputs, real *work)
+{{
+  (void)work;
+  {prefix}_mpc_begin(&controller, &{prefix}_mpc_plan, memory);
+  {prefix}_mpc_tick(&controller, state[0], state + 1, state + 1 + NQ);
+  return torques(state[0], outputs);
+}}
+
+static int call_two_ticks(const real *state, real *outputs, real *work)
+{{
+  const real later = state[0] + {prefix}_mpc_plan.period, *next = state + 1 + NQ + NV;
+  real tau[NT];
+  (void)work;
+  {prefix}_mpc_begin(&controller, &{prefix}_mpc_plan, memory);
+  {prefix}_mpc_control(&controller, state[0], state[0], state + 1, state + 1 + NQ, tau);
+  {prefix}_mpc_control(&controller, later, later, next, next + NQ, tau);
+  return torques(later, outputs);
+}}
+
+static const struct a_case cases[CASES] = {{
+  {{"nothing", call_nothing, 0}},
+  {{"room", call_room, 0}},
+  {{"tick", call_tick, OUTPUTS}},
+  {{"two_ticks", call_two_ticks, OUTPUTS}},
+}};
+
+static const real states[STATES][INPUTS] = {{
+"""
+)
+
+
+@dataclass(frozen=True)
+class Ticks:
+    """Ticks on a board: whether their bits are the host's, instructions of one, the most, bytes of
+    stack, of code with constants, and of memory; torques as (states, times * 2m).
+    """
+
+    same_bits: bool
+    failed: int
+    instructions: int
+    stack: int
+    code: int
+    memory: int
+    torques: np.ndarray
+
+
+def states_of(mpc: st.Mpc) -> np.ndarray:
+    """Return rows (t, q, v, q, v): states of a plan at a tick and one period later, each with
+    0.1 rad/s more about the torso's x axis.
+    """
+    period, motion = 1 / mpc.settings.rate, mpc.plan.trajectory
+    rows = []
+    for t in TIMES:
+        row = [np.array([t])]
+        for at in (t, t + period):
+            sample = motion.resample(np.array([at]))
+            row += [sample.q[0], sample.v[0] + 0.1 * (np.arange(sample.v.shape[1]) == 3)]
+        rows.append(np.concatenate(row))
+    return np.array(rows)
+
+
+def ticks(folder: Path, mpc: st.Mpc, board: str, output: Path, profile: str) -> Ticks:
+    """Run a controller of a generated folder's model on a board and on the host."""
+    images = [built(folder, mpc, BOARDS[name], output / name, profile) for name in (board, "host")]
+    found, host = (run(image) for image in images)
+    own = found["tick"], found["two_ticks"]
+    same = all(
+        (found[name].bits == host[name].bits).all() and found[name].statuses == host[name].statuses
+        for name in ("tick", "two_ticks")
+    )
+    controller = images[0].path.parent / f"{mpc.model.name}_mpc.o"
+    size = command(["arm-none-eabi-size", str(controller)]).splitlines()[1].split()
+    return Ticks(
+        same,
+        max(max(result.statuses) for result in own),
+        max(own[0].instructions),
+        max(own[0].depths),
+        int(size[0]) + int(size[1]),
+        8 * mpc.memory_size,
+        found["two_ticks"].values,
+    )
+
+
+def built(folder: Path, mpc: st.Mpc, board: Board, output: Path, profile: str) -> Image:
+    """Write cases.h and the controller, and build the check for a board."""
+    board.need()
+    manifest, states, prefix = manifest_of(folder), states_of(mpc), mpc.model.name
+    output.mkdir(parents=True, exist_ok=True)
+    (output / "cases.h").write_text(cases(mpc, states))
+    _, controller = mpc.write_c(output)
+    flags = (*board.cpu, *PROFILES[profile], "-ffunction-sections", "-fdata-sections")
+    strict = ("-std=c99", *WARNINGS, *flags)
+    model = folder / "src" / f"{prefix}.c"
+    objects = [compiled(board, path, output, strict, folder) for path in (model, controller)]
+    for name in ("check.c", board.port):
+        objects.append(compiled(board, HERE / name, output, (*C_LINES, *flags), folder))
+    image = output / "image.elf"
+    words = [board.compiler, *board.cpu, *board.link, *map(str, objects), "-lm", "-o", str(image)]
+    command(words)
+    return Image(board, image, manifest, {"states": states})
+
+
+def cases(mpc: st.Mpc, states: np.ndarray) -> str:
+    """Return the text of cases.h."""
+    prefix, model = mpc.model.name, mpc.model
+    text = HEAD.format(
+        prefix=prefix,
+        upper=prefix.upper(),
+        states=len(states),
+        nq=model.nq,
+        nv=model.nv,
+        shown=SHOWN,
+    )
+    for row in states:
+        text += f"  {{{', '.join(float(x).hex() for x in row)}}},\n"
+    return text + "};\n\n#endif\n"

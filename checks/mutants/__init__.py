@@ -1,0 +1,1 @@
+"""`make mutants` tells whether the tests would notice a fault."""

@@ -1,0 +1,1 @@
+"""`python -m checks.stress`: models and runtime at their limits."""

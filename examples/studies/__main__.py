@@ -1,0 +1,53 @@
+"""Computes a study: figures and tables of the paper, and of what a tail is worth.
+
+models          the paper's comparison of tails (Sect. 4.1): Fig. 8, and what each tail costs
+righting        righting in the air (Sects. 4.2, 4.3): Figs. 9 to 13, Table 2, and ours
+contact         motions on the ground (Sects. 4, 4.4): films, plots and a table
+landing         kicks that the tail rights onto the feet, planned and passive
+morphology      plans of righting for tails of many shapes, from many tumbles: 20400
+replanning      bodies unlike the planned one: the plan's torques, PFL, predictive control
+identification  how often the intervals of identified parameters cover the truth
+
+The work is done in parallel, as many processes as $SERPENTAIL_THREADS says or there are cores. Each
+part is kept in FOLDER, so that an interrupted study resumes. The options are those of one study.
+"""
+
+from importlib import import_module
+
+from examples import front
+
+OPTIONS = {
+    "righting": {"starts": (front.count, 200, "random starts of the tail (1, 3)")},
+    "replanning": {"starts": (front.count, 12, "tumbling starts")},
+    "morphology": {
+        "points": (front.count, 6800, "tails and tumbles, each with three numbers of segments"),
+        "executor": (str, None, "where to run, such as processes:4 or dask:HOST:PORT"),
+    },
+    "identification": {
+        "trials": (front.count, 400, "trials of each case"),
+        "segments": (front.count, 1, "segments of the tail"),
+        "links": (int, 3, "links of each; 0: a continuum"),
+    },
+}
+NAMES = ("models", "contact", "landing", *OPTIONS)
+
+
+def main(name: str, folder, options: dict) -> int | None:
+    """Do a study."""
+    return import_module(f"examples.studies.{name}").study(folder, **options)
+
+
+if __name__ == "__main__":
+    parser = front.parser(__doc__)
+    studies = parser.add_subparsers(dest="name", metavar="NAME", required=True)
+    for name in NAMES:
+        one = studies.add_parser(name, allow_abbrev=False)
+        place = front.ROOT / "output" / "studies" / name
+        words = f"where results go (default: output/studies/{name} of the checkout)"
+        one.add_argument("folder", nargs="?", type=front.usable, default=place, help=words)
+        for option, (kind, default, meaning) in OPTIONS.get(name, {}).items():
+            words = f"{meaning} (default: {default})"
+            one.add_argument(f"--{option}", type=kind, default=default, help=words)
+    options = vars(parser.parse_args())
+    name, folder = options.pop("name"), options.pop("folder")
+    front.run(main, name, folder, options, after=front.GOES_ON)

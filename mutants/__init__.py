@@ -1,1 +1,0 @@
-"""`make mutants`: makes one small change at a time in the sources, and checks that tests notice."""

@@ -1,1 +1,0 @@
-"""`make stress`: models and runtime at their limits."""
