@@ -15,7 +15,7 @@ import numpy as np
 import serpentail as st
 from benchmarks.fixtures import built
 from benchmarks.peers import mujoco_scene
-from serpentail.show.pictures.skeleton import leg_joints
+from serpentail.show.animal import leg_joints
 
 GAMMA, CROUCH, STAND, STRETCH = np.radians([210.0, -15.0, -40.0, -75.0])
 DAMPING = 1e-3  # N m s

@@ -90,10 +90,10 @@ def _motion(scene: "Scenario", page: str | None) -> tuple["Trajectory", dict[str
 
 def view(arguments: argparse.Namespace) -> Outcome:
     """Write the page of saved motions, and return its path."""
-    from ..show.page.saved import read
+    from ..show.motions import saved_motion
     from ..show.page.view import view as page_of
 
-    motions = [read(file, arguments.folder) for file in arguments.files]
+    motions = [saved_motion(file, arguments.folder) for file in arguments.files]
     names = list(arguments.files) if len(motions) > 1 else None
     path = arguments.output or Path(arguments.files[0]).with_suffix(".html")
     page = page_of(motions, path, names=names)

@@ -39,7 +39,7 @@ class Showable:
 
     def _repr_html_(self) -> str:
         """Text and page, for notebooks."""
-        from ..show.page.notebook import in_notebook
+        from ..show.page.view import in_notebook
 
         return in_notebook(self, lambda: [cast("Trajectory", self)])
 

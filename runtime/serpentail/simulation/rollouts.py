@@ -162,7 +162,7 @@ class Rollouts(Exports):
 
     def _repr_html_(self) -> str:
         """Text and page of the first runs, for notebooks."""
-        from ..show.page.notebook import in_notebook
+        from ..show.page.view import in_notebook
 
         begun = [k for k, e in enumerate(self.errors) if e is None or e.trajectory is not None]
         begun = begun[:SHOWN]

@@ -10,11 +10,10 @@ from matplotlib.colors import to_rgb
 from PIL import Image
 
 import serpentail as st
-from serpentail.show.pictures.animal import PALE, SHADOW
-from serpentail.show.pictures.filmstrip import strip_of
-from serpentail.show.pictures.frames import moments, way
-from serpentail.show.pictures.page import drawn_points
-from serpentail.show.pictures.style import STYLE, TORSO
+from serpentail.show.pictures.frames import drawn_points
+from serpentail.show.pictures.pen import PALE
+from serpentail.show.pictures.strip import moments, strip_of, way
+from serpentail.show.pictures.style import SHADOW, STYLE, TORSO
 from serpentail.show.pictures.views import NAMED, SIDE, views_of
 from tests.support.drawn_flight import SPEEDS, flight
 from tests.support.rows import row

@@ -8,7 +8,7 @@ import numpy as np
 from ... import __version__
 from ...basics.errors import ExportError
 from ...model.model import Model
-from ...show.page.shape import shape, tail_radii, usual_radius
+from ...show.animal import animal_of, usual_radius
 
 AXES = (("alpha", (1, 0, 0)), ("beta", (0, 0, 1)))  # of a link's two joints, in its own frame
 NO_TURN = (0.0, 0.0, 0.0)
@@ -83,8 +83,8 @@ def chain_of(model: Model, kind: str) -> Chain:
     p = model.parameters
     numbers = [(i + 1, j + 1) for i, count in enumerate(model.joints_each) for j in range(count)]
     masses, lengths, centers, inertias = _links(model, len(numbers))
-    own = "link_masses" in p
-    radii = tail_radii(model).tolist() if own else [usual_radius(model)] * len(numbers)
+    animal, alike = animal_of(model), [usual_radius(model)] * len(numbers)
+    radii = alike if animal.alike else animal.tail_radii
     places = [p["tail_mount"], *((0.0, -length, 0.0) for length in lengths)]
     links = tuple(
         Link(*number, *rest)
@@ -147,7 +147,7 @@ def _mount_turn(model: Model) -> Vector:
 
 def torso_capsule(model: Model) -> Capsule:
     """Return a capsule as long as the torso, its cross-section of the torso's area."""
-    axes = np.array(shape(model)["semi_axes"])
+    axes = np.array(animal_of(model).semi_axes)
     axis = int(axes.argmax())
     radius = float(np.sqrt(np.prod(np.delete(axes, axis))))
     return Capsule(axis, max(float(axes[axis]) - radius, 0.0), radius)

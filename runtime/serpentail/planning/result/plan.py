@@ -145,7 +145,7 @@ class Plan:
 
     def _repr_html_(self) -> str:
         """Text and page, for notebooks."""
-        from ...show.page.notebook import in_notebook
+        from ...show.page.view import in_notebook
 
         return in_notebook(self, lambda: self._motions(self.trajectory.model), SHOWN)
 

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from ...basics.errors import ViewError
 from ...basics.files import replacing
-from .animal import FORCE, LEG, SHADE, SHADOW
-from .style import HEAD, INK, QUIET, TAIL, TORSO
+from .style import FORCE, HEAD, INK, LEG, QUIET, SHADE, SHADOW, TAIL, TORSO
 
 Picture = NDArray[np.uint8]  # (height, width, 3), both even
 RATE = 25  # frames a second

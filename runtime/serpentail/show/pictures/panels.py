@@ -10,8 +10,8 @@ from serpentail_scene.layout import OMEGA
 
 from ...basics.attitude import pitch_roll_yaw, tilt_deg
 from ...model.model import Model
-from ...motion.body import bends
 from ...motion.trajectory import Trajectory
+from ..animal import bends
 from .style import INK, TAIL, Array
 
 # Okabe and Ito, dashed for grey prints

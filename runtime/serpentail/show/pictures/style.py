@@ -23,6 +23,8 @@ METADATA: dict[str, dict[str, Any]] = {
 }
 DPI = 200
 INK, QUIET, TORSO, TAIL, HEAD = "#222222", "#8c8c8c", "#c6e0f0", "#d55e00", "#0072b2"
+LEG, FORCE = "#009e73", "#cc79a7"  # Okabe and Ito
+SHADE, SHADOW = "#ecebe6", "#c9c7bf"  # the ground
 STYLE: dict[str, Any] = {
     "svg.hashsalt": "serpentail",
     "font.size": 8,

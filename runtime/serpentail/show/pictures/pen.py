@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .frames import Frame, tick
-from .style import HEAD, INK, TAIL, TORSO, Array
+from .style import FORCE, HEAD, INK, LEG, SHADE, SHADOW, TAIL, TORSO, Array
 from .views import TOP, View
 
 if TYPE_CHECKING:
@@ -16,8 +16,6 @@ WIDTH = 1.4  # points, of the tail
 THIN, THICK = 0.4, 2.5  # of a tail of its own: least and largest width over that
 MOST_DOTS = 20  # more tail points than this are drawn without dots
 LARGE_DOTS = 8  # more joints than this get small marks, so that the tail's colour stays visible
-LEG, FORCE = "#009e73", "#cc79a7"  # Okabe and Ito
-SHADE, SHADOW = "#ecebe6", "#c9c7bf"  # the ground
 PALE = 0.3  # opacity of parts below it
 GRIDS = np.array([0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10])  # m, between lines on the ground
 LINES = 8  # of the ground's grid that are seen, about
@@ -69,7 +67,10 @@ class Pen:
             return
         self.fill(outline, 0.4, alpha=PALE, **look)
         if len(above):
-            self.fill(hull(self.flat(above)), 0.41, **look)
+            from scipy.spatial import ConvexHull
+
+            flat = self.flat(above)
+            self.fill(flat[ConvexHull(flat).vertices], 0.41, **look)
 
     def line(self, corners: Array, **look: Any) -> None:
         """Draw a line below the torso, and again above it where the torso cannot hide it.
@@ -128,7 +129,7 @@ def above_ground(frame: Frame) -> Array | None:
 
     On the unit sphere they are a cap about n = diag(a) R^T e_z / d: z = p_z + d cos(polar).
     """
-    normal = frame.rotation[2] * frame.body.semi_axes
+    normal = frame.rotation[2] * frame.animal.semi_axes
     depth = np.linalg.norm(normal)
     if frame.torso[2] >= depth:
         return None
@@ -139,14 +140,7 @@ def above_ground(frame: Frame) -> Array | None:
     beside = np.linalg.svd(normal[None])[2][1:]
     ring = np.cos(around)[..., None] * beside[0] + np.sin(around)[..., None] * beside[1]
     sphere = np.cos(polar)[..., None] * normal / depth + np.sin(polar)[..., None] * ring
-    return frame.world(sphere.reshape(-1, 3) * frame.body.semi_axes)
-
-
-def hull(points: Array) -> Array:
-    """The convex outline (k, 2) of points (n, 2)."""
-    from scipy.spatial import ConvexHull
-
-    return points[ConvexHull(points).vertices]
+    return frame.world(sphere.reshape(-1, 3) * frame.animal.semi_axes)
 
 
 def draw_animal(pen: Pen) -> None:
@@ -155,22 +149,21 @@ def draw_animal(pen: Pen) -> None:
     for leg in pen.frame.legs:
         pen.line(leg, color=LEG, linewidth=1.4)
     draw_tail(pen)
-    count = len(pen.frame.tail) - 1
+    count = len(pen.frame.tail)
     if count <= MOST_DOTS:
         size = 2.4 if count <= LARGE_DOTS else 1.2
-        pen.dots(pen.frame.tail[1:], color=INK, markersize=size, markeredgewidth=0)
+        pen.dots(pen.frame.tail, color=INK, markersize=size, markeredgewidth=0)
     pen.arrows(pen.frame.arrows)
 
 
 def draw_tail(pen: Pen) -> None:
     """The tail, of one width or as thick as its links are."""
-    tail, thickness = pen.frame.tail, pen.frame.body.thickness
-    if not thickness:
+    tail, animal = pen.frame.tail, pen.frame.animal
+    if animal.alike:
         pen.line(tail, color=TAIL, linewidth=WIDTH)
         return
-    pen.line(tail[:2], color=TAIL, linewidth=WIDTH)
-    for k, thick in enumerate(thickness, 1):
-        width = WIDTH * min(max(thick, THIN), THICK)
+    for k, thickness in enumerate(np.divide(animal.tail_radii, np.mean(animal.tail_radii))):
+        width = WIDTH * min(max(thickness, THIN), THICK)
         pen.line(tail[k : k + 2], color=TAIL, linewidth=width)
 
 
@@ -179,15 +172,15 @@ def draw_marks(pen: Pen) -> None:
 
     None on a fixed base.
     """
-    if not pen.frame.body.marked:
+    if pen.frame.animal.fixed:
         return
-    _, length, height = pen.frame.body.semi_axes
+    _, length, height = pen.frame.animal.semi_axes
     angle = np.linspace(0, np.pi, 61)
     back = pen.frame.world(
         np.stack([0 * angle, length * np.cos(angle), height * np.sin(angle)], axis=1)
     )
     pen.plot(pen.visible(back), "-", 0.5, color=INK, linewidth=0.7)
-    pen.line(pen.frame.world(tick(pen.frame.body)), color=INK, linewidth=1.4)
+    pen.line(pen.frame.world(tick(pen.frame.animal)), color=INK, linewidth=1.4)
     head = pen.frame.world([[0, length, 0]])
     fill = HEAD if pen.frame.in_front(head, pen.view)[0] else "white"
     pen.plot(head, "o", 0.8, color=HEAD, markersize=4, markerfacecolor=fill)
