@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..basics.errors import SimulationError
-from ..motion.table import as_text
+from ..motion.text import as_text
 from .outcome import Files, Outcome
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def plan(arguments: argparse.Namespace) -> Outcome:
     """Return the report of a scene's plan, and whether it converged."""
-    from ..bridges.containers.files import save
+    from ..bridges.containers.tables import save
     from ..scenes import plan as scenes
 
     plan = scenes.planned(arguments.scene, arguments.folder)
@@ -27,7 +27,7 @@ def plan(arguments: argparse.Namespace) -> Outcome:
 
 def simulate(arguments: argparse.Namespace) -> Outcome:
     """Return the report of a scene's motion."""
-    from ..bridges.containers.files import save
+    from ..bridges.containers.tables import save
     from ..motion.numbers import UNITS
     from ..scenes.overrides import parsed
     from ..scenes.simulate import scenario
@@ -45,7 +45,7 @@ def simulate(arguments: argparse.Namespace) -> Outcome:
 
 def identify(arguments: argparse.Namespace) -> Outcome:
     """Return parameters, motion and torques that marker tracks show, and whether that converged."""
-    from ..bridges.containers.files import save
+    from ..bridges.containers.tables import save
     from ..scenes.identify import identified
 
     found = identified(arguments.scene, arguments.data, arguments.folder)

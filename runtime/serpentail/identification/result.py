@@ -9,8 +9,8 @@ import numpy as np
 
 from ..basics.errors import IdentificationError
 from ..model.model import Model
-from ..motion.origin import origin
-from ..motion.table import as_text
+from ..motion.archive import origin
+from ..motion.text import as_text
 from ..motion.trajectory import Trajectory
 from .certainty import Combination
 from .estimates import Estimate, IdentifiedTrial

@@ -1,4 +1,7 @@
-"""Files of motions: arrays in one npz, which is read only if every checksum is right."""
+"""Files of motions, and what a motion says of the model that made it.
+
+A file is one npz of arrays, which is read only if every checksum is right.
+"""
 
 import json
 import os
@@ -10,6 +13,8 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from ..basics.files import replacing
+from ..model.model import Model
+from ..model.parameters import json_ready
 from .contact import Contact
 
 SUFFIX = ".npz"
@@ -101,3 +106,13 @@ def _parsed(fields: dict[str, Any]) -> dict[str, Any]:
         groups = json.loads(str(touching.pop("groups")))
         arguments["contact"] = Contact(**touching, groups=groups)
     return arguments | {"info": json.loads(str(fields["info"]))}
+
+
+def origin(model: Model) -> dict[str, Any]:
+    """Return name, hashes and parameters of a model, ready for JSON."""
+    return {
+        "model": model.name,
+        "content_hash": model.manifest["content_hash"],
+        "manifest_hash": model.checked.manifest_hash,
+        "parameters": json_ready(model.parameters),
+    }

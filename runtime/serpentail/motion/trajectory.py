@@ -17,13 +17,12 @@ from ..basics.attitude import Array, pose_of
 from ..basics.checks import needed
 from ..model.model import Model
 from . import archive
-from .account import account
 from .contact import Contact
 from .derived import Derived, Later, made, settled
-from .exports import Exports
+from .methods import Exports, Showable
 from .plausibility import doubts, warnings_of
 from .resample import Interpolation, hermite_q, inside, monotone, smooth
-from .showable import Showable
+from .text import short_text
 from .validation import check_time, check_unit, json_text, layout_of, real, shapes
 
 
@@ -113,7 +112,7 @@ class Trajectory(Exports, Showable):
             array.setflags(write=False)
         return made(cls, arrays | {"model": model}, later)
 
-    __repr__ = account
+    __repr__ = short_text
 
     @property
     def energy(self) -> Array:

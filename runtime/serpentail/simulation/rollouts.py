@@ -11,9 +11,9 @@ import numpy as np
 from ..basics.errors import SimulationError, ViewError
 from ..model.model import Model
 from ..model.parameters import RunParameters
-from ..motion.account import arrays_of, framed, how_made, tail_of
 from ..motion.derived import Derived, settled
-from ..motion.exports import Exports
+from ..motion.methods import Exports
+from ..motion.text import arrays_of, framed, how_made, tail_of
 from ..motion.trajectory import MONOTONE, Trajectory
 from .audit import Audit
 from .compiled_run import Samples, sampled

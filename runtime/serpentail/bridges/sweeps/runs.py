@@ -11,7 +11,7 @@ import numpy as np
 
 from ...basics.errors import SerpentailError, SweepError
 from ...model.model import Model
-from ...motion.numbers import NUMBERS
+from ...motion.numbers import UNITS, numbers_of
 from ...motion.trajectory import Trajectory
 from ...scenes.overrides import changed
 from ...scenes.simulate import Scenario, scenario_of
@@ -22,7 +22,7 @@ from .axes import Point
 from .job import STARTS, Job
 
 ENDS = ("end_s", "q_end", "v_end", "kinetic_end_J", "potential_end_J")  # outputs by default
-OUTPUTS = (*ENDS, *(number.name for number in NUMBERS))
+OUTPUTS = (*ENDS, *UNITS)
 FEW = 2  # points that are not worth running side by side
 MOST_TEXT = 2000  # characters of an error
 SHARED = (type(None), Damping, TorqueTable, TorqueCurve)  # controllers that any parameters suit
@@ -195,12 +195,9 @@ def _outcomes(found: Rollouts, outputs: Sequence[str]) -> list[tuple[str | None,
 def outcome_of(motion: Trajectory, outputs: Sequence[str]) -> dict[str, Any]:
     """Return the outputs of a motion by name."""
     arrays = (motion.t[-1], motion.q[-1], motion.v[-1], motion.kinetic[-1], motion.potential[-1])
-    ends = dict(zip(ENDS, (np.asarray(x).tolist() for x in arrays), strict=True))
-    numbers = {number.name: number for number in NUMBERS if number.name in outputs}
-    return {
-        name: ends[name] if name in ends else numbers[name].of(motion.model, motion)  # type: ignore[arg-type]
-        for name in outputs
-    }
+    found = dict(zip(ENDS, (np.asarray(x).tolist() for x in arrays), strict=True))
+    found |= numbers_of(motion.model, motion, outputs)  # type: ignore[arg-type]
+    return {name: found[name] for name in outputs}
 
 
 def as_text(outcome: dict[str, Any]) -> str:

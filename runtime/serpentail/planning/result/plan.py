@@ -13,8 +13,8 @@ from serpentail_scene.layout import TAIL_V
 
 from ...basics.errors import SimulationError
 from ...model.model import Model
-from ...motion.account import UNITS, framed, tail_of
-from ...motion.origin import origin
+from ...motion.archive import origin
+from ...motion.text import SI, framed, tail_of
 from ...motion.trajectory import Trajectory
 from ...simulation.controllers import Controller, Damping, TorqueCurve
 from ..flight import flight
@@ -88,7 +88,7 @@ class Plan:
             [
                 f"Plan of {self.trajectory.info['model']}, {moved}: {ended}",
                 f"{self.duration:.6g} s, {self.mesh.intervals} intervals by {self.rule.name} of "
-                f"degree {self.rule.degree}, {len(self.trajectory.t)} samples; {UNITS}",
+                f"degree {self.rule.degree}, {len(self.trajectory.t)} samples; {SI}",
                 f"effort {effort} N^2 m^2 s, energy {energy} J, peak power {power} W",
                 f"true attitude at the end: {to_plan} deg from the plan, {to_goal} from the goal",
                 f"{told['rounds']} rounds, {told['iterations']} iterations; processor time "

@@ -11,7 +11,7 @@ from ...motion.body import weight as weight_of
 from ...motion.numbers import UNITS
 from ...motion.plausibility import warnings_of
 from ...motion.summary import summary
-from ...motion.table import as_word
+from ...motion.text import as_word
 from ...motion.trajectory import Trajectory
 from ..animal import BELLY, JOINT, Animal, animal_of
 from .samples import packed, samples, thinned
