@@ -6,7 +6,7 @@ import numpy as np
 
 from ..model.model import Model
 from .errors import differences, differing, differing_outputs, is_derivative
-from .law import VALUE_LIMIT, Errors, Law, registry
+from .law import VALUE_LIMIT, Errors, law
 from .states import (
     State,
     arguments,
@@ -17,9 +17,6 @@ from .states import (
     scaled,
     state_functions,
 )
-
-LAWS: list[Law] = []
-law = registry(LAWS)
 
 
 @law()

@@ -9,11 +9,8 @@ from serpentail_scene.layout import OMEGA
 
 from ..model.model import Model
 from .errors import block_error, blocks_of, relative, worst
-from .law import PIECEWISE, SLOPE_LIMIT, Errors, Law, fastest, moved, registry, slope
+from .law import PIECEWISE, SLOPE_LIMIT, Errors, fastest, law, moved, slope
 from .states import State, at_origin
-
-LAWS: list[Law] = []
-law = registry(LAWS)
 
 
 def along(s: State, time: float) -> State:
@@ -22,14 +19,14 @@ def along(s: State, time: float) -> State:
 
 
 def slopes(
-    model: Model, s: State, f: Callable[[State], np.ndarray]
+    model: Model, s: State, f: Callable[[State], np.ndarray], nearer: float = 1.0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return how fast a function changes along the state's directions, and the size of that.
 
-    Its rounding scales with the size.
+    Its rounding scales with the size. nearer: by how much to shorten the steps.
     """
     s = at_origin(s)
-    rate = max(1.0, fastest(model, s.dq))
+    rate = nearer * max(1.0, fastest(model, s.dq))
     change, largest = slope(lambda t: np.asarray(f(along(s, t)), float), rate)
     return change, rate * largest
 
@@ -42,7 +39,7 @@ def block_slope_error(
     return block_error(x, change, np.abs(change) + largest, blocks_of(model))
 
 
-@law("inverse_dynamics", "inverse_dynamics_derivatives", units=SLOPE_LIMIT, without=PIECEWISE)
+@law("inverse_dynamics inverse_dynamics_derivatives", SLOPE_LIMIT, without=PIECEWISE)
 def inverse_dynamics_changes_by_its_jacobians(model: Model, s: State) -> Errors:
     """dq, dv times a direction are the slope of H v_dot + C along it."""
     dq, dv = model.inverse_dynamics_derivatives(s.q, s.v, s.v_dot)
@@ -54,11 +51,8 @@ def inverse_dynamics_changes_by_its_jacobians(model: Model, s: State) -> Errors:
 
 
 @law(
-    "mass_matrix",
-    "inverse_dynamics",
-    "forward_dynamics",
-    "forward_dynamics_derivatives",
-    units=SLOPE_LIMIT,
+    "mass_matrix inverse_dynamics forward_dynamics forward_dynamics_derivatives",
+    SLOPE_LIMIT,
     without=PIECEWISE,
 )
 def forward_dynamics_changes_by_its_jacobians(model: Model, s: State) -> Errors:
@@ -78,12 +72,7 @@ def forward_dynamics_changes_by_its_jacobians(model: Model, s: State) -> Errors:
     }
 
 
-@law(
-    "forward_dynamics_derivatives",
-    "forward_dynamics_jvp",
-    "forward_dynamics_vjp",
-    units=SLOPE_LIMIT,
-)
+@law("forward_dynamics_derivatives forward_dynamics_jvp forward_dynamics_vjp", SLOPE_LIMIT)
 def products_are_those_with_the_jacobians(model: Model, s: State) -> Errors:
     """jvp is J d, vjp is lambda^T J, relative to the sum of |terms|."""
     J = [x.astype(float) for x in model.forward_dynamics_derivatives(s.q, s.v, s.tau)]
@@ -103,7 +92,7 @@ def product_error(vjp: Iterable, multiplier: np.ndarray, jacobians: Iterable) ->
     )
 
 
-@law("mass_matrix", "inverse_dynamics_derivatives", "inverse_dynamics_vjp", units=SLOPE_LIMIT)
+@law("mass_matrix inverse_dynamics_derivatives inverse_dynamics_vjp", SLOPE_LIMIT)
 def gradient_is_the_product_with_the_jacobians(model: Model, s: State) -> Errors:
     """The gradient of lambda^T (H v_dot + C) is lambda^T times dq, dv and H."""
     J = [*model.inverse_dynamics_derivatives(s.q, s.v, s.v_dot), model.mass_matrix(s.q)]
@@ -111,7 +100,7 @@ def gradient_is_the_product_with_the_jacobians(model: Model, s: State) -> Errors
     return product_error(vjp, s.multiplier, [j.astype(float) for j in J])
 
 
-@law("inverse_dynamics_vjp", "inverse_dynamics_hessian", units=SLOPE_LIMIT, without=PIECEWISE)
+@law("inverse_dynamics_vjp inverse_dynamics_hessian", SLOPE_LIMIT, without=PIECEWISE)
 def gradient_changes_by_the_hessian(model: Model, s: State) -> Errors:
     """The Hessian times a direction is the slope of the gradient along it; turns in q commute by
     half a bracket.
@@ -132,7 +121,7 @@ def gradient_changes_by_the_hessian(model: Model, s: State) -> Errors:
     return errors
 
 
-@law("energy", "energy_derivatives", "mass_matrix", units=SLOPE_LIMIT, without=PIECEWISE)
+@law("energy energy_derivatives mass_matrix", SLOPE_LIMIT, without=PIECEWISE)
 def energies_change_by_their_gradients(model: Model, s: State) -> Errors:
     """The gradients of both energies times a direction are their slopes.
 
@@ -148,7 +137,7 @@ def energies_change_by_their_gradients(model: Model, s: State) -> Errors:
     }
 
 
-@law("momentum", "momentum_derivatives", units=SLOPE_LIMIT)
+@law("momentum momentum_derivatives", SLOPE_LIMIT)
 def momentum_changes_by_its_jacobians(model: Model, s: State) -> Errors:
     """The Jacobians of both momenta times a direction are their slopes."""
     linear_dq, linear_dv, angular_dq, angular_dv = model.momentum_derivatives(s.q, s.v)
@@ -158,11 +147,9 @@ def momentum_changes_by_its_jacobians(model: Model, s: State) -> Errors:
 
 
 @law(
-    "mass_matrix",
-    "forward_dynamics",
-    "inverse_dynamics_parameter_derivatives",
+    "mass_matrix forward_dynamics inverse_dynamics_parameter_derivatives "
     "forward_dynamics_parameter_derivatives",
-    units=SLOPE_LIMIT,
+    SLOPE_LIMIT,
 )
 def parameters_move_both_dynamics_alike(model: Model, s: State) -> Errors:
     """H times a parameter's derivative of v_dot is minus that of H v_dot + C at the same v_dot."""

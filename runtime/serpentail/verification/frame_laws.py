@@ -22,7 +22,7 @@ from .errors import (
     turned_array,
     worst,
 )
-from .law import VALUE_LIMIT, Errors, Law, fastest, moved, registry, slope
+from .law import VALUE_LIMIT, Errors, fastest, law, moved, slope
 from .states import State, at_origin, outputs, state_functions
 
 WORLD = ("mass_matrix_world", "bias_force_world")
@@ -35,8 +35,6 @@ PLACED = (
     "tail_points",
     "contact_points",
 )
-LAWS: list[Law] = []
-law = registry(LAWS)
 
 
 def changed_axes(top: np.ndarray, middle: np.ndarray, size: int) -> np.ndarray:
@@ -100,7 +98,7 @@ def quaternion_has_no_norm_and_no_sign(model: Model, s: State) -> Errors:
     return same_bits(model, state_functions(model), s, replace(s, q=q))
 
 
-@law("tail_points", units=VALUE_LIMIT, only="articulated")
+@law("tail_points", VALUE_LIMIT, only="articulated")
 def links_have_their_length(model: Model, s: State) -> Errors:
     """The first tail point is the mount, and each is a link from the next: L_t / N, or its own
     length.
@@ -117,7 +115,7 @@ def links_have_their_length(model: Model, s: State) -> Errors:
     }
 
 
-@law("tail_points", "tail_point_jacobians", units=VALUE_LIMIT)
+@law("tail_points tail_point_jacobians", VALUE_LIMIT)
 def jacobians_are_the_derivatives_of_the_points(model: Model, s: State) -> Errors:
     """J v is the derivative of the tail points along each unit velocity, relative to |points| times
     the links' turn.
@@ -135,13 +133,7 @@ def jacobians_are_the_derivatives_of_the_points(model: Model, s: State) -> Error
     return worst(errors)
 
 
-@law(
-    "mass_matrix",
-    "forward_dynamics",
-    "forward_dynamics_external",
-    "tail_point_jacobians",
-    units=VALUE_LIMIT,
-)
+@law("mass_matrix forward_dynamics forward_dynamics_external tail_point_jacobians", VALUE_LIMIT)
 def loads_accelerate_by_their_generalised_force(model: Model, s: State) -> Errors:
     """H (v_dot under loads - v_dot without) = [f; n; 0] + sum J_k^T f_k, relative to cond(H)."""
     H, J = model.mass_matrix(s.q).astype(float), model.tail_point_jacobians(s.q)
@@ -152,7 +144,7 @@ def loads_accelerate_by_their_generalised_force(model: Model, s: State) -> Error
     return difference(model, s.q, "v_dot", loaded, free + np.linalg.solve(H, force))
 
 
-@law("forward_dynamics", "forward_dynamics_external", units=VALUE_LIMIT)
+@law("forward_dynamics forward_dynamics_external", VALUE_LIMIT)
 def no_load_is_no_change(model: Model, s: State) -> Errors:
     """Forward dynamics under zero loads is forward dynamics, relative to cond(H)."""
     free = model.forward_dynamics(s.q, s.v, s.tau)
@@ -161,14 +153,14 @@ def no_load_is_no_change(model: Model, s: State) -> Errors:
     )
 
 
-@law("mass_matrix", "mass_matrix_world", units=VALUE_LIMIT)
+@law("mass_matrix mass_matrix_world", VALUE_LIMIT)
 def mass_matrix_in_world_axes(model: Model, s: State) -> Errors:
     """The world-frame H is X^-T H X^-1 with X = blkdiag(1, R, 1)."""
     X = changed_axes(np.eye(3), rotation_matrix(s.q[QUATERNION]), model.nv)
     return matrix_error(model.mass_matrix_world(s.q), X @ model.mass_matrix(s.q) @ X.T)
 
 
-@law("bias_force", "bias_force_world", units=VALUE_LIMIT)
+@law("bias_force bias_force_world", VALUE_LIMIT)
 def bias_force_in_world_axes(model: Model, s: State) -> Errors:
     """The world-frame C is X^-T C: d(R omega)/dt = R omega_dot, so that X_dot adds nothing."""
     X = changed_axes(np.eye(3), rotation_matrix(s.q[QUATERNION]), model.nv)

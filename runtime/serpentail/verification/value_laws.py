@@ -14,14 +14,12 @@ from ..motion.trajectory import Trajectory
 from ..simulation.schedules import Legs
 from ..simulation.simulate import simulate
 from .errors import block_error, blocks_of, difference, differing, relative, rounding, worst
-from .law import PIECEWISE, VALUE_LIMIT, Errors, Law, fastest, moved, registry, slope
+from .law import PIECEWISE, VALUE_LIMIT, Errors, fastest, law, moved, slope
 from .states import State
 
 FLIGHT, STEPS = 0.2, 2000  # s
 SWING = 0.02  # s, of a tail on a fixed base, which gravity folds and whips
 CLEAR = 10.0  # m: more than a flight falls, or than a tail's length
-LAWS: list[Law] = []
-law = registry(LAWS)
 
 
 # Inertia, dynamics, energy, flight
@@ -45,7 +43,7 @@ def mass_matrix_is_positive_definite(model: Model, s: State) -> Errors:
     return worst([rounding(model) - eigenvalues[0] / eigenvalues[-1]])
 
 
-@law("mass_matrix", units=4, only="free")
+@law("mass_matrix", 4, only="free")
 def translation_carries_the_whole_mass(model: Model, s: State) -> Errors:
     """The first block of H is (m_torso + m_tail) 1."""
     return relative(
@@ -53,7 +51,7 @@ def translation_carries_the_whole_mass(model: Model, s: State) -> Errors:
     )
 
 
-@law("mass_matrix", "bias_force", "inverse_dynamics", units=VALUE_LIMIT)
+@law("mass_matrix bias_force inverse_dynamics", VALUE_LIMIT)
 def inverse_dynamics_is_mass_times_acceleration_plus_bias(model: Model, s: State) -> Errors:
     """Inverse dynamics is H v_dot + C, relative to |H| |v_dot| + |C|."""
     H, C = model.mass_matrix(s.q), model.bias_force(s.q, s.v)
@@ -61,7 +59,7 @@ def inverse_dynamics_is_mass_times_acceleration_plus_bias(model: Model, s: State
     return block_error(found, H @ s.v_dot + C, scale, blocks_of(model))
 
 
-@law("mass_matrix", "inverse_dynamics", "forward_dynamics", units=VALUE_LIMIT)
+@law("mass_matrix inverse_dynamics forward_dynamics", VALUE_LIMIT)
 def forward_dynamics_needs_the_torques_it_was_given(model: Model, s: State) -> Errors:
     """Inverse dynamics of forward dynamics is [0; tau], relative to |H| |v_dot| + |tau|."""
     v_dot = model.forward_dynamics(s.q, s.v, s.tau)
@@ -72,11 +70,7 @@ def forward_dynamics_needs_the_torques_it_was_given(model: Model, s: State) -> E
 
 
 # behind its stops a tail is pushed so much harder than it moves that roundings of that are seen
-@law(
-    *("mass_matrix", "inverse_dynamics", "forward_dynamics_external"),
-    units=VALUE_LIMIT,
-    without=PIECEWISE,
-)
+@law("mass_matrix inverse_dynamics forward_dynamics_external", VALUE_LIMIT, without=PIECEWISE)
 def forward_dynamics_inverts_inverse_dynamics(model: Model, s: State) -> Errors:
     """Under the loads that v_dot needs, forward dynamics returns v_dot, relative to cond(H)."""
     force = model.inverse_dynamics(s.q, s.v, s.v_dot)
@@ -86,13 +80,13 @@ def forward_dynamics_inverts_inverse_dynamics(model: Model, s: State) -> Errors:
     )
 
 
-@law("mass_matrix", "energy", units=VALUE_LIMIT)
+@law("mass_matrix energy", VALUE_LIMIT)
 def kinetic_energy_is_half_v_H_v(model: Model, s: State) -> Errors:
     """T = v . H v / 2."""
     return relative(model.energy(s.q, s.v)[0], s.v @ model.mass_matrix(s.q) @ s.v / 2)
 
 
-@law("mass_matrix", "momentum", units=VALUE_LIMIT, only="free")
+@law("mass_matrix momentum", VALUE_LIMIT, only="free")
 def momentum_is_mass_times_velocity(model: Model, s: State) -> Errors:
     """Momentum is the upper part of H v, angular momentum the middle part, moved to the COM."""
     linear, angular = model.momentum(s.q, s.v)
@@ -115,7 +109,7 @@ def center_of_mass(model: Model, q: np.ndarray) -> np.ndarray:
     return q[..., POSITION] + (R @ h[..., None])[..., 0] / H[..., :1, 0]
 
 
-@law("mass_matrix", "center_of_mass", units=VALUE_LIMIT, only="free")
+@law("mass_matrix center_of_mass", VALUE_LIMIT, only="free")
 def center_of_mass_is_that_of_the_mass_matrix(model: Model, s: State) -> Errors:
     """The COM and its Jacobian follow from H; the Jacobian is the upper part of H over the mass."""
     position, _, J = model.center_of_mass(s.q, s.v)
@@ -126,7 +120,7 @@ def center_of_mass_is_that_of_the_mass_matrix(model: Model, s: State) -> Errors:
     }
 
 
-@law("momentum", "center_of_mass", units=VALUE_LIMIT)
+@law("momentum center_of_mass", VALUE_LIMIT)
 def momentum_is_mass_times_velocity_of_the_center_of_mass(model: Model, s: State) -> Errors:
     """Momentum is the mass times the velocity of the COM: of the animal, or of a tail on a fixed
     base.
@@ -135,14 +129,14 @@ def momentum_is_mass_times_velocity_of_the_center_of_mass(model: Model, s: State
     return relative(total_mass(model.parameters) * velocity, model.momentum(s.q, s.v)[0])
 
 
-@law("center_of_mass", units=VALUE_LIMIT)
+@law("center_of_mass", VALUE_LIMIT)
 def velocity_of_the_center_of_mass_is_J_v(model: Model, s: State) -> Errors:
     """The velocity of the COM is its Jacobian times v, relative to the largest part of that."""
     _, velocity, J = model.center_of_mass(s.q, s.v)
     return relative(velocity, J @ s.v, abs(J) @ abs(s.v))
 
 
-@law("energy", "forward_dynamics", units=VALUE_LIMIT, without=PIECEWISE)
+@law("energy forward_dynamics", VALUE_LIMIT, without=PIECEWISE)
 def energy_changes_by_the_power_of_the_torques(model: Model, s: State) -> Errors:
     """Along forward dynamics dE/dt = tau . q_t_dot less the power of the tail's own damping.
 
@@ -177,7 +171,7 @@ def flight(model: Model, s: State, **settings: Any) -> Trajectory:
     return motion
 
 
-@law("rollout", "energy", "momentum", units=4 * STEPS, floor=1e-10, without=PARTS)
+@law("rollout energy momentum", 4 * STEPS, floor=1e-10, without=PARTS)
 def energy_is_constant_in_flight(model: Model, s: State) -> Errors:
     """In 0.2 s of flight without torques, or 0.02 s on a fixed base (2000 steps of RK4), the sum of
     both energies is constant.
@@ -186,13 +180,7 @@ def energy_is_constant_in_flight(model: Model, s: State) -> Errors:
     return relative(motion.energy, motion.energy[0], abs(motion.kinetic) + abs(motion.potential))
 
 
-@law(
-    *("rollout", "energy", "momentum"),
-    units=4 * STEPS,
-    floor=1e-10,
-    only="free",
-    without=PARTS,
-)
+@law("rollout energy momentum", 4 * STEPS, floor=1e-10, only="free", without=PARTS)
 def momentum_is_constant_in_flight(model: Model, s: State) -> Errors:
     """In flight angular momentum about the COM is constant, and momentum changes by - M g t."""
     motion = flight(model, s)
@@ -205,13 +193,7 @@ def momentum_is_constant_in_flight(model: Model, s: State) -> Errors:
     }
 
 
-@law(
-    *("rollout", "mass_matrix", "energy", "momentum"),
-    units=4 * STEPS,
-    floor=1e-10,
-    only="free",
-    without=PARTS,
-)
+@law("rollout mass_matrix energy momentum", 4 * STEPS, floor=1e-10, only="free", without=PARTS)
 def center_of_mass_flies_a_parabola(model: Model, s: State) -> Errors:
     """In flight the COM is at c + c_dot t - g t^2 / 2."""
     motion = flight(model, s)
