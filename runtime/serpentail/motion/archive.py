@@ -8,7 +8,7 @@ import os
 import zipfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TypeVar
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from ..model.parameters import json_ready
 from .contact import Contact
 
 SUFFIX = ".npz"
+T = TypeVar("T")
 CONTACT = "contact_"  # before the names of a contact's arrays in a file
 MOST_EXPANSION = 100  # times the file: ours is not compressed, a motion in one that is fits, too
 
@@ -42,8 +43,8 @@ def write(
     return target
 
 
-def read(path: str | os.PathLike[str], arrays: Iterable[str]) -> tuple[Path, dict[str, Any]]:
-    """Return the path of a file, and its arrays, info and contact.
+def read(path: str | os.PathLike[str], arrays: Iterable[str], kind: type[T]) -> T:
+    """Return the trajectory of a file, made by its class.
 
     FileNotFoundError if it is absent, ValueError if it is not a trajectory.
     """
@@ -54,7 +55,7 @@ def read(path: str | os.PathLike[str], arrays: Iterable[str]) -> tuple[Path, dic
         )
     fields = _stored(source, arrays)
     try:
-        return source, _parsed(fields)
+        return kind(**_parsed(fields))
     except (KeyError, RecursionError, TypeError, ValueError) as error:
         raise ValueError(f"{str(source)!r} does not hold a valid trajectory: {error}") from error
 

@@ -97,38 +97,23 @@ NUMBERS = (
     Number("model", "", "name of the model", lambda run: run.model.name),
     Number("duration_s", "s", "from the first sample to the last", _duration),
     # the leap
-    Number(
-        "take_off_s", "s", "start of the flight about the apex: nothing touches the ground",
-        lambda run: run.landing.flight[0],
-    ),
-    Number(
-        "apex_m", "m", "largest height of B, the torso's centre of mass",
-        _of_torso(lambda motion: float(motion.q[:, 2].max())),
-    ),
-    Number(
-        "com_rise_m", "m", "largest height of the centre of mass, above its start",
-        lambda run: com_rise(run.model, run.motion),
-    ),
-    Number(
-        "recontact_s", "s", "landing: end of the flight about the apex",
-        lambda run: run.landing.flight[1],
-    ),
-    Number(
-        "landing_group", "", "group of points that lands first", lambda run: run.landing.group()
-    ),
+    Number("take_off_s", "s", "start of the flight about the apex: nothing touches the ground",
+        lambda run: run.landing.flight[0]),
+    Number("apex_m", "m", "largest height of B, the torso's centre of mass",
+        _of_torso(lambda motion: float(motion.q[:, 2].max()))),
+    Number("com_rise_m", "m", "largest height of the centre of mass, above its start",
+        lambda run: com_rise(run.model, run.motion)),
+    Number("recontact_s", "s", "landing: end of the flight about the apex",
+        lambda run: run.landing.flight[1]),
+    Number("landing_group", "", "group of points that lands first",
+        lambda run: run.landing.group()),
     # the attitude, and whether it was a landing or a tumble
-    Number(
-        "pitch_at_end_rad", "rad", "pitch at the end, whole turns included",
-        _of_torso(lambda motion: float(pitch_roll_yaw(motion.q, unwrap=True)[-1, 0])),
-    ),
-    Number(
-        "tilt_max_deg", "deg", "largest angle between the torso's z axis and the vertical",
-        _of_torso(lambda motion: float(tilt_deg(motion.attitude).max())),
-    ),
-    Number(
-        "tilt_end_deg", "deg", "this angle at the end",
-        _of_torso(lambda motion: float(tilt_deg(motion.attitude[-1]))),
-    ),
+    Number("pitch_at_end_rad", "rad", "pitch at the end, whole turns included",
+        _of_torso(lambda motion: float(pitch_roll_yaw(motion.q, unwrap=True)[-1, 0]))),
+    Number("tilt_max_deg", "deg", "largest angle between the torso's z axis and the vertical",
+        _of_torso(lambda motion: float(tilt_deg(motion.attitude).max()))),
+    Number("tilt_end_deg", "deg", "this angle at the end",
+        _of_torso(lambda motion: float(tilt_deg(motion.attitude[-1])))),
     Number(
         "upright_end", "", "z component of the torso's z axis at the end: 1 level, -1 on its back",
         _of_torso(upright),
@@ -149,71 +134,45 @@ NUMBERS = (
         f"than {MIN_SHARE} of the weight on the feet",
         lambda run: run.landing.standing,
     ),
-    Number(
-        "landed", "", "stands at the end, and least_upright_landing is above 0",
-        lambda run: run.landing.landed(),
-    ),
+    Number("landed", "", "stands at the end, and least_upright_landing is above 0",
+        lambda run: run.landing.landed()),
     # the ground
-    Number(
-        "body_weight_N", "N", "weight of torso and tail; on a fixed base, of the tail",
-        lambda run: run.weight or None,
-    ),
+    Number("body_weight_N", "N", "weight of torso and tail; on a fixed base, of the tail",
+        lambda run: run.weight or None),
     Number(
         "ground_impulse_N_s", "N s",
         "impulse of the ground on all points (x, y, z), summed by the integrator",
         _ground_impulse,
     ),
-    Number(
-        "impulse_N_s", "N s", "the same for each group",
-        lambda run: run.motion.info.get("impulse_N_s") or None,
-    ),
-    Number(
-        "peak_ground_force_N", "N", f"largest force on all points together, {STEPS}",
-        lambda run: run.peak(0),
-    ),
-    Number(
-        "peak_ground_force_weights", "body weights", "the same in body weights",
-        lambda run: run.in_weights(run.peak(0)),
-    ),
+    Number("impulse_N_s", "N s", "the same for each group",
+        lambda run: run.motion.info.get("impulse_N_s") or None),
+    Number("peak_ground_force_N", "N", f"largest force on all points together, {STEPS}",
+        lambda run: run.peak(0)),
+    Number("peak_ground_force_weights", "body weights", "the same in body weights",
+        lambda run: run.in_weights(run.peak(0))),
     Number("peak_ground_force_s", "s", "time of this force", lambda run: run.peak(1)),
-    Number(
-        "peak_group_force_N", "N", "the same force on each group and on each foot",
-        Facts.peaks_of_parts,
-    ),
-    Number(
-        "peak_group_force_weights", "body weights", "the same in body weights", _parts_in_weights
-    ),
-    Number(
-        "touching_s", "s", f"total time for which each group touched the ground; {ONE_FOOT}",
-        lambda run: run.landing.touching_time(),
-    ),
+    Number("peak_group_force_N", "N", "the same force on each group and on each foot",
+        Facts.peaks_of_parts),
+    Number("peak_group_force_weights", "body weights", "the same in body weights",
+        _parts_in_weights),
+    Number("touching_s", "s", f"total time for which each group touched the ground; {ONE_FOOT}",
+        lambda run: run.landing.touching_time()),
     Number(
         "slip_m", "m",
         "longest path that a point of each group slips while the ground pushes it, at the samples",
         lambda run: slip(run.model, run.motion),
     ),
-    Number(
-        "first_touch_down_s", "s", f"first touch-down of each group; {ONE_FOOT}",
-        lambda run: run.landing.times("touch_down", 0),
-    ),
-    Number(
-        "last_take_off_s", "s", f"last take-off of each group; {ONE_FOOT}",
-        lambda run: run.landing.times("take_off", -1),
-    ),
+    Number("first_touch_down_s", "s", f"first touch-down of each group; {ONE_FOOT}",
+        lambda run: run.landing.times("touch_down", 0)),
+    Number("last_take_off_s", "s", f"last take-off of each group; {ONE_FOOT}",
+        lambda run: run.landing.times("take_off", -1)),
     # the books
-    Number(
-        "peak_torque_N_m", "N m", "largest torque of a tail coordinate, at the samples",
-        lambda run: float(np.abs(run.motion.tau).max(initial=0)),
-    ),
-    Number(
-        "energy_change_J", "J", "energy at the end minus energy at the start",
-        lambda run: float(run.motion.energy[-1] - run.motion.energy[0]),
-    ),
-    Number(
-        "work_J", "J",
-        "work of the torques, the damping, the ground and the legs' drives",
-        _entry("work_J"),
-    ),
+    Number("peak_torque_N_m", "N m", "largest torque of a tail coordinate, at the samples",
+        lambda run: float(np.abs(run.motion.tau).max(initial=0))),
+    Number("energy_change_J", "J", "energy at the end minus energy at the start",
+        lambda run: float(run.motion.energy[-1] - run.motion.energy[0])),
+    Number("work_J", "J", "work of the torques, the damping, the ground and the legs' drives",
+        _entry("work_J")),
     Number(
         "imbalance", "",
         "energy (J) and momentum (N s) that work and impulses do not explain, and the larger of "

@@ -41,8 +41,8 @@ def warnings_of(model: Model | None, motion: "Trajectory") -> list[str]:
     Without a model the latter are those found before the motion was saved or pickled.
     """
     books: list[str] = motion.info.get("warnings", [])
-    found = motion.info.get("doubts", []) if model is None else doubts(model, motion)
-    return [*books, *found]
+    impossible = motion.info.get("doubts", []) if model is None else doubts(model, motion)
+    return [*books, *impossible]
 
 
 def doubts(model: Model, motion: "Trajectory") -> list[str]:
@@ -63,17 +63,17 @@ def _in_the_ground(model: Model, motion: "Trajectory") -> list[str]:
     """Return parts that are deep in the ground, because the scene gives them no contact."""
     if motion.contact is None:
         return []
-    allowed, told = DEEP * 2 * float(semi_axes(model).max()), []
+    allowed, warnings = DEEP * 2 * float(semi_axes(model).max()), []
     for part, (depth, time) in _depths(model, motion).items():
         if depth > allowed:
             remedy = f'add "{part}" to `contacts` of the scene'
             if part == "legs":
                 remedy = "above the ankle they touch nothing: start higher, or bend the legs less"
-            told.append(
+            warnings.append(
                 f"{part}: {1e3 * depth:.3g} mm below the ground at t = {time:.4g} s, more than "
                 f"{1e3 * allowed:.3g} mm, and no contact there: {remedy}"
             )
-    return told
+    return warnings
 
 
 def _depths(model: Model, motion: "Trajectory") -> dict[str, Moment]:
@@ -145,10 +145,10 @@ def _nearest(points: Array) -> Array:
 
 def _blows(model: Model, motion: "Trajectory") -> list[str]:
     """A force of the ground that no legs of the animal's size bear."""
-    found, whole = peaks(motion), weight(model)
-    if not found or not whole:
+    largest, whole = peaks(motion), weight(model)
+    if not largest or not whole:
         return []
-    force, time = found["all"]
+    force, time = largest["all"]
     most = BORNE * (BEARER / float(total_mass(model.parameters))) ** (1 / 3)
     if not force > most * whole:
         return []
@@ -162,17 +162,17 @@ def _blows(model: Model, motion: "Trajectory") -> list[str]:
 def _bends(model: Model, motion: "Trajectory") -> list[str]:
     """Segments that are bent by clearly more than half a turn."""
     bends = _bend(model, motion.tail)
-    told = []
+    warnings = []
     for segment, k in enumerate(bends.argmax(axis=0)):
         if bends[k, segment] > MOST_BEND:
             remedy = "damp it more, or give its reference smaller bends"
             if bends[k, segment] > DEGREES:
                 remedy = "are degrees given in place of radians (np.radians)? If not, damp it more"
-            told.append(
+            warnings.append(
                 f"tail: segment {segment + 1} is bent by {bends[k, segment]:.3g} rad at t = "
                 f"{motion.t[k]:.4g} s, more than {MOST_BEND:.3g}: {remedy}"
             )
-    return told
+    return warnings
 
 
 def _bend(model: Model, tail: Array) -> Array:

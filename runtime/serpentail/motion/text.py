@@ -5,7 +5,6 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from ..basics.short_repr import cut
-from ..model.model import Model
 
 if TYPE_CHECKING:
     from .trajectory import Trajectory
@@ -81,7 +80,7 @@ def _rows(name: str, value: Any, unit: str, error: Any) -> list[Row]:
 def short_text(motion: "Trajectory") -> str:
     """Return what a REPL shows of a trajectory: at most six lines."""
     first, last = motion.t[[0, -1]]
-    moved = tail_of(motion.model) if motion.model else "without its model"
+    moved = motion.model.tail_words() if motion.model else "without its model"
     name = motion.info.get("model", "a tail")
     lines = [
         f"Trajectory of {name}, {moved}: {len(motion.t)} samples, {first:.6g} to {last:.6g} s",
@@ -90,17 +89,6 @@ def short_text(motion: "Trajectory") -> str:
         how_made(motion.info),
     ]
     return framed(lines + _ended(motion))
-
-
-def tail_of(model: Model) -> str:
-    """Return in words what a model's tail is made of."""
-    if model.kind == "mixed":
-        return model.tail_words()
-    if isinstance(model.links, tuple):
-        return f"{model.kind}, {', '.join(map(str, model.links))} links"
-    if model.links:
-        return f"{model.kind}, {model.segments} x {model.links} links"
-    return f"{model.kind}, {model.segments} segments"
 
 
 def arrays_of(motion: Any) -> str:

@@ -219,13 +219,7 @@ class Trajectory(Exports, Showable):
         ValueError
             The file is not a trajectory, or is damaged.
         """
-        source, fields = archive.read(path, ARRAYS)
-        try:
-            return cls(**fields)
-        except ValueError as error:
-            raise ValueError(
-                f"{str(source)!r} does not hold a valid trajectory: {error}"
-            ) from error
+        return archive.read(path, ARRAYS, cls)
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave out the model, whose compiled code belongs to one machine."""

@@ -108,10 +108,10 @@ def links_have_their_length(model: Model, s: State) -> Errors:
     mount = pose[POSITION] + rotation_matrix(pose[QUATERNION]) @ model.parameters["tail_mount"]
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     even = model.parameters["tail_length"] / len(lengths)
-    own = np.array(model.parameters.get("link_lengths", np.full(len(lengths), even)))
+    wanted = np.array(model.parameters.get("link_lengths", np.full(len(lengths), even)))
     return {
         "mount": relative(points[0], mount, points),
-        "lengths": relative(lengths, own, points),
+        "lengths": relative(lengths, wanted, points),
     }
 
 

@@ -60,10 +60,10 @@ def stored_energy_changes_by_its_forces(model: Model, s: State) -> Errors:
 def torques_that_make_up_for_it_rid_a_tail_of_it(model: Model, s: State) -> Errors:
     """With torques that compensate the passive tail, v_dot is that of a tail without it."""
     bare = rid_of(model, PARTS)
-    own = passive_force(model.parameters, s.q[model.layout.tail_q], s.v[model.layout.tail_v])
+    force = passive_force(model.parameters, s.q[model.layout.tail_q], s.v[model.layout.tail_v])
     expected = bare.inverse_dynamics(s.q, s.v, bare.forward_dynamics(s.q, s.v, s.tau))
-    found = bare.inverse_dynamics(s.q, s.v, model.forward_dynamics(s.q, s.v, s.tau + own))
-    scale = np.abs(own).max() + np.abs(expected).max() + np.abs(found).max()
+    found = bare.inverse_dynamics(s.q, s.v, model.forward_dynamics(s.q, s.v, s.tau + force))
+    scale = np.abs(force).max() + np.abs(expected).max() + np.abs(found).max()
     return relative(found, expected, scale)
 
 

@@ -157,16 +157,16 @@ def energy_changes_by_the_power_of_the_torques(model: Model, s: State) -> Errors
 def flight(model: Model, s: State, **settings: Any) -> Trajectory:
     """Fly without torques, links turning at up to 10 rad/s: undamped tails whip, long ones more.
 
-    A model with contacts flies above the ground with its legs held. settings: method and
+    A model with contacts flies above the ground with its legs at rest. settings: method and
     tolerance; without them 2000 steps of RK4.
     """
     q, v = s.q.copy(), 10 / fastest(model, s.v) * s.v
     if model.contacts:
         q[2] += CLEAR
-    held: dict[str, Any] = {"legs": Legs.fixed(0.0, 0.0)} if "feet" in model.contacts else {}
+    legs: dict[str, Any] = {"legs": Legs.fixed(0.0, 0.0)} if "feet" in model.contacts else {}
     span = SWING if model.fixed else FLIGHT
     settings = settings or {"method": "rk4", "step": span / STEPS}
-    motion = simulate(model, q, v, t_span=span, **held, **settings)
+    motion = simulate(model, q, v, t_span=span, **legs, **settings)
     assert isinstance(motion, Trajectory)  # one start, one motion
     return motion
 

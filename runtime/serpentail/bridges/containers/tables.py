@@ -24,20 +24,22 @@ Column = tuple[str, np.ndarray]  # its unit, and its numbers (rows,)
 
 def dataset(motion: Trajectory | Rollouts) -> "xarray.Dataset":
     """Return the dataset; ExtraMissing without xarray."""
-    xarray, found = needed("xarray", "xarray"), contents(motion)
-    coordinates: dict[str, Any] = {name: (name, list(each)) for name, each in found.labels.items()}
-    coordinates["time"] = ("time", found.labels["time"], {"units": "s", "long_name": "time"})
-    if found.groups:
-        coordinates["group"] = ("point", list(found.groups))
+    xarray, content = needed("xarray", "xarray"), contents(motion)
+    coordinates: dict[str, Any] = {
+        name: (name, list(each)) for name, each in content.labels.items()
+    }
+    coordinates["time"] = ("time", content.labels["time"], {"units": "s", "long_name": "time"})
+    if content.groups:
+        coordinates["group"] = ("point", list(content.groups))
     variables = {}
-    for name, quantity in found.quantities.items():
+    for name, quantity in content.quantities.items():
         units = {"units": quantity.unit} if quantity.unit else {}
         attributes = units | {"long_name": quantity.words}
         variables[name] = (quantity.dims, quantity.values, attributes)
         if not isinstance(quantity.units, str):
             last = quantity.dims[-1]
             coordinates[f"{last}_units"] = (last, list(quantity.units))
-    return xarray.Dataset(variables, coordinates, found.facts)
+    return xarray.Dataset(variables, coordinates, content.facts)
 
 
 def write_dataset(motion: Trajectory | Rollouts, path: str | os.PathLike[str]) -> Path:
@@ -57,12 +59,12 @@ def frame(motion: Trajectory | Rollouts) -> "pandas.DataFrame":
 
     ExtraMissing without pandas.
     """
-    pandas, found = needed("pandas", "pandas"), contents(motion)
-    index = pandas.Index(found.labels["time"], name="time")
-    if len(found.leading) > 1:
-        labels = [found.labels[name] for name in found.leading]
-        index = pandas.MultiIndex.from_product(labels, names=list(found.leading))
-    columns = _columns(found)
+    pandas, content = needed("pandas", "pandas"), contents(motion)
+    index = pandas.Index(content.labels["time"], name="time")
+    if len(content.leading) > 1:
+        labels = [content.labels[name] for name in content.leading]
+        index = pandas.MultiIndex.from_product(labels, names=list(content.leading))
+    columns = _columns(content)
     table = pandas.DataFrame({name: rows for name, (_, rows) in columns.items()}, index=index)
     table.attrs["units"] = {"time": "s"} | {name: unit for name, (unit, _) in columns.items()}
     return table
@@ -74,32 +76,32 @@ def write_table(motion: Trajectory | Rollouts, path: str | os.PathLike[str]) -> 
     NotWritten if it cannot be written. Its header has names and units, such as "time [s]"; numbers
     have all their digits.
     """
-    found = contents(motion)
-    columns, heads = _columns(found), {"run": "run", "time": "time [s]"}
-    header = [heads[name] for name in found.leading]
+    content = contents(motion)
+    columns, heads = _columns(content), {"run": "run", "time": "time [s]"}
+    header = [heads[name] for name in content.leading]
     header += [f"{name} [{unit}]" for name, (unit, _) in columns.items()]
-    places = product(*(np.asarray(found.labels[name]).tolist() for name in found.leading))
+    places = product(*(np.asarray(content.labels[name]).tolist() for name in content.leading))
     rows = np.stack([numbers for _, numbers in columns.values()], axis=1)
     lines = ((*place, *row.tolist()) for place, row in zip(places, rows, strict=True))
     return write_csv(path, chain([header], lines))
 
 
-def _columns(found: Contents) -> dict[str, Column]:
+def _columns(content: Contents) -> dict[str, Column]:
     """The columns, by names such as z, tau_alpha_1, forces_tail_1_x.
 
     Values with one number for each run, and none for samples, are left out.
     """
     columns: dict[str, Column] = {}
-    for name, quantity in found.quantities.items():
+    for name, quantity in content.quantities.items():
         if "time" in quantity.dims:
-            columns |= _columns_of(name, quantity, found)
+            columns |= _columns_of(name, quantity, content)
     return columns
 
 
-def _columns_of(name: str, quantity: Quantity, found: Contents) -> dict[str, Column]:
+def _columns_of(name: str, quantity: Quantity, content: Contents) -> dict[str, Column]:
     """The columns of one quantity."""
-    others = quantity.dims[len(found.leading) :]
-    places = list(product(*(found.labels[dim] for dim in others)))
+    others = quantity.dims[len(content.leading) :]
+    places = list(product(*(content.labels[dim] for dim in others)))
     rows = quantity.values.reshape(-1, len(places))
     units = quantity.units
     each = [units] * len(places) if isinstance(units, str) else units

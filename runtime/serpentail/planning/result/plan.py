@@ -14,7 +14,7 @@ from serpentail_scene.layout import TAIL_V
 from ...basics.errors import SimulationError
 from ...model.model import Model
 from ...motion.archive import origin
-from ...motion.text import SI, framed, tail_of
+from ...motion.text import SI, framed
 from ...motion.trajectory import Trajectory
 from ...simulation.controllers import Controller, Damping, TorqueCurve
 from ..flight import flight
@@ -79,7 +79,7 @@ class Plan:
     def __repr__(self) -> str:
         """At most six lines: whether it succeeded, what it costs, and how true it is."""
         told, model = self.report, self.trajectory.model
-        moved = tail_of(model) if model else "without its model"
+        moved = model.tail_words() if model else "without its model"
         ended = "success" if self.success else f"no success ({told['status']})"
         chosen = ", ".join(f"{name} {_digits(x)}" for name, x in self.design.items())
         names = "effort", "energy_J", "peak_power_W", *TRUTH

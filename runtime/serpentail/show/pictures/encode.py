@@ -24,11 +24,11 @@ def encoder() -> str:
         from imageio_ffmpeg import get_ffmpeg_exe
 
         return str(get_ffmpeg_exe())
-    found = shutil.which("ffmpeg")
-    if found is None:
+    program = shutil.which("ffmpeg")
+    if program is None:
         remedy = 'pip install "serpentail[film]", or write a .gif'
         raise ViewError(f"an .mp4 needs ffmpeg, which is not on PATH: {remedy}")
-    return found
+    return program
 
 
 def write_gif(path: Path, pictures: Iterator[Picture]) -> None:
@@ -84,10 +84,10 @@ def _feed(command: list[str], first: Picture, pictures: Iterator[Picture]) -> No
             process.stdin.close()
         except BrokenPipeError:
             pass  # it ended, and says why
-        said = process.stderr.read().decode(errors="replace").split("\n")
+        messages = process.stderr.read().decode(errors="replace").split("\n")
         if process.wait() != 0:
-            told = [line for line in said if line.strip()]
-            raise OSError(f"ffmpeg: {told[-1] if told else process.returncode}")
+            lines = [line for line in messages if line.strip()]
+            raise OSError(f"ffmpeg: {lines[-1] if lines else process.returncode}")
     finally:
         process.kill()
         process.wait()

@@ -21,9 +21,9 @@ from ..page.view import view as write_page
 from .encode import RATE, Picture, encoder, write_gif, write_mp4
 from .filmstrip import VIEWS, filmstrip
 from .frames import drawn_points, window_around
-from .pen import Pen, draw_animal, draw_ground, draw_marks, draw_shadow
+from .pen import Pen, draw_ground, draw_moment
 from .strip import Strip, strip_of
-from .style import INK, METADATA, QUIET, STYLE, Array
+from .style import INK, METADATA, STYLE, Array
 from .views import View, views_of
 
 if TYPE_CHECKING:
@@ -216,10 +216,7 @@ def _draw_frame(
     for axes, view, motion in panels:
         before = set(axes.get_children())
         pen = Pen(axes, strip.films[motion][k], view, np.zeros(3), strip.grounded)
-        draw_shadow(pen)
-        pen.plot(strip.coms[motion][: k + 1], ":", 0.1, color=QUIET, linewidth=1.0)
-        draw_animal(pen)
-        draw_marks(pen)
+        draw_moment(pen, strip.coms[motion][: k + 1])
         added = [artist for artist in axes.get_children() if artist not in before]
         for artist in sorted(added, key=lambda artist: artist.get_zorder()):
             axes.draw_artist(artist)

@@ -12,10 +12,10 @@ from ...model.model import Model
 from ...motion.trajectory import Trajectory
 from ..motions import checked_motions
 from .frames import Frame, drawn_points, window_around
-from .pen import Pen, draw_animal, draw_ground, draw_marks, draw_shadow
+from .pen import Pen, draw_animal, draw_ground, draw_moment
 from .sheet import LEFT, Sheet, sheet_of
 from .strip import Strip, strip_of
-from .style import INK, QUIET, Array, drawn
+from .style import INK, Array, drawn
 from .views import SIDE, View, views_of
 
 if TYPE_CHECKING:
@@ -126,10 +126,7 @@ def _draw_row(
         pen = Pen(axes, frame, view, strip.origin(frame), strip.grounded)
         if strip.grounded:
             draw_ground(axes, view, pen.origin)
-            draw_shadow(pen)
-        pen.plot(strip.coms[which[0]], ":", 0.1, color=QUIET, linewidth=1.0)
-        draw_animal(pen)
-        draw_marks(pen)
+        draw_moment(pen, strip.coms[which[0]])
         if line == 0:
             axes.set_title(_label(k, film), pad=3)
         if x == LEFT:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .frames import Frame, tick
-from .style import FORCE, HEAD, INK, LEG, SHADE, SHADOW, TAIL, TORSO, Array
+from .style import FORCE, HEAD, INK, LEG, QUIET, SHADE, SHADOW, TAIL, TORSO, Array
 from .views import TOP, View
 
 if TYPE_CHECKING:
@@ -143,12 +143,20 @@ def above_ground(frame: Frame) -> Array | None:
     return frame.world(sphere.reshape(-1, 3) * frame.animal.semi_axes)
 
 
+def draw_moment(pen: Pen, path: Array) -> None:
+    """The animal with its marks and shadow, and the path (K, 3) of its centre of mass."""
+    _draw_shadow(pen)
+    pen.plot(path, ":", 0.1, color=QUIET, linewidth=1.0)
+    draw_animal(pen)
+    _draw_marks(pen)
+
+
 def draw_animal(pen: Pen) -> None:
     """Torso, legs, tail with a dot at every point if they are few, and the ground's forces."""
     pen.torso()
     for leg in pen.frame.legs:
         pen.line(leg, color=LEG, linewidth=1.4)
-    draw_tail(pen)
+    _draw_tail(pen)
     count = len(pen.frame.tail)
     if count <= MOST_DOTS:
         size = 2.4 if count <= LARGE_DOTS else 1.2
@@ -156,7 +164,7 @@ def draw_animal(pen: Pen) -> None:
     pen.arrows(pen.frame.arrows)
 
 
-def draw_tail(pen: Pen) -> None:
+def _draw_tail(pen: Pen) -> None:
     """The tail, of one width or as thick as its links are."""
     tail, animal = pen.frame.tail, pen.frame.animal
     if animal.alike:
@@ -167,7 +175,7 @@ def draw_tail(pen: Pen) -> None:
         pen.line(tail[k : k + 2], color=TAIL, linewidth=width)
 
 
-def draw_marks(pen: Pen) -> None:
+def _draw_marks(pen: Pen) -> None:
     """The back's midline and tick, and the head: a dot on the near side, a ring on the far one.
 
     None on a fixed base.
@@ -186,7 +194,7 @@ def draw_marks(pen: Pen) -> None:
     pen.plot(head, "o", 0.8, color=HEAD, markersize=4, markerfacecolor=fill)
 
 
-def draw_shadow(pen: Pen) -> None:
+def _draw_shadow(pen: Pen) -> None:
     """Draw the animal's shadow at noon, in views from above the ground."""
     if not pen.grounded or pen.view.matrix[2, 2] <= 0:
         return

@@ -114,7 +114,7 @@ def _rows(models: list[Model], motions: list[Trajectory], wanted: Any) -> Array:
     """The samples (motions, frames) to draw, those nearest to the times."""
     times = numbers_in(wanted)
     if isinstance(wanted, int | np.integer) and not isinstance(wanted, bool) and wanted > 0:
-        tracks = [(pair[1].t, way(*pair)) for pair in zip(models, motions, strict=True)]
+        tracks = [(pair[1].t, way_of(*pair)) for pair in zip(models, motions, strict=True)]
         times = moments(tracks, int(wanted))
     elif times is None or times.ndim != 1 or not times.size or not np.isfinite(times).all():
         raise refusal("frames", wanted, "a whole number from 1, or times in s", ViewError)
@@ -132,7 +132,7 @@ def largest_force(motions: Iterable[Trajectory], rows: Iterable[Iterable[int]]) 
     return float(max(sizes, default=0.0))
 
 
-def way(model: Model, motion: Trajectory) -> Array:
+def way_of(model: Model, motion: Trajectory) -> Array:
     """How far (K,), m, head, back and tail have gone by each sample, on the average."""
     _, length, height = animal_of(model).semi_axes
     marks, rotations = np.array([[0, length, 0], [0, 0, height]]), rotation_matrix(motion.attitude)
@@ -150,8 +150,8 @@ def moments(tracks: list[tuple[Array, Array]], count: int) -> Array:
     begin, end = max(t[0] for t, _ in tracks), min(t[-1] for t, _ in tracks)
     grid = np.linspace(begin, end, 4001)
     share = np.linspace(0, 1, len(grid))
-    for t, gone in tracks:
-        here = np.interp(grid, t, gone)
-        here -= here[0]
-        share += MOVING * here / (here[-1] or 1.0)
+    for t, way in tracks:
+        passed = np.interp(grid, t, way)
+        passed -= passed[0]
+        share += MOVING * passed / (passed[-1] or 1.0)
     return np.interp(np.linspace(0, share[-1], count), share, grid)
