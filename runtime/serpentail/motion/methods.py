@@ -117,7 +117,7 @@ class Showable:
         """
         from ..show.page.view import view
 
-        return view(self, path, model=model)  # type: ignore[arg-type]
+        return view(self, path, model=model)  # type: ignore[call-overload]
 
     def _repr_html_(self) -> str:
         """Text and page, for notebooks."""

@@ -156,8 +156,9 @@ class Poses:
 
 def poses_of(model: Model, q: Array, angles: Array | None) -> Poses:
     """Return the poses of configurations (K, nq) with angles (K, 4) of the legs, rad."""
-    known = angles is not None and "leg_points" in model.kernels
-    legs = np.asarray(model.leg_points(q, angles)) if known else None
+    legs = None
+    if angles is not None and "leg_points" in model.kernels:
+        legs = np.asarray(model.leg_points(q, angles))
     return Poses(pose_of(q, model.layout), model.tail_points(q), legs)
 
 
