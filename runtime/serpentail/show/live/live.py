@@ -207,12 +207,11 @@ class Live:
 def _meshes() -> dict[str, tuple[Array, Array]]:
     """Vertices and faces of each part's mesh: back and belly are the two sides of one ball."""
     solids = needed("trimesh", "live").creation
-    ball, rod = solids.icosphere(subdivisions=3), solids.cylinder(1.0, 1.0, sections=ROUND)
-    vertices, faces = np.asarray(ball.vertices), np.asarray(ball.faces)
-    above = vertices[faces, 2].mean(axis=1) > np.mean(BELLY)
-    return {
-        "back": (vertices, faces[above]),
-        "belly": (vertices, faces[~above]),
-        **dict.fromkeys(("fur", "eye"), (vertices, faces)),
-        **dict.fromkeys(("tail", "legs"), (np.asarray(rod.vertices), np.asarray(rod.faces))),
-    }
+    ball, rod = (
+        (np.asarray(mesh.vertices), np.asarray(mesh.faces))
+        for mesh in (solids.uv_sphere(), solids.cylinder(1.0, 1.0, sections=ROUND))
+    )
+    vertices, faces = ball
+    above = vertices[faces, 2].mean(axis=1) > np.mean(BELLY)  # whole rings of faces
+    sides = {"back": (vertices, faces[above]), "belly": (vertices, faces[~above])}
+    return sides | {"fur": ball, "eye": ball, "tail": rod, "legs": rod}
