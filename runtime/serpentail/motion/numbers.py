@@ -3,6 +3,7 @@
 Reports, pages and documents all read this one table.
 """
 
+import math
 from collections.abc import Callable, Iterable
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -193,9 +194,25 @@ UNITS = {number.name: number.unit for number in NUMBERS}
 
 
 def numbers_of(model: Model, motion: Trajectory, names: Iterable[str] = UNITS) -> dict[str, Any]:
-    """Return numbers of a motion by name."""
+    """Return numbers of a motion by name, ready for JSON."""
     facts, wanted = Facts(model, motion), set(names)
-    return {number.name: number.of(facts) for number in NUMBERS if number.name in wanted}
+    with np.errstate(over="ignore", invalid="ignore"):  # of a run that blows up
+        return {
+            number.name: finite_json(number.of(facts))
+            for number in NUMBERS
+            if number.name in wanted
+        }
+
+
+def finite_json(value: Any) -> Any:
+    """Return a value for JSON: lists in place of arrays, None for a number that is not finite."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, dict):
+        return {str(name): finite_json(part) for name, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite_json(part) for part in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def explained() -> str:

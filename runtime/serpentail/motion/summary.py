@@ -5,7 +5,6 @@ steps, the error is larger than the motion's own, so the change is an estimate o
 runs do not both hit a number by chance.
 """
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -90,13 +89,13 @@ def summary(model: Model, motion: Trajectory, errors: bool = False) -> Summary:
     docs/simulation.md lists all names, units and meanings. A motion that cannot be made again,
     because it was read from a file, for example, has no errors, and a warning says so.
     """
-    result = Summary(_numbers(model, motion))
+    result = Summary(numbers_of(model, motion))
     if errors:
         again = _made_again(motion)
         if isinstance(again, str):
             result["warnings"] = [*result["warnings"], again]
             return result
-        others = [_numbers(model, other) for other in again]
+        others = [numbers_of(model, other) for other in again]
         result.errors = {
             name: _error(value, [numbers[name] for numbers in others])
             for name, value in result.items()
@@ -104,19 +103,6 @@ def summary(model: Model, motion: Trajectory, errors: bool = False) -> Summary:
         }
         result["warnings"] = [*result["warnings"], *_strays(model, motion, again)]
     return result
-
-
-def _numbers(model: Model, motion: Trajectory) -> dict[str, Any]:
-    """The numbers by name."""
-    with np.errstate(over="ignore", invalid="ignore"):  # of a run that blows up
-        return {name: _ready(value) for name, value in numbers_of(model, motion).items()}
-
-
-def _ready(value: Any) -> Any:
-    """A value for JSON: None for a number that is not finite."""
-    if isinstance(value, dict):
-        return {name: _ready(part) for name, part in value.items()}
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _made_again(motion: Trajectory) -> list[Trajectory] | str:

@@ -1,7 +1,6 @@
 """Runs the points of a sweep on one model: one after another, or flights side by side."""
 
 import json
-import math
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -11,7 +10,7 @@ import numpy as np
 
 from ...basics.errors import SerpentailError, SweepError
 from ...model.model import Model
-from ...motion.numbers import UNITS, numbers_of
+from ...motion.numbers import UNITS, finite_json, numbers_of
 from ...motion.trajectory import Trajectory
 from ...scenes.overrides import changed
 from ...scenes.simulate import Scenario, scenario_of
@@ -203,20 +202,9 @@ def outcome_of(motion: Trajectory, outputs: Sequence[str]) -> dict[str, Any]:
 def as_text(outcome: dict[str, Any]) -> str:
     """Return an outcome as JSON; SweepError if it is not plain data."""
     try:
-        return json.dumps(_ready(outcome), allow_nan=False)
+        return json.dumps(finite_json(outcome), allow_nan=False)
     except (TypeError, ValueError) as reason:
         raise SweepError(f"run: its outcome is not plain data ({reason})") from None
-
-
-def _ready(value: Any) -> Any:
-    """Return a value for JSON: None for a number that is not finite."""
-    if isinstance(value, np.ndarray | np.generic):
-        value = value.tolist()
-    if isinstance(value, dict):
-        return {str(name): _ready(each) for name, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_ready(each) for each in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def error_text(reason: BaseException) -> str:
