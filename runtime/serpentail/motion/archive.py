@@ -29,10 +29,7 @@ def write(
     info: Mapping[str, Any],
     contact: Contact | None,
 ) -> Path:
-    """Write one npz file (suffix added if absent), whole or not at all, and return its path.
-
-    NotWritten if it cannot be written.
-    """
+    """Write one npz file, whole or not at all; return its path. NotWritten if it cannot be."""
     target = _npz(path)
     touching: dict[str, Any] = {}
     if contact is not None:

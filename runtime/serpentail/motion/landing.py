@@ -103,10 +103,7 @@ class Landing:
         } | of_feet
 
     def times(self, kind: str, which: int) -> dict[str, float | None] | None:
-        """Time (s) of each group's event of a kind, by its place: 0 the first, -1 the last one.
-
-        That of a foot is a sample.
-        """
+        """Time (s) of each group's first (0) or last (-1) event of a kind; of a foot by samples."""
         if not self.has_events:
             return None
         times: dict[str, list[float]] = {group: [] for group in self.groups}

@@ -36,10 +36,7 @@ Measure = Callable[[slice], Array]  # samples -> (K,)
 
 
 def warnings_of(model: Model | None, motion: "Trajectory") -> list[str]:
-    """Return the doubts about a motion: what does not balance, then what no animal can do.
-
-    Without a model the latter are those found before the motion was saved or pickled.
-    """
+    """Return all doubts about a motion; without a model, those of when it was saved among them."""
     books: list[str] = motion.info.get("warnings", [])
     impossible = motion.info.get("doubts", []) if model is None else doubts(model, motion)
     return [*books, *impossible]

@@ -20,10 +20,7 @@ Row = tuple[str, ...]  # name, value, error, unit
 def as_text(
     report: Mapping[str, Any], units: Mapping[str, str] = NONE, errors: Mapping[str, Any] = NONE
 ) -> str:
-    """Return a report as lines of name, value, estimated error if there is one, and unit.
-
-    An entry with parts has one line for each.
-    """
+    """Return a report as lines of name, value, estimated error and unit; one line for each part."""
     table = []
     for name, value in report.items():
         table += _rows(name, value, units.get(name, ""), errors.get(name))

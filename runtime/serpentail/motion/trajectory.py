@@ -104,10 +104,7 @@ class Trajectory(Exports, Showable):
 
     @classmethod
     def of_run(cls, arrays: dict[str, Array], model: Model, later: Later) -> Self:
-        """Return a motion of checked arrays t, q, v, tau, which it owns.
-
-        ``later(name)`` computes another field when that is first used.
-        """
+        """Return a motion of checked arrays; ``later(name)`` computes a field that is used."""
         for array in arrays.values():
             array.setflags(write=False)
         return made(cls, arrays | {"model": model}, later)

@@ -89,10 +89,7 @@ class Animal:
 
 
 def animal_of(model: Model) -> Animal:
-    """Return the drawn animal of a model.
-
-    Its torso is that of ``motion.body``, with semi-axes large enough to be seen.
-    """
+    """Return the drawn animal of a model; its semi-axes are large enough to be seen."""
     p, axes = model.parameters, semi_axes(model)
     if model.fixed:
         reach = float(np.linalg.norm(p["tail_mount"]))

@@ -9,14 +9,14 @@ from ..model.model import Model
 from .derivative_laws import slopes
 from .errors import relative, sensitivity
 from .law import PIECEWISE, SLOPE_LIMIT, VALUE_LIMIT, Errors, law
-from .states import State
+from .states import Case
 
 # accelerations are quotients in q_t: differences follow them in smaller steps than sines
 NEARER = 8.0
 
 
 @law("airborne_rates momentum forward_dynamics mass_matrix", VALUE_LIMIT)
-def airborne_rates_are_those_of_the_animal(model: Model, s: State) -> Errors:
+def airborne_rates_are_those_of_the_animal(model: Model, s: Case) -> Errors:
     """With omega of an airborne state the animal has its angular momentum; its tail accelerates as
     q_t_ddot says, relative to cond(H).
     """
@@ -36,14 +36,14 @@ def airborne_rates_are_those_of_the_animal(model: Model, s: State) -> Errors:
     }
 
 
-def direction(s: State) -> np.ndarray:
+def direction(s: Case) -> np.ndarray:
     """Return how (x, tau) moves along the state's directions."""
     turning = quaternion_rate(s.q[QUATERNION], s.dq[OMEGA])
     return np.concatenate([turning, s.dq[TAIL_V], s.dv[TAIL_V], s.dtau])
 
 
 def block_errors(
-    model: Model, s: State, product: np.ndarray, slope: tuple[np.ndarray, np.ndarray], last: str
+    model: Model, s: Case, product: np.ndarray, slope: tuple[np.ndarray, np.ndarray], last: str
 ) -> dict[str, float]:
     """Return the errors of a product against a slope by block, the last one of a name."""
     (change, largest), nt = slope, model.layout.nt
@@ -55,11 +55,11 @@ def block_errors(
 
 
 @law("airborne_rates airborne_rates_derivatives mass_matrix", SLOPE_LIMIT, without=PIECEWISE)
-def airborne_rates_change_by_their_jacobian(model: Model, s: State) -> Errors:
+def airborne_rates_change_by_their_jacobian(model: Model, s: Case) -> Errors:
     """The Jacobian of an airborne state's rates times a direction is their slope along it."""
     y, J = model.airborne_rates_derivatives(s.x, s.tau, s.angular)
 
-    def rates(at: State) -> np.ndarray:
+    def rates(at: Case) -> np.ndarray:
         return model.airborne_rates(at.x, at.tau, s.angular)
 
     product = J.astype(float) @ direction(s)
@@ -70,12 +70,12 @@ def airborne_rates_change_by_their_jacobian(model: Model, s: State) -> Errors:
 @law(
     "airborne_rates_derivatives airborne_rates_hessian mass_matrix", SLOPE_LIMIT, without=PIECEWISE
 )
-def airborne_gradient_changes_by_the_hessian(model: Model, s: State) -> Errors:
+def airborne_gradient_changes_by_the_hessian(model: Model, s: Case) -> Errors:
     """The Hessian of weights^T y times a direction is the slope of weights^T J along it."""
     y, J, H = model.airborne_rates_hessian(s.x, s.tau, s.angular, s.weights)
     same = model.airborne_rates_derivatives(s.x, s.tau, s.angular)
 
-    def gradient(at: State) -> np.ndarray:
+    def gradient(at: Case) -> np.ndarray:
         return s.weights @ model.airborne_rates_derivatives(at.x, at.tau, s.angular)[1]
 
     values = {"values": relative(y, same[0]), "J": relative(J, same[1])}

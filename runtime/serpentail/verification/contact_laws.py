@@ -9,7 +9,7 @@ from serpentail_scene.layout import POSITION, TORSO_NV, VELOCITY
 from ..model.model import Model
 from .errors import relative, sensitivity, worst
 from .law import PIECEWISE, SLOPE_LIMIT, VALUE_LIMIT, Errors, fastest, law, moved, slope
-from .states import State, at_origin, is_fixed
+from .states import Case, at_origin, is_fixed
 
 DEPTH = 3e-3  # m, of the lowest point in the ground
 HEIGHT = 100.0  # m: far from the ground
@@ -30,7 +30,7 @@ def bristles(model: Model) -> np.ndarray:
     return 1e-3 * np.sin(np.arange(2 * sum(model.contacts.values())))
 
 
-def sunk(model: Model, s: State) -> State:
+def sunk(model: Model, s: Case) -> Case:
     """Return the state with its lowest point in the ground."""
     positions, _ = model.contact_points(s.q, s.v, *legs(model))
     return replace(s, q=raised(s.q, -(positions[:, 2].min() + DEPTH)))
@@ -47,14 +47,14 @@ def raised(q: np.ndarray, height: float) -> np.ndarray:
 
 # behind its stops a tail is pushed so much harder than it moves that roundings of that are seen
 @law("pfl forward_dynamics", VALUE_LIMIT, without=PIECEWISE)
-def tail_gets_the_accelerations_that_torques_are_for(model: Model, s: State) -> Errors:
+def tail_gets_the_accelerations_that_torques_are_for(model: Model, s: Case) -> Errors:
     """Torques of partial feedback linearisation give wanted accelerations, relative to cond(H)."""
     v_dot = model.forward_dynamics(s.q, s.v, model.pfl(s.q, s.v, s.accelerations))
     return relative(v_dot[model.layout.tail_v], s.accelerations, v_dot) / sensitivity(model, s.q)
 
 
 @law("tracked_dynamics pfl forward_dynamics", VALUE_LIMIT, without=PIECEWISE)
-def tracking_moves_as_its_torques_do(model: Model, s: State) -> Errors:
+def tracking_moves_as_its_torques_do(model: Model, s: Case) -> Errors:
     """Torques and v_dot of one call equal those of two calls, relative to cond(H)."""
     tau, v_dot = model.kernel("tracked_dynamics")(s.q, s.v, s.accelerations)
     expected = model.forward_dynamics(s.q, s.v, tau)
@@ -66,7 +66,7 @@ def tracking_moves_as_its_torques_do(model: Model, s: State) -> Errors:
 
 
 @law("implicit_factor implicit_solve mass_matrix", VALUE_LIMIT)
-def implicit_steps_solve_their_system(model: Model, s: State) -> Errors:
+def implicit_steps_solve_their_system(model: Model, s: Case) -> Errors:
     """High up, (1 - w J) k = r with J of damping and gains alone, relative to cond(H)."""
     w, damping = 1e-3, np.linspace(1e-3, 2e-3, len(s.tau))
     H = model.mass_matrix(s.q).astype(float)
@@ -87,7 +87,7 @@ def implicit_steps_solve_their_system(model: Model, s: State) -> Errors:
 
 
 def implicit_step(
-    model: Model, s: State, w: float, damping: np.ndarray, gains: np.ndarray
+    model: Model, s: Case, w: float, damping: np.ndarray, gains: np.ndarray
 ) -> list[np.ndarray]:
     """Return k of right-hand sides dq and dv, and of bristles if there are contacts, high up."""
     u = (bristles(model),) if model.contacts else ()
@@ -99,7 +99,7 @@ def implicit_step(
 
 
 @law("contact_points", SLOPE_LIMIT, only="contact")
-def velocities_are_the_rates_of_the_points(model: Model, s: State) -> Errors:
+def velocities_are_the_rates_of_the_points(model: Model, s: Case) -> Errors:
     """Points of feet and tail move as they say; the torso's lowest is one point after another."""
     count = sum(n for name, n in model.contacts.items() if name != "torso")
     s = at_origin(s)
@@ -116,7 +116,7 @@ def velocities_are_the_rates_of_the_points(model: Model, s: State) -> Errors:
 
 
 @law("contact_points", VALUE_LIMIT, only="contact")
-def points_are_carried_by_the_torso(model: Model, s: State) -> Errors:
+def points_are_carried_by_the_torso(model: Model, s: Case) -> Errors:
     """A change of B's position and velocity is added to those of every point."""
     move = np.array([0.5, -0.25, 1.0])
     first = model.contact_points(s.q, s.v, *legs(model))
@@ -128,7 +128,7 @@ def points_are_carried_by_the_torso(model: Model, s: State) -> Errors:
 
 
 @law("leg_points contact_points", VALUE_LIMIT, only="contact")
-def legs_end_in_their_feet(model: Model, s: State) -> Errors:
+def legs_end_in_their_feet(model: Model, s: Case) -> Errors:
     """A, M and T of the legs' joints are the feet's points."""
     joints = model.leg_points(s.q, LEGS[:4])
     feet = model.contact_points(s.q, s.v, *legs(model))[0][:6]
@@ -136,7 +136,7 @@ def legs_end_in_their_feet(model: Model, s: State) -> Errors:
 
 
 @law("leg_points", VALUE_LIMIT, only="contact")
-def legs_have_their_lengths(model: Model, s: State) -> Errors:
+def legs_have_their_lengths(model: Model, s: Case) -> Errors:
     """Hips are as far from B, and each joint from the next, as the parameters say."""
     P, joints = model.parameters, model.leg_points(s.q, LEGS[:4]).astype(float)
     B = np.broadcast_to(s.q[POSITION], (2, 1, 3))
@@ -146,7 +146,7 @@ def legs_have_their_lengths(model: Model, s: State) -> Errors:
 
 
 @law("contact_points contact_dynamics mass_matrix bias_force", VALUE_LIMIT, only="contact")
-def the_ground_accelerates_by_its_generalised_force(model: Model, s: State) -> Errors:
+def the_ground_accelerates_by_its_generalised_force(model: Model, s: Case) -> Errors:
     """H v_dot + C = [0; tau] + J^T f, relative to cond(H).
 
     A column of J is the change of the points' velocities by one entry of v.
@@ -163,7 +163,7 @@ def the_ground_accelerates_by_its_generalised_force(model: Model, s: State) -> E
 
 
 @law("contact_rates contact_points contact_dynamics", VALUE_LIMIT, only="contact")
-def simulations_ask_what_users_do(model: Model, s: State) -> Errors:
+def simulations_ask_what_users_do(model: Model, s: Case) -> Errors:
     """Heights equal those of the points, accelerations and forces those of contact_dynamics.
 
     The ground's power is that of its forces on the moving points.
@@ -188,7 +188,7 @@ def simulations_ask_what_users_do(model: Model, s: State) -> Errors:
 
 
 @law("contact_points contact_dynamics", 8, only="contact")
-def the_ground_never_pulls_nor_holds_by_more_than_friction(model: Model, s: State) -> Errors:
+def the_ground_never_pulls_nor_holds_by_more_than_friction(model: Model, s: Case) -> Errors:
     """f_n is not below 0, and the horizontal force not above mu f_n."""
     s, P = sunk(model, s), model.parameters
     _, _, forces = model.contact_dynamics(s.q, s.v, s.tau, bristles(model), *legs(model))

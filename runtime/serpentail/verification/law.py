@@ -14,7 +14,7 @@ from ..basics.errors import UnusualSize
 from ..model.model import Model
 from ..model.passive import idle
 from .errors import rounding
-from .states import State, is_fixed
+from .states import Case, is_fixed
 
 # limits in roundings (eps of the model's real type)
 VALUE_LIMIT = 450  # 1e-13 in double
@@ -23,7 +23,7 @@ PIECEWISE = ("stops",)  # of the passive tail: their forces have no slopes by wi
 FEW_LINKS = 8  # in a segment: with more of them, rounding grows
 
 Errors = float | dict[str, float]  # one error, or one for each place
-LawFunction = Callable[[Model, State], Errors]
+LawFunction = Callable[[Model, Case], Errors]
 
 
 @dataclass(frozen=True)

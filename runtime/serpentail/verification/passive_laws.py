@@ -10,12 +10,12 @@ from ..model.passive import PARTS, passive_force, stored_energy
 from .contact_laws import implicit_step
 from .errors import relative, rounding, sensitivity
 from .law import PIECEWISE, VALUE_LIMIT, Errors, law, rid_of
-from .states import State
+from .states import Case
 from .value_laws import flight
 
 
 @law("inverse_dynamics", VALUE_LIMIT, only="passive")
-def the_tail_itself_asks_for_torques(model: Model, s: State) -> Errors:
+def the_tail_itself_asks_for_torques(model: Model, s: Case) -> Errors:
     """H v_dot + C has the forces of springs, damping and stops on the tail's coordinates alone."""
     bare = rid_of(model, PARTS)
     force = model.inverse_dynamics(s.q, s.v, s.v_dot).astype(float)
@@ -28,7 +28,7 @@ def the_tail_itself_asks_for_torques(model: Model, s: State) -> Errors:
 
 
 @law("energy", VALUE_LIMIT, only="passive")
-def springs_and_stops_store_potential_energy(model: Model, s: State) -> Errors:
+def springs_and_stops_store_potential_energy(model: Model, s: Case) -> Errors:
     """Potential energy is that of height plus what the tail stores.
 
     Kinetic energy does not change.
@@ -44,7 +44,7 @@ def springs_and_stops_store_potential_energy(model: Model, s: State) -> Errors:
 
 
 @law("energy_derivatives", VALUE_LIMIT, only="passive")
-def stored_energy_changes_by_its_forces(model: Model, s: State) -> Errors:
+def stored_energy_changes_by_its_forces(model: Model, s: Case) -> Errors:
     """The gradient of potential energy has the forces of springs and stops, without damping."""
     bare = rid_of(model, PARTS)
     gradient = model.energy_derivatives(s.q, s.v)[2].astype(float)
@@ -57,7 +57,7 @@ def stored_energy_changes_by_its_forces(model: Model, s: State) -> Errors:
 
 
 @law("forward_dynamics", VALUE_LIMIT, only="passive")
-def torques_that_make_up_for_it_rid_a_tail_of_it(model: Model, s: State) -> Errors:
+def torques_that_make_up_for_it_rid_a_tail_of_it(model: Model, s: Case) -> Errors:
     """With torques that compensate the passive tail, v_dot is that of a tail without it."""
     bare = rid_of(model, PARTS)
     force = passive_force(model.parameters, s.q[model.layout.tail_q], s.v[model.layout.tail_v])
@@ -68,7 +68,7 @@ def torques_that_make_up_for_it_rid_a_tail_of_it(model: Model, s: State) -> Erro
 
 
 @law("rollout energy momentum", 2000, floor=1e-6, only="passive")
-def passive_tails_change_energy_by_their_damping_alone(model: Model, s: State) -> Errors:
+def passive_tails_change_energy_by_their_damping_alone(model: Model, s: Case) -> Errors:
     """In flight, momentum changes by - M g t and energy by the work of the tail's damping; springs
     and stops store energy and give it back. The tail starts between its stops.
     """
@@ -92,7 +92,7 @@ def passive_tails_change_energy_by_their_damping_alone(model: Model, s: State) -
 
 
 @law("implicit_factor implicit_solve mass_matrix", VALUE_LIMIT, only="passive", without=PIECEWISE)
-def implicit_steps_know_the_passive_tail(model: Model, s: State) -> Errors:
+def implicit_steps_know_the_passive_tail(model: Model, s: Case) -> Errors:
     """High up and untracked, (1 - w J) k = r with J of springs and both dampings, relative to
     cond(H).
     """

@@ -55,10 +55,7 @@ def write_dataset(motion: Trajectory | Rollouts, path: str | os.PathLike[str]) -
 
 
 def frame(motion: Trajectory | Rollouts) -> "pandas.DataFrame":
-    """Return the table, its index time or (run, time); ``attrs["units"]`` has the units.
-
-    ExtraMissing without pandas.
-    """
+    """Return the table of pandas, indexed by time or (run, time); ``attrs["units"]``: its units."""
     pandas, content = needed("pandas", "pandas"), contents(motion)
     index = pandas.Index(content.labels["time"], name="time")
     if len(content.leading) > 1:
@@ -87,10 +84,7 @@ def write_table(motion: Trajectory | Rollouts, path: str | os.PathLike[str]) -> 
 
 
 def _columns(content: Contents) -> dict[str, Column]:
-    """The columns, by names such as z, tau_alpha_1, forces_tail_1_x.
-
-    Values with one number for each run, and none for samples, are left out.
-    """
+    """The columns of what is sampled, by names such as z, tau_alpha_1, forces_tail_1_x."""
     columns: dict[str, Column] = {}
     for name, quantity in content.quantities.items():
         if "time" in quantity.dims:
@@ -131,10 +125,7 @@ def checked(path: str) -> Path:
 
 
 def save(motion: Trajectory, path: str) -> Path:
-    """Write a motion to a file of the kind that its suffix names; return the path.
-
-    Raises as ``checked``, and NotWritten if it cannot be written.
-    """
+    """Write a motion to a file as its suffix says; raise as ``checked``, and NotWritten."""
     target = checked(path)
     written: Path = getattr(motion, WRITERS[target.suffix])(target)
     return written

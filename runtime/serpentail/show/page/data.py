@@ -134,10 +134,7 @@ def _events(motion: Trajectory, prefix: str) -> list[dict[str, Any]]:
 def _plots(
     names: Sequence[str], motions: Sequence[Trajectory], weight: float
 ) -> list[dict[str, Any]]:
-    """The plots: title, curves of all runs, and the least span of the axis.
-
-    For forces also the weight (N) where the scale changes.
-    """
+    """The plots: title, curves of all runs, least span; the weight (N) where forces are scaled."""
     plots = []
     for array, title in TITLES.items():
         curves = []

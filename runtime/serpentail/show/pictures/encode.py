@@ -46,10 +46,7 @@ def write_gif(path: Path, pictures: Iterator[Picture]) -> None:
 
 
 def palette() -> list[int]:
-    """Return the colours of a film and of the edges between them, as red, green and blue.
-
-    They are the same for all frames, so that only what moves is stored.
-    """
+    """Return red, green, blue of all colours and their edges, the same in all frames."""
     from matplotlib.colors import to_rgb
 
     ink = np.array([to_rgb(colour) for colour in (INK, QUIET, TAIL, HEAD, LEG, FORCE, SHADOW)])

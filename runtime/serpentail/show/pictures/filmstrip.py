@@ -95,10 +95,7 @@ def _draw(strip: Strip) -> tuple["Figure", np.ndarray]:
 
 
 def _path_aspect(strip: Strip) -> float | None:
-    """Return width over height of the panel of the path.
-
-    None if the centre of mass moves less than half a torso, or if there are several motions.
-    """
+    """Width over height of the path's panel; None for several motions, or one that hardly moves."""
     still = np.ptp(strip.coms[0][:, 1:], axis=0).max() < max(strip.every[0].animal.semi_axes)
     if len(strip.films) > 1 or still:
         return None

@@ -59,10 +59,7 @@ class Frame:
 
 
 def silhouette(rotation: Array, semi_axes: ArrayLike, view: View, count: int = 121) -> Array:
-    """Outline (count, 2), m, about the centre, of an ellipsoid rotated by R.
-
-    It is the ellipse P R diag(a^2) R^T P^T.
-    """
+    """Outline (count, 2), m, of an ellipsoid rotated by R: the ellipse P R diag(a^2) R^T P^T."""
     spread = view.matrix[:2] @ rotation * np.asarray(semi_axes, dtype=float)
     angle = np.linspace(0, 2 * np.pi, count)
     circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)

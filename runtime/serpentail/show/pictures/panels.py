@@ -65,10 +65,7 @@ def tilt(motion: Trajectory, model: Model | None) -> Panel:
 
 
 def tail(motion: Trajectory, model: Model | None) -> Panel:
-    """Bends of the segments, for articulated ones the sum of their links' angles.
-
-    Tail coordinates if no model is known.
-    """
+    """Bends of the segments: of links the sum of their angles; without a model coordinates."""
     names, styles, order = of_segments(motion)
     if model is None:
         label, angles = "tail coord.\n[deg]", motion.tail

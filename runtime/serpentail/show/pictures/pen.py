@@ -73,10 +73,7 @@ class Pen:
             self.fill(flat[ConvexHull(flat).vertices], 0.41, **look)
 
     def line(self, corners: Array, **look: Any) -> None:
-        """Draw a line below the torso, and again above it where the torso cannot hide it.
-
-        The latter part has a white rim, to show that it passes in front.
-        """
+        """Draw a line below the torso, and, where it passes in front, above it with a white rim."""
         fine = np.linspace(0, len(corners) - 1, 16 * (len(corners) - 1) + 1)
         world = np.stack([np.interp(fine, np.arange(len(corners)), c) for c in corners.T], axis=1)
         above, below = self.parted(world)
@@ -110,10 +107,7 @@ class Pen:
         )
 
     def parted(self, world: Array) -> tuple[Array, Array | None]:
-        """Return world points above the ground and below it, nan elsewhere.
-
-        None if there are none.
-        """
+        """World points above the ground and below it, nan elsewhere; None if none is below."""
         below = world[:, 2:] < 0
         if not self.grounded or not below.any():
             return world, None
@@ -176,10 +170,7 @@ def _draw_tail(pen: Pen) -> None:
 
 
 def _draw_marks(pen: Pen) -> None:
-    """The back's midline and tick, and the head: a dot on the near side, a ring on the far one.
-
-    None on a fixed base.
-    """
+    """The back's midline and tick, and the head: a dot on the near side, a ring on the far one."""
     if pen.frame.animal.fixed:
         return
     _, length, height = pen.frame.animal.semi_axes
@@ -204,10 +195,7 @@ def _draw_shadow(pen: Pen) -> None:
 
 
 def draw_ground(axes: "Axes", view: View, origin: Array) -> None:
-    """The ground z = 0 that the axes' limits have in them, from aside a line over a shaded half.
-
-    In views from above it is a grid.
-    """
+    """The ground z = 0: from aside a line over a shaded half, from above a grid."""
     (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
     height = -view.of(origin)[1]
     if view.matrix[2, 2] < EDGE_ON:

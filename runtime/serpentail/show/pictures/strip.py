@@ -143,10 +143,7 @@ def way_of(model: Model, motion: Trajectory) -> Array:
 
 
 def moments(tracks: list[tuple[Array, Array]], count: int) -> Array:
-    """Return times (s), at most ``count``, between which motions change equally.
-
-    tracks: times and paths of each motion; the moments are in the span that all have.
-    """
+    """Return times (s), at most ``count``, between which the motions (times, ways) change alike."""
     begin, end = max(t[0] for t, _ in tracks), min(t[-1] for t, _ in tracks)
     grid = np.linspace(begin, end, 4001)
     share = np.linspace(0, 1, len(grid))
