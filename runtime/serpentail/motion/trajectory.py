@@ -193,7 +193,7 @@ class Trajectory(Exports, Showable):
             The file cannot be written.
         """
         arrays = {name: getattr(self, name) for name in ARRAYS}
-        return archive.write(path, arrays, self._told(), self.contact)
+        return archive.write(path, arrays, self._info_with_doubts(), self.contact)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
@@ -220,12 +220,12 @@ class Trajectory(Exports, Showable):
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave out the model, whose compiled code belongs to one machine."""
-        return settled(self, DERIVED) | {"model": None, "info": self._told()}
+        return settled(self, DERIVED) | {"model": None, "info": self._info_with_doubts()}
 
-    def _told(self) -> dict[str, Any]:
+    def _info_with_doubts(self) -> dict[str, Any]:
         """Return info with the doubts that only the model can find."""
-        found = [] if self.model is None else doubts(self.model, self)
-        return self.info | {"doubts": found} if found else self.info
+        sentences = [] if self.model is None else doubts(self.model, self)
+        return self.info | {"doubts": sentences} if sentences else self.info
 
     def resample(self, t: ArrayLike) -> Self:
         """Return the motion at other times, by interpolation.
