@@ -45,7 +45,7 @@ _HOME = {
     **dict.fromkeys(["fisher_information", "Information"], "identification.design"),
     "film": "show.pictures.film",
     "filmstrip": "show.pictures.filmstrip",
-    "leg_joints": "show.pictures.skeleton",
+    "leg_joints": "show.animal",
     "plot": "show.pictures.plot",
     "view": "show.page.view",
     "live": "show.live.live",

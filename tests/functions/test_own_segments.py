@@ -7,7 +7,7 @@ import pytest
 
 import serpentail as st
 from serpentail.bridges.containers.contents import contents
-from serpentail.show.page.shape import shape
+from serpentail.show.animal import animal_of
 from serpentail.verification.report import laws
 from serpentail_codegen.functions.differentiable import FUNCTIONS
 from serpentail_codegen.functions.draft import Draft
@@ -108,7 +108,7 @@ def test_models_tell_their_kinds():
     assert "an arc, 2 links, an arc, 3 links" in repr(model)
     assert model.parameters["tail_mass"] == pytest.approx(1.5e-3 + 9e-4 + 1.1e-3 + 1.5e-3)
     assert model.parameters["tail_length"] == pytest.approx(0.06 + 0.055 + 0.09 + 0.06)
-    radii = np.array(shape(model)["tail_radii"])
+    radii = np.array(animal_of(model).tail_radii)
     assert len(radii) == 3 + 2 + 3 + 3
     arcs = np.sqrt(np.array([1.5e-3 / 0.06, 1.1e-3 / 0.09]) / 1e3 / np.pi)
     np.testing.assert_allclose(radii[:3], arcs[0])

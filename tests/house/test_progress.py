@@ -189,7 +189,7 @@ def test_what_the_package_gives_fills_no_screen_and_says_what_it_is_and_how_it_e
     failed = flown(3, parameters={"gravity": [90.0, 90.0, 9.8]}, controller=tired)
     warned = dataclasses.replace(motion, info=motion.info | {"warnings": ["word " * 99, "b"]})
     report = plan.report | {"status": "Infeasible", "effort": None}
-    tails = "articulated, 1 x 3 links.*51 samples, 0 to 0.05 s.*by points: 6 of the feet; 0 events"
+    tails = "1 x 3 links.*51 samples, 0 to 0.05 s.*by points: 6 of the feet; 0 events"
     for thing, words in [
         (motion, rf"{tails}.*\n  by switching: .*steps"),
         (motion.contact, "forces=array of 51 x 6 x 3"),

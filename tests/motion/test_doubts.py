@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import serpentail as st
-from serpentail.motion.tail_in_torso import sunk
+from serpentail.motion.plausibility import sunk
 from tests.references import contact as reference
 from tests.support import zoo
 from tests.support.rows import row

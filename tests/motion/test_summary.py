@@ -9,7 +9,7 @@ import pytest
 
 import serpentail as st
 from serpentail.motion import numbers
-from serpentail.motion.table import as_text, as_word
+from serpentail.motion.text import as_text, as_word
 from tests.support import zoo
 
 from .conftest import at_height, made, scene_of, told

@@ -7,7 +7,7 @@ import pytest
 
 import serpentail as st
 from serpentail.scenes.plan import plan_arguments
-from serpentail.show.pictures.skeleton import leg_joints
+from serpentail.show.animal import leg_joints
 from serpentail_codegen.scene.parse import load_scene
 from tests.support import zoo
 from tests.support.models import folder_of

@@ -117,5 +117,5 @@ def test_motions_have_a_tail_alone(tmp_path):
     assert told["body_weight_N"] == pytest.approx(9.8 * MASS) and "on a fixed base" in repr(run)
     assert contents(run).labels["coordinate"] == ["alpha_1", "beta_1", "alpha_2", "beta_2"]
     drawn = frames(chain(), run, [0], 0.0)[0]
-    assert not drawn.body.marked
-    assert drawn.body.semi_axes == pytest.approx([np.linalg.norm(TABLE_1["tail_mount"])] * 3)
+    assert drawn.animal.fixed
+    assert drawn.animal.semi_axes == pytest.approx([np.linalg.norm(TABLE_1["tail_mount"])] * 3)

@@ -48,7 +48,7 @@ class Drawn:
         return np.full(self.segments, self.links or 1)
 
     def tail_points(self, q):
-        return tail_points(q, self.links)[:, 1:]
+        return tail_points(q, self.links)
 
 
 def flight(speed=SPEEDS["up"], segments=2, samples=59):

@@ -20,7 +20,7 @@ from serpentail.model.passive import PARTS
 from serpentail.verification.errors import block_error, differences, matrix_error
 from serpentail.verification.law import VALUE_LIMIT, Law, rid_of
 from serpentail.verification.report import Check, as_short_text, as_text, check, laws, summary
-from serpentail.verification.states import State, arguments, outputs, states
+from serpentail.verification.states import Case, arguments, outputs, states
 from serpentail_codegen.functions.catalogue import CATALOGUE, function_of
 from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.ir.interpret import Numbers, Run
@@ -67,8 +67,8 @@ class Reference:
         return chain(parameters(model), *sizes)
 
     def rows(
-        self, model: st.Model, cases: list[State]
-    ) -> Iterator[tuple[str, str, list[State], float]]:
+        self, model: st.Model, cases: list[Case]
+    ) -> Iterator[tuple[str, str, list[Case], float]]:
         """Yield title, function, states and limit (in roundings) of every comparison."""
         # libraries are off by 6e-13 for 48 links, folded, by 9e-12 for 128
         long = 2 * model.segments * (model.links or 1)
@@ -132,7 +132,7 @@ def interpreted(model: st.Model, name: str) -> Callable:
     scene = parse_scene(model.manifest["scene"], model.name)
     assembled = cache(lambda: assemble(function_of(name, tail_of(scene)), tail_of(scene)))
 
-    def error(model: st.Model, s: State) -> float:
+    def error(model: st.Model, s: Case) -> float:
         arrays = assembled().of_role("input")
         inputs = {a.name: getattr(s, a.name).tolist() for a in arrays}
         inputs |= {key: np.ravel(value).tolist() for key, value in parameters(model).items()}
@@ -156,7 +156,7 @@ def parameters(model: st.Model) -> dict:
 # References: other derivations of the same tail
 
 
-def reference_checks(reference: Reference, model: st.Model, cases: list[State]) -> list[Check]:
+def reference_checks(reference: Reference, model: st.Model, cases: list[Case]) -> list[Check]:
     """Return a check of every quantity that a reference computes; none for another kind of tail."""
     title, checks = reference.title, []
     text = f"The model agrees with {title}, v_dot relative to cond(H)."
@@ -175,7 +175,7 @@ def reference_checks(reference: Reference, model: st.Model, cases: list[State]) 
 def agreement(chain, name: str) -> Callable:
     """Return the law's error: a function of the model against the same of a chain."""
 
-    def error(model: st.Model, s: State) -> float:
+    def error(model: st.Model, s: Case) -> float:
         results = getattr(chain, name)(*arguments(model, name, s))
         return differences(model, name, s, results if isinstance(results, tuple) else (results,))
 
@@ -185,7 +185,7 @@ def agreement(chain, name: str) -> Callable:
 # Equal segments: 2 m segments of n links that bend alike are m segments of 2 n
 
 
-def split_check(model: st.Model, cases: list[State], parent: Path) -> Check:
+def split_check(model: st.Model, cases: list[Case], parent: Path) -> Check:
     """Return whether H and C depend on how equal joints are counted, by a model made for this."""
     name = "halves of segments"
     text = (
@@ -207,7 +207,7 @@ def split_check(model: st.Model, cases: list[State], parent: Path) -> Check:
     partner = st.load(parent / "partner")
     whole, halves = (model, partner) if partner.segments > model.segments else (partner, model)
 
-    def error(_model: st.Model, s: State) -> dict[str, float]:
+    def error(_model: st.Model, s: Case) -> dict[str, float]:
         return split_errors(whole, halves, s)
 
     return check(Law(name, text, error, units=VALUE_LIMIT), model, cases)
@@ -221,7 +221,7 @@ def partner_sizes(model: st.Model) -> tuple[int, int] | None:
     return (segments // 2, 2 * links) if segments % 2 == 0 else (2 * segments, links // 2)
 
 
-def split_errors(whole: st.Model, halves: st.Model, s: State) -> dict[str, float]:
+def split_errors(whole: st.Model, halves: st.Model, s: Case) -> dict[str, float]:
     """Return the errors of H and C at the state of the whole that the state begins with."""
     q, v = s.q[: whole.nq], s.v[: whole.nv]
     G = np.kron(np.eye(whole.segments), np.vstack([np.eye(2), np.eye(2)]))

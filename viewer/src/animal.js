@@ -34,7 +34,7 @@ export class Animal {
     Object.assign(this, { run, k, alone, scale, group: new Group() });
     const look = k === 0 ? {} : ghost(k);
     const lambert = () => new MeshLambertMaterial(look);
-    this.torso = new Torso(run.body.semi_axes, look);
+    this.torso = new Torso(run.body, look);
     this.materials = { tail: lambert(), joint: lambert(), leg: lambert(), force: lambert() };
 
     const links = Math.max(run.points - 1, 0);
@@ -128,14 +128,14 @@ export class Animal {
       this.run.point("tail", row, j, from);
       this.run.point("tail", row, j + 1, to);
       this.tail.place(j, from, to, radius);
-      this.joints.place(j, body.jointed ? from : to, body.jointed ? 1.25 * radius : radius);
+      this.joints.place(j, body.jointed ? from : to, body.joint * radius);
     }
     this.tail.placed();
     this.joints.placed();
   }
 
   showLegs(row) {
-    const radius = 0.085 * this.run.body.semi_axes[2];
+    const radius = this.run.body.leg_radius;
     for (let leg = 0; leg < this.run.legs; leg++) {
       for (let j = 0; j < LEG; j++) {
         this.run.point("legs", row, LEG * leg + j, to);

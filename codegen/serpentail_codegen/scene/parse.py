@@ -8,6 +8,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from serpentail_scene.layout import GROUPS
 from serpentail_scene.signatures.table import (
     ALL,
     DEFAULT,
@@ -40,7 +41,6 @@ from .problems import Problem, SceneError
 from .resolve import resolve_parameters
 from .scene import (
     CONTACTS,
-    GROUPS,
     KEYS,
     MOST_LINKS,
     ONLY,

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from serpentail_scene.layout import GROUPS
 from serpentail_scene.signatures.table import DEFAULT
 
 from .parameters import ANY, PARAMETERS, Parameters, Rule
@@ -13,7 +14,6 @@ from .passive import PASSIVE_NAMES, parts_of
 from .variant import EQUAL, Shape
 
 KINDS = ("articulated", "continuum", "mixed")
-GROUPS = ("feet", "tail", "torso")  # of contact points, in their order
 FRICTION = ("cone", "box", "smooth", "paper")
 BASES = ("free", "fixed")  # of the tail: a torso that moves, or one that never does
 TARGETS = ("c", "casadi")  # languages to emit, in their order

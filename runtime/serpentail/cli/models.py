@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..motion.table import as_text
+from ..motion.text import as_text
 from .outcome import VerbOutcome
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..basics.errors import SimulationError, SweepError
-from ..motion.table import as_text
+from ..motion.text import as_text
 from .outcome import Files, VerbOutcome
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ LATER = ("executor", "retry_failed", "limit")  # arguments of a sweep that runs
 
 def plan(arguments: argparse.Namespace) -> VerbOutcome:
     """Return the report of a scene's plan, and whether it converged."""
-    from ..bridges.containers.files import save
+    from ..bridges.containers.tables import save
     from ..scenes import plan as scenes
 
     plan = scenes.planned(arguments.scene, arguments.folder)
@@ -29,7 +29,7 @@ def plan(arguments: argparse.Namespace) -> VerbOutcome:
 
 def simulate(arguments: argparse.Namespace) -> VerbOutcome:
     """Return the report of a scene's motion."""
-    from ..bridges.containers.files import save
+    from ..bridges.containers.tables import save
     from ..motion.numbers import UNITS
     from ..scenes.overrides import parsed
     from ..scenes.simulate import scenario
@@ -47,7 +47,7 @@ def simulate(arguments: argparse.Namespace) -> VerbOutcome:
 
 def identify(arguments: argparse.Namespace) -> VerbOutcome:
     """Return parameters, motion and torques that marker tracks show, and whether that converged."""
-    from ..bridges.containers.files import save
+    from ..bridges.containers.tables import save
     from ..scenes.identify import identified
 
     found = identified(arguments.scene, arguments.data, arguments.folder)
@@ -89,10 +89,10 @@ def _motion(scene: "Scenario", page: str | None) -> tuple["Trajectory", dict[str
 
 def view(arguments: argparse.Namespace) -> VerbOutcome:
     """Write the page of saved motions, and return its path."""
-    from ..show.page.saved import read
+    from ..show.motions import saved_motion
     from ..show.page.view import view as page_of
 
-    motions = [read(file, arguments.folder) for file in arguments.files]
+    motions = [saved_motion(file, arguments.folder) for file in arguments.files]
     names = list(arguments.files) if len(motions) > 1 else None
     path = arguments.output or Path(arguments.files[0]).with_suffix(".html")
     page = page_of(motions, path, names=names)

@@ -63,7 +63,7 @@ def target(option: str, path: str) -> Path:
         from ..show.page.view import checked_path
 
         return checked_path(path)
-    from ..bridges.containers.files import checked
+    from ..bridges.containers.tables import checked
 
     return checked(path)
 

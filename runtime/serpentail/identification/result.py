@@ -13,8 +13,8 @@ from ..basics.checks import refusal
 from ..basics.errors import IdentificationError
 from ..basics.short_repr import brief
 from ..model.model import Model
-from ..motion.origin import origin
-from ..motion.table import as_text
+from ..motion.archive import origin
+from ..motion.text import as_text
 from ..motion.trajectory import Trajectory
 from .certainty import Combination
 from .placement import Placements

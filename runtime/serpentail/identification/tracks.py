@@ -16,7 +16,7 @@ from serpentail_scene.units import MEASURES, plain
 from ..basics.checks import finite_array, needed, one_of, real_array, refusal, shown
 from ..basics.errors import IdentificationError, UnusualSize
 from ..basics.plausible_values import LARGEST
-from ..motion.account import framed
+from ..motion.text import framed
 
 UNITS: dict[str, Fraction] = MEASURES["m"][1]
 ZEROS = ("refuse", "gap")

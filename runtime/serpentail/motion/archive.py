@@ -1,18 +1,24 @@
-"""Files of motions: arrays in one npz, which is read only if every checksum is right."""
+"""Files of motions, and what a motion says of the model that made it.
+
+A file is one npz of arrays, which is read only if every checksum is right.
+"""
 
 import json
 import os
 import zipfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TypeVar
 
 import numpy as np
 
 from ..basics.files import replacing
+from ..model.model import Model
+from ..model.parameters import json_ready
 from .contact import Contact
 
 SUFFIX = ".npz"
+T = TypeVar("T")
 CONTACT = "contact_"  # before the names of a contact's arrays in a file
 MOST_EXPANSION = 100  # times the file: ours is not compressed, a motion in one that is fits, too
 
@@ -23,10 +29,7 @@ def write(
     info: Mapping[str, Any],
     contact: Contact | None,
 ) -> Path:
-    """Write one npz file (suffix added if absent), whole or not at all, and return its path.
-
-    NotWritten if it cannot be written.
-    """
+    """Write one npz file, whole or not at all; return its path. NotWritten if it cannot be."""
     target = _npz(path)
     touching: dict[str, Any] = {}
     if contact is not None:
@@ -37,8 +40,8 @@ def write(
     return target
 
 
-def read(path: str | os.PathLike[str], arrays: Iterable[str]) -> tuple[Path, dict[str, Any]]:
-    """Return the path of a file, and its arrays, info and contact.
+def read(path: str | os.PathLike[str], arrays: Iterable[str], kind: type[T]) -> T:
+    """Return the trajectory of a file, made by its class.
 
     FileNotFoundError if it is absent, ValueError if it is not a trajectory.
     """
@@ -49,7 +52,7 @@ def read(path: str | os.PathLike[str], arrays: Iterable[str]) -> tuple[Path, dic
         )
     fields = _stored(source, arrays)
     try:
-        return source, _parsed(fields)
+        return kind(**_parsed(fields))
     except (KeyError, RecursionError, TypeError, ValueError) as error:
         raise ValueError(f"{str(source)!r} does not hold a valid trajectory: {error}") from error
 
@@ -101,3 +104,13 @@ def _parsed(fields: dict[str, Any]) -> dict[str, Any]:
         groups = json.loads(str(touching.pop("groups")))
         arguments["contact"] = Contact(**touching, groups=groups)
     return arguments | {"info": json.loads(str(fields["info"]))}
+
+
+def origin(model: Model) -> dict[str, Any]:
+    """Return name, hashes and parameters of a model, ready for JSON."""
+    return {
+        "model": model.name,
+        "content_hash": model.manifest["content_hash"],
+        "manifest_hash": model.checked.manifest_hash,
+        "parameters": json_ready(model.parameters),
+    }

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from serpentail_scene.layout import GROUPS
+
 from ..basics.checks import shown
 from ..basics.short_repr import brief
 
@@ -115,5 +117,4 @@ class Contact:
         return replace(self, **changed)
 
 
-GROUPS = ("feet", "tail", "torso")
 OF_POINTS = ("points", "forces", "bristles")

@@ -25,10 +25,7 @@ def settled(motion: Any, names: Iterable[str]) -> dict[str, Any]:
 
 
 class Derived:
-    """A field that its motion derives once and keeps, unless it was given.
-
-    If threads race, the first one's values stay.
-    """
+    """A field that its motion derives once and keeps: if threads race, the first one's values."""
 
     def __init__(self, name: str):
         self.name = name

@@ -23,9 +23,9 @@ def joined(parts: Sequence[Trajectory]) -> Trajectory:
     }
     contact = parts[0].contact
     if contact is not None:
-        own = [part.contact.arrays for part in parts if part.contact]
+        contacts = [part.contact.arrays for part in parts if part.contact]
         points: dict[str, Any] = {
-            name: _end_to_end([each[name] for each in own]) for name in contact.arrays
+            name: _end_to_end([each[name] for each in contacts]) for name in contact.arrays
         }
         contact = replace(contact, **points)
     return replace(parts[0], **arrays, info=_info([part.info for part in parts]), contact=contact)
@@ -64,10 +64,10 @@ def _info(parts: Sequence[dict[str, Any]]) -> dict[str, Any]:
             info[name] = {
                 of: np.sum([part[name][of] for part in parts], axis=0).tolist() for of in info[name]
             }
-        found = [part["imbalance"] for part in parts]
+        books = [part["imbalance"] for part in parts]
         info["imbalance"] = {
-            "energy_J": sum(each["energy_J"] for each in found),
-            "momentum_N_s": np.sum([each["momentum_N_s"] for each in found], axis=0).tolist(),
-            "relative": max(each["relative"] for each in found),
+            "energy_J": sum(each["energy_J"] for each in books),
+            "momentum_N_s": np.sum([each["momentum_N_s"] for each in books], axis=0).tolist(),
+            "relative": max(each["relative"] for each in books),
         }
     return info

@@ -3,16 +3,18 @@
 The landing is the touch-down that ends the flight about the apex, the highest point of B.
 """
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from serpentail_scene.layout import QUATERNION, VELOCITY
 
 from ..basics.attitude import Array, rotation_matrix
 from ..model.model import Model
 from .body import weight
-from .feet import feet_times, feet_touching
+from .ground import feet
 from .trajectory import Trajectory
 
 # standing is: upright, at rest, its weight on the feet
@@ -21,163 +23,155 @@ MAX_SPEED = 0.05  # m/s, of B
 MIN_SHARE = 0.5  # of the weight
 
 ROUNDING = 1e-6  # relative, of times that a float model counts
-Spans = list[tuple[float, float]]
+Span = tuple[float, float]
 
 
-def knows_events(motion: Trajectory) -> bool:
-    """Tell whether the motion is on the ground and its events were detected."""
-    return motion.contact is not None and "events" in motion.info
+class Landing:
+    """Touches, flight and landing of a motion.
 
+    What does not exist is None: in flight, without events (of methods that detect none), without
+    feet, or if it does not land.
+    """
 
-def flight(motion: Trajectory) -> tuple[float | None, float | None]:
-    """Times (s) at which the flight about the apex begins and ends; None: not in the motion."""
-    if not knows_events(motion):
+    def __init__(self, model: Model, motion: Trajectory):
+        self.model, self.motion = model, motion
+        self.groups = list(motion.contact.groups) if motion.contact else []
+        self.has_events = motion.contact is not None and "events" in motion.info
+
+    @cached_property
+    def events(self) -> list[dict[str, Any]]:
+        """The events within the samples; a resampled motion may have only some of them."""
+        if not self.has_events:
+            return []
+        t = self.motion.t
+        slack = ROUNDING * max(abs(t[0]), abs(t[-1]))
+        return [e for e in self.motion.events if t[0] - slack <= e["time"] <= t[-1] + slack]
+
+    @cached_property
+    def flight(self) -> tuple[float | None, float | None]:
+        """Times (s) at which the flight about the apex begins and ends; None: not in the motion."""
+        apex = self.motion.t[self.motion.q[:, 2].argmax()]
+        for begin, end in self._airborne() if self.has_events else ():
+            if begin <= apex and (end is None or apex <= end):
+                return (None if begin == -np.inf else begin), end
         return None, None
-    apex = motion.t[motion.q[:, 2].argmax()]
-    for begin, end in airborne(motion):
-        if begin <= apex and (end is None or apex <= end):
-            return (None if begin == -np.inf else begin), end
-    return None, None
 
+    def _airborne(self) -> list[tuple[float, float | None]]:
+        """Spans in which nothing touches the ground; -inf or None if they exceed the motion."""
+        touching = self._touching_first()
+        begin: float | None = None if touching else -np.inf
+        spans: list[tuple[float, float | None]] = []
+        for event in self.events:
+            # the last group to leave the ground begins a flight, the first to return ends it
+            if event["kind"] == "take_off":
+                touching.discard(event["group"])
+                begin = None if touching else event["time"]
+            else:
+                touching.add(event["group"])
+                if begin is not None:
+                    spans.append((begin, event["time"]))
+                begin = None
+        return spans if begin is None else [*spans, (begin, None)]
 
-def events(motion: Trajectory) -> list[dict[str, Any]]:
-    """Return the events within the samples; a resampled motion may have only some of them."""
-    slack = ROUNDING * max(abs(motion.t[0]), abs(motion.t[-1]))
-    begin, end = motion.t[0] - slack, motion.t[-1] + slack
-    return [event for event in motion.events if begin <= event["time"] <= end]
+    def _touching_first(self) -> set[str]:
+        """The groups that the ground pushes at the first sample."""
+        contact = self.motion.contact
+        assert contact is not None
+        return {name for name in self.groups if (contact.of(name).forces[0, :, 2] > 0).any()}
 
+    def touching_time(self) -> dict[str, float] | None:
+        """For how long (s) each group, and each foot by the samples, touches the ground in all."""
+        if not self.has_events:
+            return None
+        first, last = self.motion.t[[0, -1]].tolist()
+        begun = dict.fromkeys(self._touching_first(), first)
+        spans: dict[str, list[Span]] = {group: [] for group in self.groups}
+        for event in self.events:
+            group, time = event["group"], event["time"]
+            if event["kind"] == "touch_down":
+                begun[group] = time
+            else:
+                spans[group].append((begun.pop(group, first), time))
+        for group, begin in begun.items():
+            spans[group].append((begin, max(begin, last)))
 
-def airborne(motion: Trajectory) -> list[tuple[float, float | None]]:
-    """Return spans in which nothing touches the ground; -inf or None if they exceed the motion."""
-    touching = _touching_first(motion)
-    begin: float | None = None if touching else -np.inf
-    spans: list[tuple[float, float | None]] = []
-    for event in events(motion):
-        # the last group to leave the ground begins a flight, the first to return ends it
-        if event["kind"] == "take_off":
-            touching.discard(event["group"])
-            begin = None if touching else event["time"]
-        else:
-            touching.add(event["group"])
-            if begin is not None:
-                spans.append((begin, event["time"]))
-            begin = None
-    if begin is not None:
-        spans.append((begin, None))
-    return spans
+        # intervals of a foot begin with a force
+        steps = np.diff(self.motion.t)
+        of_feet = {name: float(steps @ pushed[:-1]) for name, pushed in self._feet_pushed().items()}
+        return {
+            group: float(sum(b - a for a, b in each)) for group, each in spans.items()
+        } | of_feet
 
+    def times(self, kind: str, which: int) -> dict[str, float | None] | None:
+        """Time (s) of each group's first (0) or last (-1) event of a kind; of a foot by samples."""
+        if not self.has_events:
+            return None
+        times: dict[str, list[float]] = {group: [] for group in self.groups}
+        for event in self.events:
+            if event["kind"] == kind:
+                times[event["group"]].append(event["time"])
+        sign = 1 if kind == "touch_down" else -1
+        for name, pushed in self._feet_pushed().items():
+            times[name] = self.motion.t[1:][np.diff(pushed.astype(int)) == sign].tolist()
+        return {name: each[which] if each else None for name, each in times.items()}
 
-def touches(motion: Trajectory) -> dict[str, Spans] | None:
-    """Return spans (s) in which each group touches the ground; None if no events were detected."""
-    if not knows_events(motion):
+    def _feet_pushed(self) -> dict[str, NDArray[np.bool_]]:
+        """For each foot the samples (K,) at which the ground pushes it."""
+        return {
+            name: np.asarray((forces[..., 2] > 0).any(axis=1))
+            for name, forces in feet(self.motion).items()
+        }
+
+    # What the landing was.
+
+    def group(self) -> str | None:
+        """The group that lands first."""
+        landing = self.flight[1]
+        for event in self.events if landing is not None else ():
+            if event["kind"] == "touch_down" and event["time"] == landing:
+                return str(event["group"])
         return None
-    begun = dict.fromkeys(_touching_first(motion), float(motion.t[0]))
-    spans: dict[str, Spans] = {group: [] for group in _groups(motion)}
-    for event in events(motion):
-        group, time = event["group"], event["time"]
-        if event["kind"] == "touch_down":
-            begun[group] = time
-        else:
-            spans[group].append((begun.pop(group, float(motion.t[0])), time))
-    for group, begin in begun.items():
-        spans[group].append((begin, max(begin, float(motion.t[-1]))))
-    return spans
 
+    @cached_property
+    def _up_after(self) -> Array | None:
+        """The world's z axis in the torso's axes (K, 3), from the landing on."""
+        after = self.motion.t >= (np.inf if self.flight[1] is None else self.flight[1])
+        return rotation_matrix(self.motion.q[after][:, QUATERNION])[:, 2] if after.any() else None
 
-def touching_time(motion: Trajectory) -> dict[str, float] | None:
-    """For how long (s) each group, and each foot by the samples, touches the ground in all."""
-    spans = touches(motion)
-    if spans is None:
-        return None
-    of_groups = {group: float(sum(b - a for a, b in each)) for group, each in spans.items()}
-    return of_groups | feet_touching(motion)
+    def least_upright(self) -> float | None:
+        """Least z of the torso's z axis in the samples from the landing on."""
+        return None if self._up_after is None else float(self._up_after[:, 2].min())
 
+    def turned(self) -> float | None:
+        """Rotation (rad) of the torso about horizontal axes after the landing, in total.
 
-def times_of(motion: Trajectory, kind: str, which: int) -> dict[str, float | None] | None:
-    """Time (s) of each group's event of a kind, by its place: 0 the first, -1 the last one.
+        It is the integral of the horizontal angular velocity, that is the length of the path of the
+        world's z axis on the torso. It is computed from the samples' attitudes, which must be less
+        than half a turn apart.
+        """
+        up = self._up_after
+        if up is None:
+            return None
+        sines = np.linalg.norm(np.cross(up[:-1], up[1:]), axis=1)
+        return float(np.arctan2(sines, (up[:-1] * up[1:]).sum(axis=1)).sum())
 
-    That of a foot is a sample.
-    """
-    if not knows_events(motion):
-        return None
-    found: dict[str, list[float]] = {group: [] for group in _groups(motion)}
-    for event in events(motion):
-        if event["kind"] == kind:
-            found[event["group"]].append(event["time"])
-    of_groups = {group: times[which] if times else None for group, times in found.items()}
-    return of_groups | feet_times(motion, kind, which)
+    @cached_property
+    def standing(self) -> bool | None:
+        """Whether it ends upright, at rest and on its feet."""
+        motion = self.motion
+        if motion.contact is None or "feet" not in motion.contact.groups:
+            return None
+        carried = motion.contact.of("feet").forces[-1, :, 2].sum()
+        slow = np.linalg.norm(motion.v[-1, VELOCITY]) < MAX_SPEED
+        heavy = carried > MIN_SHARE * weight(self.model)
+        return bool(upright(motion) > MIN_UPRIGHT and slow and heavy)
 
-
-def _groups(motion: Trajectory) -> list[str]:
-    """The groups of points that can touch."""
-    return list(motion.contact.groups) if motion.contact else []
-
-
-def _touching_first(motion: Trajectory) -> set[str]:
-    """The groups that the ground pushes at the first sample."""
-    contact = motion.contact
-    if contact is None:
-        return set()
-    return {name for name in _groups(motion) if (contact.of(name).forces[0, :, 2] > 0).any()}
-
-
-# What the landing was.
-
-
-def landing_group(motion: Trajectory) -> str | None:
-    """The group that lands first."""
-    landing = flight(motion)[1]
-    for event in events(motion) if landing is not None else ():
-        if event["kind"] == "touch_down" and event["time"] == landing:
-            return str(event["group"])
-    return None
-
-
-def least_upright(motion: Trajectory) -> float | None:
-    """Least z of the torso's z axis in the samples from the landing on."""
-    up = _up_after(motion)
-    return None if up is None else float(up[:, 2].min())
-
-
-def turned(motion: Trajectory) -> float | None:
-    """Return the rotation (rad) of the torso about horizontal axes after the landing, in total.
-
-    It is the integral of the horizontal angular velocity, that is the length of the path of the
-    world's z axis on the torso. It is computed from the samples' attitudes, which must be less than
-    half a turn apart.
-    """
-    up = _up_after(motion)
-    if up is None:
-        return None
-    sines = np.linalg.norm(np.cross(up[:-1], up[1:]), axis=1)
-    return float(np.arctan2(sines, (up[:-1] * up[1:]).sum(axis=1)).sum())
-
-
-def _up_after(motion: Trajectory) -> Array | None:
-    """The world's z axis in the torso's axes (K, 3), from the landing on; None without one."""
-    landing = flight(motion)[1]
-    after = motion.t >= (np.inf if landing is None else landing)
-    return rotation_matrix(motion.q[after][:, QUATERNION])[:, 2] if after.any() else None
+    def landed(self) -> bool | None:
+        """Whether it stands at the end and was never on its back after the landing."""
+        least = self.least_upright()
+        return None if self.standing is None or least is None else self.standing and least > 0
 
 
 def upright(motion: Trajectory) -> float:
     """How upright the torso ends: z of its z axis, 1 on its feet, -1 on its back."""
     return float(rotation_matrix(motion.q[-1, QUATERNION])[2, 2])
-
-
-def standing(model: Model, motion: Trajectory) -> bool | None:
-    """Tell if it ends upright, at rest and on its feet; None without feet."""
-    if motion.contact is None or "feet" not in motion.contact.groups:
-        return None
-    carried = motion.contact.of("feet").forces[-1, :, 2].sum()
-    slow = np.linalg.norm(motion.v[-1, VELOCITY]) < MAX_SPEED
-    return bool(upright(motion) > MIN_UPRIGHT and slow and carried > MIN_SHARE * weight(model))
-
-
-def landed(model: Model, motion: Trajectory) -> bool | None:
-    """Tell if it stands at the end and was never on its back after the landing.
-
-    None if it does not land, or has no feet.
-    """
-    stands, least = standing(model, motion), least_upright(motion)
-    return None if stands is None or least is None else stands and least > 0

@@ -15,8 +15,7 @@ from ..basics.errors import StateError
 from ..model.model import Model
 from ..model.parameters import total_mass
 from .body import semi_axes, weight
-from .forces import peaks
-from .tail_in_torso import sunk
+from .ground import peaks
 
 if TYPE_CHECKING:
     from .trajectory import Trajectory
@@ -37,13 +36,10 @@ Measure = Callable[[slice], Array]  # samples -> (K,)
 
 
 def warnings_of(model: Model | None, motion: "Trajectory") -> list[str]:
-    """Return the doubts about a motion: what does not balance, then what no animal can do.
-
-    Without a model the latter are those found before the motion was saved or pickled.
-    """
+    """Return all doubts about a motion; without a model, those of when it was saved among them."""
     books: list[str] = motion.info.get("warnings", [])
-    found = motion.info.get("doubts", []) if model is None else doubts(model, motion)
-    return [*books, *found]
+    impossible = motion.info.get("doubts", []) if model is None else doubts(model, motion)
+    return [*books, *impossible]
 
 
 def doubts(model: Model, motion: "Trajectory") -> list[str]:
@@ -64,17 +60,17 @@ def _in_the_ground(model: Model, motion: "Trajectory") -> list[str]:
     """Return parts that are deep in the ground, because the scene gives them no contact."""
     if motion.contact is None:
         return []
-    allowed, told = DEEP * 2 * float(semi_axes(model).max()), []
+    allowed, warnings = DEEP * 2 * float(semi_axes(model).max()), []
     for part, (depth, time) in _depths(model, motion).items():
         if depth > allowed:
             remedy = f'add "{part}" to `contacts` of the scene'
             if part == "legs":
                 remedy = "above the ankle they touch nothing: start higher, or bend the legs less"
-            told.append(
+            warnings.append(
                 f"{part}: {1e3 * depth:.3g} mm below the ground at t = {time:.4g} s, more than "
                 f"{1e3 * allowed:.3g} mm, and no contact there: {remedy}"
             )
-    return told
+    return warnings
 
 
 def _depths(model: Model, motion: "Trajectory") -> dict[str, Moment]:
@@ -123,12 +119,33 @@ def _through_the_torso(model: Model, motion: "Trajectory") -> list[str]:
     ]
 
 
+def sunk(points: Array) -> Array:
+    """Return how far tails (K, P, 3) go into the torso, (K,): 0 not at all, 1 to its centre.
+
+    points: from the mount to the tip, joined by straight lines, from the torso's centre in its axes
+    and divided by its semi-axes, so that the torso is the unit ball. Until the tail has left the
+    ball once, it may be as near to the centre as its mount; from then on it must stay outside.
+    """
+    distance = np.linalg.norm(points, axis=2)
+    outside = np.maximum.accumulate(distance, axis=1)[:, :-1] > 1
+    allowed = np.where(outside, 1, distance[:, :1])
+    return np.asarray(np.max(allowed - _nearest(points), axis=1, initial=0))
+
+
+def _nearest(points: Array) -> Array:
+    """Least distances (K, P - 1) from the centre of the lines between neighbours."""
+    starts, ways = points[:, :-1], np.diff(points, axis=1)
+    lengths = np.maximum((ways**2).sum(axis=2), np.finfo(float).tiny)
+    parts = np.clip(-(starts * ways).sum(axis=2) / lengths, 0, 1)
+    return np.asarray(np.linalg.norm(starts + parts[..., None] * ways, axis=2))
+
+
 def _blows(model: Model, motion: "Trajectory") -> list[str]:
     """A force of the ground that no legs of the animal's size bear."""
-    found, whole = peaks(motion), weight(model)
-    if not found or not whole:
+    largest, whole = peaks(motion), weight(model)
+    if not largest or not whole:
         return []
-    force, time = found["all"]
+    force, time = largest["all"]
     most = BORNE * (BEARER / float(total_mass(model.parameters))) ** (1 / 3)
     if not force > most * whole:
         return []
@@ -142,17 +159,17 @@ def _blows(model: Model, motion: "Trajectory") -> list[str]:
 def _bends(model: Model, motion: "Trajectory") -> list[str]:
     """Segments that are bent by clearly more than half a turn."""
     bends = _bend(model, motion.tail)
-    told = []
+    warnings = []
     for segment, k in enumerate(bends.argmax(axis=0)):
         if bends[k, segment] > MOST_BEND:
             remedy = "damp it more, or give its reference smaller bends"
             if bends[k, segment] > DEGREES:
                 remedy = "are degrees given in place of radians (np.radians)? If not, damp it more"
-            told.append(
+            warnings.append(
                 f"tail: segment {segment + 1} is bent by {bends[k, segment]:.3g} rad at t = "
                 f"{motion.t[k]:.4g} s, more than {MOST_BEND:.3g}: {remedy}"
             )
-    return told
+    return warnings
 
 
 def _bend(model: Model, tail: Array) -> Array:

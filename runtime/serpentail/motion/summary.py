@@ -1,15 +1,31 @@
-"""``summary``: the numbers of a motion by name, for JSON, as text or as a table."""
+"""``summary``: the numbers of a motion by name, for JSON, as text or as a table; their errors.
 
-import math
+For the errors the motion is made twice again, less exactly: at higher tolerances, or with longer
+steps, the error is larger than the motion's own, so the change is an estimate on the safe side. Two
+runs do not both hit a number by chance.
+"""
+
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from serpentail_scene.layout import POSITION
+
+from ..basics.errors import SimulationError
 from ..model.model import Model
-from .errors import errors_of, made_again, strays
-from .numbers import NUMBERS, UNITS
-from .table import as_error, as_markdown, as_text, as_word
+from .body import semi_axes
+from .derived import AGAIN
+from .numbers import NUMBERS, UNITS, numbers_of
+from .text import as_error, as_markdown, as_text, as_word
 from .trajectory import Trajectory
+
+ALLOWED = 0.01  # of the animal's length that B may be off at the end, without a warning
+# what says how the motion was made, and not what it is
+OF_THE_RUN = {"model", "method", "reason", "steps", "rejected", "evaluations", "cpu_s"}
+OF_THE_RUN |= {"real_time_factor", "imbalance", "warnings"}
+COARSE = 2  # runs that are made to estimate errors
+UNCERTAIN = "uncertain"  # the error of what is no number, or exists in one of both motions only
 
 
 class Summary(dict[str, Any]):
@@ -28,21 +44,21 @@ class Summary(dict[str, Any]):
     def described(self) -> dict[str, dict[str, Any]]:
         """Return value, error, unit and meaning of each number by name, ready for JSON."""
         return {
-            each.name: {
-                "value": self[each.name],
-                "error": self.errors.get(each.name),
-                "unit": each.unit,
-                "meaning": each.meaning,
+            name: {
+                "value": self[name],
+                "error": self.errors.get(name),
+                "unit": unit,
+                "meaning": meaning,
             }
-            for each in NUMBERS
+            for name, unit, meaning, _ in NUMBERS
         }
 
     def markdown(self) -> str:
         """Return a Markdown table of name, value, error if it is known, unit and meaning."""
         heads, rows = ("number", "value", "error", "unit", "meaning"), []
-        for each in NUMBERS:
-            error = as_error(self.errors.get(each.name)).removeprefix("+- ")
-            rows.append((each.name, as_word(self[each.name]), error, each.unit, each.meaning))
+        for name, unit, meaning, _ in NUMBERS:
+            error = as_error(self.errors.get(name)).removeprefix("+- ")
+            rows.append((name, as_word(self[name]), error, unit, meaning))
         keep = [0, 1, 2, 3, 4] if self.errors else [0, 1, 3, 4]
         return as_markdown([heads[k] for k in keep], ([row[k] for k in keep] for row in rows))
 
@@ -73,25 +89,62 @@ def summary(model: Model, motion: Trajectory, errors: bool = False) -> Summary:
     docs/simulation.md lists all names, units and meanings. A motion that cannot be made again,
     because it was read from a file, for example, has no errors, and a warning says so.
     """
-    found = Summary(_numbers(model, motion))
+    result = Summary(numbers_of(model, motion))
     if errors:
-        again = made_again(motion)
+        again = _made_again(motion)
         if isinstance(again, str):
-            found["warnings"] = [*found["warnings"], again]
-        else:
-            found.errors = errors_of(found, [_numbers(model, each) for each in again])
-            found["warnings"] = [*found["warnings"], *strays(model, motion, again)]
-    return found
+            result["warnings"] = [*result["warnings"], again]
+            return result
+        others = [numbers_of(model, other) for other in again]
+        result.errors = {
+            name: _error(value, [numbers[name] for numbers in others])
+            for name, value in result.items()
+            if name not in OF_THE_RUN and value is not None
+        }
+        result["warnings"] = [*result["warnings"], *_strays(model, motion, again)]
+    return result
 
 
-def _numbers(model: Model, motion: Trajectory) -> dict[str, Any]:
-    """Return the numbers by name."""
-    with np.errstate(over="ignore", invalid="ignore"):  # of a run that blows up
-        return {each.name: _ready(each.of(model, motion)) for each in NUMBERS}
+def _made_again(motion: Trajectory) -> list[Trajectory] | str:
+    """The motion made again, less and less exactly, or in one line why there is none."""
+    again = vars(motion).get(AGAIN)
+    if again is None:
+        return (
+            "errors: no estimate: only what simulate or a sequence made can be made again, not what"
+            " was read, resampled or taken from Rollouts, failed, or was controlled by st.Sampled"
+        )
+    motions: list[Trajectory] = []
+    for coarse in range(COARSE):
+        try:
+            motions.append(again(coarse))
+        except SimulationError as error:
+            if not motions:
+                return f"errors: no estimate: made less exactly, the run fails: {error}"
+    return motions
 
 
-def _ready(value: Any) -> Any:
-    """Return a value for JSON: None for a number that is not finite."""
+def _error(value: Any, others: Sequence[Any]) -> Any:
+    """How far a value and others of its kind are apart at most."""
+    if not all(isinstance(other, type(value)) for other in others):
+        return UNCERTAIN
     if isinstance(value, dict):
-        return {name: _ready(each) for name, each in value.items()}
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+        return {name: _error(x, [other.get(name) for other in others]) for name, x in value.items()}
+    if isinstance(value, list):
+        return [_error(x, list(rest)) for x, *rest in zip(value, *others, strict=True)]
+    if isinstance(value, float):
+        return max(abs(value - other) for other in others)
+    return UNCERTAIN if any(other != value for other in others) else None
+
+
+def _strays(model: Model, motion: Trajectory, again: Sequence[Trajectory]) -> list[str]:
+    """A warning if B is far off at the end, by the motion made again."""
+    end = motion.pose[-1, POSITION]
+    off = max(float(np.linalg.norm(end - other.pose[-1, POSITION])) for other in again)
+    allowed = ALLOWED * float(2 * semi_axes(model).max() + model.parameters["tail_length"])
+    if not off > allowed:
+        return []
+    remedy = "take a smaller rtol" if "rtol" in motion.info else "take a shorter step"
+    return [
+        f"errors: B is off by an estimated {1e3 * off:.2g} mm at the end, more than "
+        f"{1e3 * allowed:.2g} mm: {remedy}"
+    ]

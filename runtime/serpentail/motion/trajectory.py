@@ -17,13 +17,12 @@ from ..basics.attitude import Array, pose_of
 from ..basics.checks import needed
 from ..model.model import Model
 from . import archive
-from .account import account
 from .contact import Contact
 from .derived import Derived, Later, made, settled
-from .exports import Exports
+from .methods import Exports, Showable
 from .plausibility import doubts, warnings_of
 from .resample import Interpolation, hermite_q, inside, monotone, smooth
-from .showable import Showable
+from .text import short_text
 from .validation import check_time, check_unit, json_text, layout_of, real, shapes
 
 
@@ -105,15 +104,12 @@ class Trajectory(Exports, Showable):
 
     @classmethod
     def of_run(cls, arrays: dict[str, Array], model: Model, later: Later) -> Self:
-        """Return a motion of checked arrays t, q, v, tau, which it owns.
-
-        ``later(name)`` computes another field when that is first used.
-        """
+        """Return a motion of checked arrays; ``later(name)`` computes a field that is used."""
         for array in arrays.values():
             array.setflags(write=False)
         return made(cls, arrays | {"model": model}, later)
 
-    __repr__ = account
+    __repr__ = short_text
 
     @property
     def energy(self) -> Array:
@@ -197,7 +193,7 @@ class Trajectory(Exports, Showable):
             The file cannot be written.
         """
         arrays = {name: getattr(self, name) for name in ARRAYS}
-        return archive.write(path, arrays, self._told(), self.contact)
+        return archive.write(path, arrays, self._info_with_doubts(), self.contact)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
@@ -220,22 +216,16 @@ class Trajectory(Exports, Showable):
         ValueError
             The file is not a trajectory, or is damaged.
         """
-        source, fields = archive.read(path, ARRAYS)
-        try:
-            return cls(**fields)
-        except ValueError as error:
-            raise ValueError(
-                f"{str(source)!r} does not hold a valid trajectory: {error}"
-            ) from error
+        return archive.read(path, ARRAYS, cls)
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave out the model, whose compiled code belongs to one machine."""
-        return settled(self, DERIVED) | {"model": None, "info": self._told()}
+        return settled(self, DERIVED) | {"model": None, "info": self._info_with_doubts()}
 
-    def _told(self) -> dict[str, Any]:
+    def _info_with_doubts(self) -> dict[str, Any]:
         """Return info with the doubts that only the model can find."""
-        found = [] if self.model is None else doubts(self.model, self)
-        return self.info | {"doubts": found} if found else self.info
+        sentences = [] if self.model is None else doubts(self.model, self)
+        return self.info | {"doubts": sentences} if sentences else self.info
 
     def resample(self, t: ArrayLike) -> Self:
         """Return the motion at other times, by interpolation.

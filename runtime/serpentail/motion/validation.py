@@ -36,10 +36,7 @@ def layout_of(q: Array) -> Layout:
 
 
 def shapes(t: Array, q: Array, like: tuple[Array, ...]) -> dict[str, tuple[int, ...]]:
-    """Return the shape that each array must have, from those of t and q.
-
-    On a fixed base v and tau have the shape of q.
-    """
+    """Return the shape that each array must have; on a fixed base v and tau have that of q."""
     samples = len(t) if t.ndim == 1 else 0
     if not samples:
         raise ValueError(f"t has shape {t.shape}: give one row of at least one time")

@@ -10,7 +10,7 @@ import numpy as np
 from ..basics.errors import SimulationError, StateError
 from ..model.model import Model
 from ..model.passive import behind_stops, stored_energy
-from ..motion.origin import origin
+from ..motion.archive import origin
 from ..motion.trajectory import Trajectory
 from .audit import BALANCED, Between, allowance, audited, warnings_of
 from .compiled_run import Samples

@@ -11,9 +11,9 @@ import numpy as np
 from ..basics.errors import SimulationError, ViewError
 from ..model.model import Model
 from ..model.parameters import RunParameters
-from ..motion.account import arrays_of, framed, how_made, tail_of
 from ..motion.derived import Derived, settled
-from ..motion.exports import Exports
+from ..motion.methods import Exports
+from ..motion.text import arrays_of, framed, how_made
 from ..motion.trajectory import MONOTONE, Trajectory
 from .audit import Audit
 from .compiled_run import Samples, sampled
@@ -118,7 +118,7 @@ class Rollouts(Exports):
         """At most six lines: number of runs, samples, method, and which failed."""
         model, failed = self.source.model, [k for k, e in enumerate(self.errors) if e is not None]
         lines = [
-            f"Rollouts of {model.name}, {tail_of(model)}: {len(self)} runs of "
+            f"Rollouts of {model.name}, {model.tail_words()}: {len(self)} runs of "
             f"{len(self.t)} samples, {self.t[0]:.6g} to {self.t[-1]:.6g} s",
             arrays_of(self),
             how_made(self.info) + " in all",
@@ -162,7 +162,7 @@ class Rollouts(Exports):
 
     def _repr_html_(self) -> str:
         """Text and page of the first runs, for notebooks."""
-        from ..show.page.notebook import in_notebook
+        from ..show.page.view import in_notebook
 
         begun = [k for k, e in enumerate(self.errors) if e is None or e.trajectory is not None]
         begun = begun[:SHOWN]

@@ -1,26 +1,22 @@
 """Laws of airborne states: their rates are those of the whole animal, derivatives are slopes."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from serpentail_scene.layout import OMEGA, QUATERNION, TAIL_V
 
 from ..basics.attitude import quaternion_rate
 from ..model.model import Model
-from .derivative_laws import along
+from .derivative_laws import slopes
 from .errors import relative, sensitivity
-from .law import PIECEWISE, SLOPE_LIMIT, VALUE_LIMIT, Errors, Law, fastest, registry, slope
-from .states import State
+from .law import PIECEWISE, SLOPE_LIMIT, VALUE_LIMIT, Errors, law
+from .states import Case
 
 # accelerations are quotients in q_t: differences follow them in smaller steps than sines
 NEARER = 8.0
-LAWS: list[Law] = []
-law = registry(LAWS)
 
 
-@law("airborne_rates", "momentum", "forward_dynamics", "mass_matrix", units=VALUE_LIMIT)
-def airborne_rates_are_those_of_the_animal(model: Model, s: State) -> Errors:
+@law("airborne_rates momentum forward_dynamics mass_matrix", VALUE_LIMIT)
+def airborne_rates_are_those_of_the_animal(model: Model, s: Case) -> Errors:
     """With omega of an airborne state the animal has its angular momentum; its tail accelerates as
     q_t_ddot says, relative to cond(H).
     """
@@ -40,66 +36,49 @@ def airborne_rates_are_those_of_the_animal(model: Model, s: State) -> Errors:
     }
 
 
-def direction(s: State) -> np.ndarray:
+def direction(s: Case) -> np.ndarray:
     """Return how (x, tau) moves along the state's directions."""
     turning = quaternion_rate(s.q[QUATERNION], s.dq[OMEGA])
     return np.concatenate([turning, s.dq[TAIL_V], s.dv[TAIL_V], s.dtau])
 
 
-def slopes(
-    model: Model, s: State, f: Callable[[State], np.ndarray]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return how fast a function changes along the state's directions, and the size of that."""
-    rate = NEARER * max(1.0, fastest(model, s.dq))
-    change, largest = slope(lambda t: np.asarray(f(along(s, t)), float), rate)
-    return change, rate * largest
-
-
-@law(
-    "airborne_rates",
-    "airborne_rates_derivatives",
-    "mass_matrix",
-    units=SLOPE_LIMIT,
-    without=PIECEWISE,
-)
-def airborne_rates_change_by_their_jacobian(model: Model, s: State) -> Errors:
-    """The Jacobian of an airborne state's rates times a direction is their slope along it."""
-    y, J = model.airborne_rates_derivatives(s.x, s.tau, s.angular)
-    change, largest = slopes(model, s, lambda at: model.airborne_rates(at.x, at.tau, s.angular))
-    product, nt = J.astype(float) @ direction(s), model.layout.nt
-    errors = {"values": relative(y, model.airborne_rates(s.x, s.tau, s.angular))}
-    edges = (0, 4, 4 + nt, 4 + 2 * nt, len(y))
-    for name, a, b in zip(("c", "q_t", "q_t_dot", "omega"), edges, edges[1:], strict=False):
-        size = np.abs(change[a:b]) + largest[a:b]
-        errors[name] = relative(product[a:b], change[a:b], size) / sensitivity(model, s.q)
+def block_errors(
+    model: Model, s: Case, product: np.ndarray, slope: tuple[np.ndarray, np.ndarray], last: str
+) -> dict[str, float]:
+    """Return the errors of a product against a slope by block, the last one of a name."""
+    (change, largest), nt = slope, model.layout.nt
+    edges = (0, 4, 4 + nt, 4 + 2 * nt, len(product))
+    errors, size = {}, np.abs(change) + largest
+    for name, a, b in zip(("c", "q_t", "q_t_dot", last), edges, edges[1:], strict=False):
+        errors[name] = relative(product[a:b], change[a:b], size[a:b]) / sensitivity(model, s.q)
     return errors
 
 
+@law("airborne_rates airborne_rates_derivatives mass_matrix", SLOPE_LIMIT, without=PIECEWISE)
+def airborne_rates_change_by_their_jacobian(model: Model, s: Case) -> Errors:
+    """The Jacobian of an airborne state's rates times a direction is their slope along it."""
+    y, J = model.airborne_rates_derivatives(s.x, s.tau, s.angular)
+
+    def rates(at: Case) -> np.ndarray:
+        return model.airborne_rates(at.x, at.tau, s.angular)
+
+    product = J.astype(float) @ direction(s)
+    errors = {"values": relative(y, rates(s))}
+    return errors | block_errors(model, s, product, slopes(model, s, rates, NEARER), "omega")
+
+
 @law(
-    "airborne_rates_derivatives",
-    "airborne_rates_hessian",
-    "mass_matrix",
-    units=SLOPE_LIMIT,
-    without=PIECEWISE,
+    "airborne_rates_derivatives airborne_rates_hessian mass_matrix", SLOPE_LIMIT, without=PIECEWISE
 )
-def airborne_gradient_changes_by_the_hessian(model: Model, s: State) -> Errors:
+def airborne_gradient_changes_by_the_hessian(model: Model, s: Case) -> Errors:
     """The Hessian of weights^T y times a direction is the slope of weights^T J along it."""
     y, J, H = model.airborne_rates_hessian(s.x, s.tau, s.angular, s.weights)
     same = model.airborne_rates_derivatives(s.x, s.tau, s.angular)
 
-    def gradient(at: State) -> np.ndarray:
+    def gradient(at: Case) -> np.ndarray:
         return s.weights @ model.airborne_rates_derivatives(at.x, at.tau, s.angular)[1]
 
-    change, largest = slopes(model, s, gradient)
-    product, condition = H.astype(float) @ direction(s), sensitivity(model, s.q)
-    errors = {
-        "values": relative(y, same[0]),
-        "J": relative(J, same[1]),
-        "symmetry": relative(H, H.T),
-    }
-    nt = model.layout.nt
-    edges = (0, 4, 4 + nt, 4 + 2 * nt, len(H))
-    for name, a, b in zip(("c", "q_t", "q_t_dot", "tau"), edges, edges[1:], strict=False):
-        size = np.abs(change[a:b]) + largest[a:b]
-        errors[name] = relative(product[a:b], change[a:b], size) / condition
-    return errors
+    values = {"values": relative(y, same[0]), "J": relative(J, same[1])}
+    errors = values | {"symmetry": relative(H, H.T)}
+    product = H.astype(float) @ direction(s)
+    return errors | block_errors(model, s, product, slopes(model, s, gradient, NEARER), "tau")

@@ -6,9 +6,9 @@ import numpy as np
 
 from ..model.model import Model
 from .errors import differences, differing, differing_outputs, is_derivative
-from .law import VALUE_LIMIT, Errors, Law, registry
+from .law import VALUE_LIMIT, Errors, law
 from .states import (
-    State,
+    Case,
     arguments,
     called_functions,
     casadi_outputs,
@@ -18,12 +18,9 @@ from .states import (
     state_functions,
 )
 
-LAWS: list[Law] = []
-law = registry(LAWS)
-
 
 @law()
-def calls_repeat(model: Model, s: State) -> Errors:
+def calls_repeat(model: Model, s: Case) -> Errors:
     """The same call gives the same bits, at once and after another call."""
     errors = {}
     for name in called_functions(model):
@@ -33,7 +30,7 @@ def calls_repeat(model: Model, s: State) -> Errors:
 
 
 @law(units=VALUE_LIMIT)
-def batches_are_singles(model: Model, s: State) -> Errors:
+def batches_are_singles(model: Model, s: Case) -> Errors:
     """A batch of nine states gives the bits of nine calls; in lanes of the fast profile, which
     fuses other products and sums, all but rounding.
     """
@@ -54,7 +51,7 @@ def batches_are_singles(model: Model, s: State) -> Errors:
 
 
 @law(units=VALUE_LIMIT, casadi=True)
-def casadi_functions_agree(model: Model, s: State) -> Errors:
+def casadi_functions_agree(model: Model, s: Case) -> Errors:
     """The CasADi functions of SX operations give what the C gives, v_dot relative to cond(H)."""
     return {
         name: differences(
@@ -66,7 +63,7 @@ def casadi_functions_agree(model: Model, s: State) -> Errors:
 
 
 @law(only="double", casadi=True)
-def casadi_externals_are_the_compiled_code(model: Model, s: State) -> Errors:
+def casadi_externals_are_the_compiled_code(model: Model, s: Case) -> Errors:
     """casadi.external on the compiled C gives the bits of the model's own call."""
     errors = {}
     for name in called_functions(model):

@@ -8,15 +8,13 @@ from serpentail_scene.layout import POSITION, TORSO_NV, VELOCITY
 
 from ..model.model import Model
 from .errors import relative, sensitivity, worst
-from .law import PIECEWISE, SLOPE_LIMIT, VALUE_LIMIT, Errors, Law, fastest, moved, registry, slope
-from .states import State, at_origin, is_fixed
+from .law import PIECEWISE, SLOPE_LIMIT, VALUE_LIMIT, Errors, fastest, law, moved, slope
+from .states import Case, at_origin, is_fixed
 
 DEPTH = 3e-3  # m, of the lowest point in the ground
 HEIGHT = 100.0  # m: far from the ground
 LEGS = np.array([3.6, -0.4, 3.7, -0.6, 5.0, -20.0, -8.0, 10.0])
 GAINS = np.array([4e4, 400.0])  # 1/s^2, 1/s: Table 1
-LAWS: list[Law] = []
-law = registry(LAWS)
 
 
 def legs(model: Model, time: float = 0.0) -> tuple[np.ndarray, ...]:
@@ -32,7 +30,7 @@ def bristles(model: Model) -> np.ndarray:
     return 1e-3 * np.sin(np.arange(2 * sum(model.contacts.values())))
 
 
-def sunk(model: Model, s: State) -> State:
+def sunk(model: Model, s: Case) -> Case:
     """Return the state with its lowest point in the ground."""
     positions, _ = model.contact_points(s.q, s.v, *legs(model))
     return replace(s, q=raised(s.q, -(positions[:, 2].min() + DEPTH)))
@@ -48,15 +46,15 @@ def raised(q: np.ndarray, height: float) -> np.ndarray:
 
 
 # behind its stops a tail is pushed so much harder than it moves that roundings of that are seen
-@law("pfl", "forward_dynamics", units=VALUE_LIMIT, without=PIECEWISE)
-def tail_gets_the_accelerations_that_torques_are_for(model: Model, s: State) -> Errors:
+@law("pfl forward_dynamics", VALUE_LIMIT, without=PIECEWISE)
+def tail_gets_the_accelerations_that_torques_are_for(model: Model, s: Case) -> Errors:
     """Torques of partial feedback linearisation give wanted accelerations, relative to cond(H)."""
     v_dot = model.forward_dynamics(s.q, s.v, model.pfl(s.q, s.v, s.accelerations))
     return relative(v_dot[model.layout.tail_v], s.accelerations, v_dot) / sensitivity(model, s.q)
 
 
-@law("tracked_dynamics", "pfl", "forward_dynamics", units=VALUE_LIMIT, without=PIECEWISE)
-def tracking_moves_as_its_torques_do(model: Model, s: State) -> Errors:
+@law("tracked_dynamics pfl forward_dynamics", VALUE_LIMIT, without=PIECEWISE)
+def tracking_moves_as_its_torques_do(model: Model, s: Case) -> Errors:
     """Torques and v_dot of one call equal those of two calls, relative to cond(H)."""
     tau, v_dot = model.kernel("tracked_dynamics")(s.q, s.v, s.accelerations)
     expected = model.forward_dynamics(s.q, s.v, tau)
@@ -67,35 +65,41 @@ def tracking_moves_as_its_torques_do(model: Model, s: State) -> Errors:
     }
 
 
-@law("implicit_factor", "implicit_solve", "mass_matrix", units=VALUE_LIMIT)
-def implicit_steps_solve_their_system(model: Model, s: State) -> Errors:
+@law("implicit_factor implicit_solve mass_matrix", VALUE_LIMIT)
+def implicit_steps_solve_their_system(model: Model, s: Case) -> Errors:
     """High up, (1 - w J) k = r with J of damping and gains alone, relative to cond(H)."""
-    w, damping, high = 1e-3, np.linspace(1e-3, 2e-3, len(s.tau)), raised(s.q, HEIGHT)
+    w, damping = 1e-3, np.linspace(1e-3, 2e-3, len(s.tau))
     H = model.mass_matrix(s.q).astype(float)
-
-    # k of a right-hand side, with bristles where the model has contacts
-    u = (bristles(model),) if model.contacts else ()
-    weight = [w, 1.0] if u else [w]
-    ground = (*u, *legs(model)) if u else ()
-    factors = model.kernel("implicit_factor")(high, s.v, damping, GAINS, weight, *ground)
-    k_q, k_v, *k_u = model.kernel("implicit_solve")(factors, s.dq, s.dv, *u)
+    k_q, k_v, *k_u = implicit_step(model, s, w, damping, GAINS)
 
     # the expected k; q is in the tangent space, so tail angles have the places of their rates
-    change, load = k_v.astype(float) - s.dv, np.zeros(model.nv)
+    change, load = k_v - s.dv, np.zeros(model.nv)
     tail = model.layout.tail_v
     tracked = H[tail, tail] @ (GAINS @ [k_q[tail], k_v[tail]])
     load[tail] = -w * (tracked + damping * k_v[tail])
     scale = np.sqrt(np.diag(H))
-    relaxed = [u[0] / (1 + w / model.parameters["D_f"])] if u else []
+    relaxed = [bristles(model) / (1 + w / model.parameters["D_f"])] if k_u else []
     return {
         "v": relative(H @ change / scale, load / scale) / sensitivity(model, s.q),
-        "q": relative(k_q, s.dq + w * k_v.astype(float)),
+        "q": relative(k_q, s.dq + w * k_v),
         "bristles": worst(map(relative, k_u, relaxed)),
     }
 
 
-@law("contact_points", units=SLOPE_LIMIT, only="contact")
-def velocities_are_the_rates_of_the_points(model: Model, s: State) -> Errors:
+def implicit_step(
+    model: Model, s: Case, w: float, damping: np.ndarray, gains: np.ndarray
+) -> list[np.ndarray]:
+    """Return k of right-hand sides dq and dv, and of bristles if there are contacts, high up."""
+    u = (bristles(model),) if model.contacts else ()
+    weight = [w, 1.0] if u else [w]
+    ground = (*u, *legs(model)) if u else ()
+    high = raised(s.q, HEIGHT)
+    factors = model.kernel("implicit_factor")(high, s.v, damping, gains, weight, *ground)
+    return [x.astype(float) for x in model.kernel("implicit_solve")(factors, s.dq, s.dv, *u)]
+
+
+@law("contact_points", SLOPE_LIMIT, only="contact")
+def velocities_are_the_rates_of_the_points(model: Model, s: Case) -> Errors:
     """Points of feet and tail move as they say; the torso's lowest is one point after another."""
     count = sum(n for name, n in model.contacts.items() if name != "torso")
     s = at_origin(s)
@@ -111,8 +115,8 @@ def velocities_are_the_rates_of_the_points(model: Model, s: State) -> Errors:
     return relative(velocities, change, np.abs(change) + rate * largest)
 
 
-@law("contact_points", units=VALUE_LIMIT, only="contact")
-def points_are_carried_by_the_torso(model: Model, s: State) -> Errors:
+@law("contact_points", VALUE_LIMIT, only="contact")
+def points_are_carried_by_the_torso(model: Model, s: Case) -> Errors:
     """A change of B's position and velocity is added to those of every point."""
     move = np.array([0.5, -0.25, 1.0])
     first = model.contact_points(s.q, s.v, *legs(model))
@@ -123,16 +127,16 @@ def points_are_carried_by_the_torso(model: Model, s: State) -> Errors:
     return worst(relative(b, a + move, np.abs(a) + 1) for a, b in zip(first, second, strict=True))
 
 
-@law("leg_points", "contact_points", units=VALUE_LIMIT, only="contact")
-def legs_end_in_their_feet(model: Model, s: State) -> Errors:
+@law("leg_points contact_points", VALUE_LIMIT, only="contact")
+def legs_end_in_their_feet(model: Model, s: Case) -> Errors:
     """A, M and T of the legs' joints are the feet's points."""
     joints = model.leg_points(s.q, LEGS[:4])
     feet = model.contact_points(s.q, s.v, *legs(model))[0][:6]
     return relative(joints[:, 3:].reshape(feet.shape), feet)
 
 
-@law("leg_points", units=VALUE_LIMIT, only="contact")
-def legs_have_their_lengths(model: Model, s: State) -> Errors:
+@law("leg_points", VALUE_LIMIT, only="contact")
+def legs_have_their_lengths(model: Model, s: Case) -> Errors:
     """Hips are as far from B, and each joint from the next, as the parameters say."""
     P, joints = model.parameters, model.leg_points(s.q, LEGS[:4]).astype(float)
     B = np.broadcast_to(s.q[POSITION], (2, 1, 3))
@@ -141,15 +145,8 @@ def legs_have_their_lengths(model: Model, s: State) -> Errors:
     return relative(lengths, [np.linalg.norm(P["hip"]), *links], np.abs(joints) + lengths.max())
 
 
-@law(
-    "contact_points",
-    "contact_dynamics",
-    "mass_matrix",
-    "bias_force",
-    units=VALUE_LIMIT,
-    only="contact",
-)
-def the_ground_accelerates_by_its_generalised_force(model: Model, s: State) -> Errors:
+@law("contact_points contact_dynamics mass_matrix bias_force", VALUE_LIMIT, only="contact")
+def the_ground_accelerates_by_its_generalised_force(model: Model, s: Case) -> Errors:
     """H v_dot + C = [0; tau] + J^T f, relative to cond(H).
 
     A column of J is the change of the points' velocities by one entry of v.
@@ -165,8 +162,8 @@ def the_ground_accelerates_by_its_generalised_force(model: Model, s: State) -> E
     return relative(residual / scale, 0, size / scale) / sensitivity(model, s.q)
 
 
-@law("contact_rates", "contact_points", "contact_dynamics", units=VALUE_LIMIT, only="contact")
-def simulations_ask_what_users_do(model: Model, s: State) -> Errors:
+@law("contact_rates contact_points contact_dynamics", VALUE_LIMIT, only="contact")
+def simulations_ask_what_users_do(model: Model, s: Case) -> Errors:
     """Heights equal those of the points, accelerations and forces those of contact_dynamics.
 
     The ground's power is that of its forces on the moving points.
@@ -190,8 +187,8 @@ def simulations_ask_what_users_do(model: Model, s: State) -> Errors:
     }
 
 
-@law("contact_points", "contact_dynamics", units=8, only="contact")
-def the_ground_never_pulls_nor_holds_by_more_than_friction(model: Model, s: State) -> Errors:
+@law("contact_points contact_dynamics", 8, only="contact")
+def the_ground_never_pulls_nor_holds_by_more_than_friction(model: Model, s: Case) -> Errors:
     """f_n is not below 0, and the horizontal force not above mu f_n."""
     s, P = sunk(model, s), model.parameters
     _, _, forces = model.contact_dynamics(s.q, s.v, s.tau, bristles(model), *legs(model))

@@ -9,27 +9,24 @@ from serpentail_scene.layout import OMEGA
 
 from ..model.model import Model
 from .errors import block_error, blocks_of, relative, worst
-from .law import PIECEWISE, SLOPE_LIMIT, Errors, Law, fastest, moved, registry, slope
-from .states import State, at_origin
-
-LAWS: list[Law] = []
-law = registry(LAWS)
+from .law import PIECEWISE, SLOPE_LIMIT, Errors, fastest, law, moved, slope
+from .states import Case, at_origin
 
 
-def along(s: State, time: float) -> State:
+def along(s: Case, time: float) -> Case:
     """Return the state after moving along the state's own directions of q, v and tau."""
     return replace(s, q=moved(s.q, s.dq, time), v=s.v + time * s.dv, tau=s.tau + time * s.dtau)
 
 
 def slopes(
-    model: Model, s: State, f: Callable[[State], np.ndarray]
+    model: Model, s: Case, f: Callable[[Case], np.ndarray], nearer: float = 1.0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return how fast a function changes along the state's directions, and the size of that.
 
-    Its rounding scales with the size.
+    Its rounding scales with the size. nearer: by how much to shorten the steps.
     """
     s = at_origin(s)
-    rate = max(1.0, fastest(model, s.dq))
+    rate = nearer * max(1.0, fastest(model, s.dq))
     change, largest = slope(lambda t: np.asarray(f(along(s, t)), float), rate)
     return change, rate * largest
 
@@ -42,8 +39,8 @@ def block_slope_error(
     return block_error(x, change, np.abs(change) + largest, blocks_of(model))
 
 
-@law("inverse_dynamics", "inverse_dynamics_derivatives", units=SLOPE_LIMIT, without=PIECEWISE)
-def inverse_dynamics_changes_by_its_jacobians(model: Model, s: State) -> Errors:
+@law("inverse_dynamics inverse_dynamics_derivatives", SLOPE_LIMIT, without=PIECEWISE)
+def inverse_dynamics_changes_by_its_jacobians(model: Model, s: Case) -> Errors:
     """dq, dv times a direction are the slope of H v_dot + C along it."""
     dq, dv = model.inverse_dynamics_derivatives(s.q, s.v, s.v_dot)
     return block_slope_error(
@@ -54,14 +51,11 @@ def inverse_dynamics_changes_by_its_jacobians(model: Model, s: State) -> Errors:
 
 
 @law(
-    "mass_matrix",
-    "inverse_dynamics",
-    "forward_dynamics",
-    "forward_dynamics_derivatives",
-    units=SLOPE_LIMIT,
+    "mass_matrix inverse_dynamics forward_dynamics forward_dynamics_derivatives",
+    SLOPE_LIMIT,
     without=PIECEWISE,
 )
-def forward_dynamics_changes_by_its_jacobians(model: Model, s: State) -> Errors:
+def forward_dynamics_changes_by_its_jacobians(model: Model, s: Case) -> Errors:
     """H times the change of v_dot is that of tau less the slope of H v_dot + C at fixed v_dot.
 
     H dtau = [0; 1].
@@ -78,13 +72,8 @@ def forward_dynamics_changes_by_its_jacobians(model: Model, s: State) -> Errors:
     }
 
 
-@law(
-    "forward_dynamics_derivatives",
-    "forward_dynamics_jvp",
-    "forward_dynamics_vjp",
-    units=SLOPE_LIMIT,
-)
-def products_are_those_with_the_jacobians(model: Model, s: State) -> Errors:
+@law("forward_dynamics_derivatives forward_dynamics_jvp forward_dynamics_vjp", SLOPE_LIMIT)
+def products_are_those_with_the_jacobians(model: Model, s: Case) -> Errors:
     """jvp is J d, vjp is lambda^T J, relative to the sum of |terms|."""
     J = [x.astype(float) for x in model.forward_dynamics_derivatives(s.q, s.v, s.tau)]
     directions = (s.dq, s.dv, s.dtau)
@@ -103,22 +92,22 @@ def product_error(vjp: Iterable, multiplier: np.ndarray, jacobians: Iterable) ->
     )
 
 
-@law("mass_matrix", "inverse_dynamics_derivatives", "inverse_dynamics_vjp", units=SLOPE_LIMIT)
-def gradient_is_the_product_with_the_jacobians(model: Model, s: State) -> Errors:
+@law("mass_matrix inverse_dynamics_derivatives inverse_dynamics_vjp", SLOPE_LIMIT)
+def gradient_is_the_product_with_the_jacobians(model: Model, s: Case) -> Errors:
     """The gradient of lambda^T (H v_dot + C) is lambda^T times dq, dv and H."""
     J = [*model.inverse_dynamics_derivatives(s.q, s.v, s.v_dot), model.mass_matrix(s.q)]
     vjp = model.inverse_dynamics_vjp(s.q, s.v, s.v_dot, s.multiplier)
     return product_error(vjp, s.multiplier, [j.astype(float) for j in J])
 
 
-@law("inverse_dynamics_vjp", "inverse_dynamics_hessian", units=SLOPE_LIMIT, without=PIECEWISE)
-def gradient_changes_by_the_hessian(model: Model, s: State) -> Errors:
+@law("inverse_dynamics_vjp inverse_dynamics_hessian", SLOPE_LIMIT, without=PIECEWISE)
+def gradient_changes_by_the_hessian(model: Model, s: Case) -> Errors:
     """The Hessian times a direction is the slope of the gradient along it; turns in q commute by
     half a bracket.
     """
     qq, qv, vv, aq = model.inverse_dynamics_hessian(s.q, s.v, s.v_dot, s.multiplier)
 
-    def gradient(at: State) -> np.ndarray:
+    def gradient(at: Case) -> np.ndarray:
         return np.concatenate(model.inverse_dynamics_vjp(at.q, at.v, s.v_dot, s.multiplier))
 
     change, largest = slopes(model, s, gradient)
@@ -132,8 +121,8 @@ def gradient_changes_by_the_hessian(model: Model, s: State) -> Errors:
     return errors
 
 
-@law("energy", "energy_derivatives", "mass_matrix", units=SLOPE_LIMIT, without=PIECEWISE)
-def energies_change_by_their_gradients(model: Model, s: State) -> Errors:
+@law("energy energy_derivatives mass_matrix", SLOPE_LIMIT, without=PIECEWISE)
+def energies_change_by_their_gradients(model: Model, s: Case) -> Errors:
     """The gradients of both energies times a direction are their slopes.
 
     That of the kinetic energy with respect to v is H v.
@@ -148,8 +137,8 @@ def energies_change_by_their_gradients(model: Model, s: State) -> Errors:
     }
 
 
-@law("momentum", "momentum_derivatives", units=SLOPE_LIMIT)
-def momentum_changes_by_its_jacobians(model: Model, s: State) -> Errors:
+@law("momentum momentum_derivatives", SLOPE_LIMIT)
+def momentum_changes_by_its_jacobians(model: Model, s: Case) -> Errors:
     """The Jacobians of both momenta times a direction are their slopes."""
     linear_dq, linear_dv, angular_dq, angular_dv = model.momentum_derivatives(s.q, s.v)
     change, largest = slopes(model, s, lambda at: np.stack(model.momentum(at.q, at.v)))
@@ -158,13 +147,11 @@ def momentum_changes_by_its_jacobians(model: Model, s: State) -> Errors:
 
 
 @law(
-    "mass_matrix",
-    "forward_dynamics",
-    "inverse_dynamics_parameter_derivatives",
+    "mass_matrix forward_dynamics inverse_dynamics_parameter_derivatives "
     "forward_dynamics_parameter_derivatives",
-    units=SLOPE_LIMIT,
+    SLOPE_LIMIT,
 )
-def parameters_move_both_dynamics_alike(model: Model, s: State) -> Errors:
+def parameters_move_both_dynamics_alike(model: Model, s: Case) -> Errors:
     """H times a parameter's derivative of v_dot is minus that of H v_dot + C at the same v_dot."""
     v_dot, H = model.forward_dynamics(s.q, s.v, s.tau), model.mass_matrix(s.q).astype(float)
     forward = model.forward_dynamics_parameter_derivatives(s.q, s.v, s.tau).astype(float)

@@ -11,7 +11,7 @@ from serpentail_scene.layout import OMEGA, TAIL_V, VELOCITY
 from ..basics.attitude import pose_of
 from ..model.model import Model
 from ..model.parameters import total_mass
-from .states import State, outputs
+from .states import Case, outputs
 
 BLOCKS = (VELOCITY, OMEGA, TAIL_V)  # of forces and accelerations: B's translation, rotation, tail
 Blocks = tuple[slice, ...]
@@ -28,7 +28,7 @@ def rounding(model: Model) -> float:
     return float(np.spacing(np.ones((), model.parameter_vector.dtype)))
 
 
-def differences(model: Model, name: str, state: State, references: Iterable[ArrayLike]) -> float:
+def differences(model: Model, name: str, state: Case, references: Iterable[ArrayLike]) -> float:
     """Return the largest error of a function's outputs against references, in order.
 
     Errors of derivatives of v_dot are divided by cond(H).
@@ -46,7 +46,7 @@ def differences(model: Model, name: str, state: State, references: Iterable[Arra
     return worst(errors) / (sensitivity(model, state.q) if solved else 1.0)
 
 
-def cancelling_size(model: Model, output: str, state: State) -> float:
+def cancelling_size(model: Model, output: str, state: Case) -> float:
     """Return how large the terms of a derivative are that must cancel; 0 where none do.
 
     Rotating the torso does not change how B moves.  The terms by which the whole mass moves with B
@@ -60,7 +60,7 @@ def cancelling_size(model: Model, output: str, state: State) -> float:
     return total_mass(model.parameters) * sizes.get(output, 0.0)
 
 
-def same_bits(model: Model, names: Iterable[str], state: State, other: State) -> dict[str, float]:
+def same_bits(model: Model, names: Iterable[str], state: Case, other: Case) -> dict[str, float]:
     """Return by function how many outputs differ between two states."""
     return {
         name: differing_outputs(outputs(model, name, state), outputs(model, name, other))
@@ -119,10 +119,7 @@ def condition(H: np.ndarray) -> float:
 
 
 def sensitivity(model: Model, q: np.ndarray) -> float:
-    """Return the condition number by which an error of v_dot is divided.
-
-    Without H it is that of the tail's part; without v_dot it is 1.
-    """
+    """Return cond(H), which divides errors of v_dot; without H that of the tail's part, or 1."""
     if "mass_matrix" in model.kernels:
         return condition(model.mass_matrix(q))
     if not model.kernels.keys() & {"forward_dynamics", "forward_dynamics_external"}:

@@ -22,8 +22,8 @@ from .errors import (
     turned_array,
     worst,
 )
-from .law import VALUE_LIMIT, Errors, Law, fastest, moved, registry, slope
-from .states import State, at_origin, outputs, state_functions
+from .law import VALUE_LIMIT, Errors, fastest, law, moved, slope
+from .states import Case, at_origin, outputs, state_functions
 
 WORLD = ("mass_matrix_world", "bias_force_world")
 # results that depend on position and velocity of B
@@ -35,8 +35,6 @@ PLACED = (
     "tail_points",
     "contact_points",
 )
-LAWS: list[Law] = []
-law = registry(LAWS)
 
 
 def changed_axes(top: np.ndarray, middle: np.ndarray, size: int) -> np.ndarray:
@@ -47,7 +45,7 @@ def changed_axes(top: np.ndarray, middle: np.ndarray, size: int) -> np.ndarray:
 
 
 @law(units=VALUE_LIMIT, only="free")
-def pose_in_the_world_turns_all_alike(model: Model, s: State) -> Errors:
+def pose_in_the_world_turns_all_alike(model: Model, s: Case) -> Errors:
     """Turning the world about z and shifting it turns and shifts every result."""
     angle, shift = 1.1, np.array([0.3, -0.7, 0.5])
     c, n = np.cos(angle), np.sin(angle)
@@ -83,7 +81,7 @@ def turned_outputs(model: Model, results: dict, X: np.ndarray, shift: np.ndarray
 
 
 @law(only="free")
-def position_and_speed_of_the_torso_do_not_matter(model: Model, s: State) -> Errors:
+def position_and_speed_of_the_torso_do_not_matter(model: Model, s: Case) -> Errors:
     """H, C, v_dot and Jacobians do not change with B's position and velocity, bit for bit."""
     q, v = s.q.copy(), s.v.copy()
     q[POSITION] += 5.0
@@ -93,15 +91,15 @@ def position_and_speed_of_the_torso_do_not_matter(model: Model, s: State) -> Err
 
 
 @law(only="free")
-def quaternion_has_no_norm_and_no_sign(model: Model, s: State) -> Errors:
+def quaternion_has_no_norm_and_no_sign(model: Model, s: Case) -> Errors:
     """The quaternion times -2 is the same attitude: the same results, bit for bit."""
     q = s.q.copy()
     q[QUATERNION] *= -2
     return same_bits(model, state_functions(model), s, replace(s, q=q))
 
 
-@law("tail_points", units=VALUE_LIMIT, only="articulated")
-def links_have_their_length(model: Model, s: State) -> Errors:
+@law("tail_points", VALUE_LIMIT, only="articulated")
+def links_have_their_length(model: Model, s: Case) -> Errors:
     """The first tail point is the mount, and each is a link from the next: L_t / N, or its own
     length.
     """
@@ -110,15 +108,15 @@ def links_have_their_length(model: Model, s: State) -> Errors:
     mount = pose[POSITION] + rotation_matrix(pose[QUATERNION]) @ model.parameters["tail_mount"]
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     even = model.parameters["tail_length"] / len(lengths)
-    own = np.array(model.parameters.get("link_lengths", np.full(len(lengths), even)))
+    wanted = np.array(model.parameters.get("link_lengths", np.full(len(lengths), even)))
     return {
         "mount": relative(points[0], mount, points),
-        "lengths": relative(lengths, own, points),
+        "lengths": relative(lengths, wanted, points),
     }
 
 
-@law("tail_points", "tail_point_jacobians", units=VALUE_LIMIT)
-def jacobians_are_the_derivatives_of_the_points(model: Model, s: State) -> Errors:
+@law("tail_points tail_point_jacobians", VALUE_LIMIT)
+def jacobians_are_the_derivatives_of_the_points(model: Model, s: Case) -> Errors:
     """J v is the derivative of the tail points along each unit velocity, relative to |points| times
     the links' turn.
     """
@@ -135,14 +133,8 @@ def jacobians_are_the_derivatives_of_the_points(model: Model, s: State) -> Error
     return worst(errors)
 
 
-@law(
-    "mass_matrix",
-    "forward_dynamics",
-    "forward_dynamics_external",
-    "tail_point_jacobians",
-    units=VALUE_LIMIT,
-)
-def loads_accelerate_by_their_generalised_force(model: Model, s: State) -> Errors:
+@law("mass_matrix forward_dynamics forward_dynamics_external tail_point_jacobians", VALUE_LIMIT)
+def loads_accelerate_by_their_generalised_force(model: Model, s: Case) -> Errors:
     """H (v_dot under loads - v_dot without) = [f; n; 0] + sum J_k^T f_k, relative to cond(H)."""
     H, J = model.mass_matrix(s.q).astype(float), model.tail_point_jacobians(s.q)
     force = np.einsum("kxi,kx->i", J, s.f_ext[TORSO_NV:].reshape(-1, 3))
@@ -152,8 +144,8 @@ def loads_accelerate_by_their_generalised_force(model: Model, s: State) -> Error
     return difference(model, s.q, "v_dot", loaded, free + np.linalg.solve(H, force))
 
 
-@law("forward_dynamics", "forward_dynamics_external", units=VALUE_LIMIT)
-def no_load_is_no_change(model: Model, s: State) -> Errors:
+@law("forward_dynamics forward_dynamics_external", VALUE_LIMIT)
+def no_load_is_no_change(model: Model, s: Case) -> Errors:
     """Forward dynamics under zero loads is forward dynamics, relative to cond(H)."""
     free = model.forward_dynamics(s.q, s.v, s.tau)
     return difference(
@@ -161,15 +153,15 @@ def no_load_is_no_change(model: Model, s: State) -> Errors:
     )
 
 
-@law("mass_matrix", "mass_matrix_world", units=VALUE_LIMIT)
-def mass_matrix_in_world_axes(model: Model, s: State) -> Errors:
+@law("mass_matrix mass_matrix_world", VALUE_LIMIT)
+def mass_matrix_in_world_axes(model: Model, s: Case) -> Errors:
     """The world-frame H is X^-T H X^-1 with X = blkdiag(1, R, 1)."""
     X = changed_axes(np.eye(3), rotation_matrix(s.q[QUATERNION]), model.nv)
     return matrix_error(model.mass_matrix_world(s.q), X @ model.mass_matrix(s.q) @ X.T)
 
 
-@law("bias_force", "bias_force_world", units=VALUE_LIMIT)
-def bias_force_in_world_axes(model: Model, s: State) -> Errors:
+@law("bias_force bias_force_world", VALUE_LIMIT)
+def bias_force_in_world_axes(model: Model, s: Case) -> Errors:
     """The world-frame C is X^-T C: d(R omega)/dt = R omega_dot, so that X_dot adds nothing."""
     X = changed_axes(np.eye(3), rotation_matrix(s.q[QUATERNION]), model.nv)
     return block_error(model.bias_force_world(s.q, s.v), X @ model.bias_force(s.q, s.v))

@@ -14,7 +14,7 @@ from ..basics.errors import UnusualSize
 from ..model.model import Model
 from ..model.passive import idle
 from .errors import rounding
-from .states import State, is_fixed
+from .states import Case, is_fixed
 
 # limits in roundings (eps of the model's real type)
 VALUE_LIMIT = 450  # 1e-13 in double
@@ -23,7 +23,7 @@ PIECEWISE = ("stops",)  # of the passive tail: their forces have no slopes by wi
 FEW_LINKS = 8  # in a segment: with more of them, rounding grows
 
 Errors = float | dict[str, float]  # one error, or one for each place
-LawFunction = Callable[[Model, State], Errors]
+LawFunction = Callable[[Model, Case], Errors]
 
 
 @dataclass(frozen=True)
@@ -51,23 +51,18 @@ class Law:
         return self.floor + units * rounding(model)
 
 
-def registry(laws: list[Law]) -> Callable[..., Callable[[LawFunction], LawFunction]]:
-    """Return a decorator that adds a function (model, state) -> error, or errors by place, to laws.
+def law(needs: str = "", units: float = 0.0, **limits: Any) -> Callable[[LawFunction], Law]:
+    """Return a decorator: a function of a model and a state that returns errors becomes a law.
 
-    The function's name and docstring are the law's; the decorator takes the functions that the law
-    needs, and its limits.
+    The function's name and docstring are the law's. needs: names of functions, between spaces.
     """
 
-    def law(*needs: str, **limits: Any) -> Callable[[LawFunction], LawFunction]:
-        def register(error: LawFunction) -> LawFunction:
-            name = error.__name__.replace("_", " ")
-            text = " ".join((error.__doc__ or "").split())
-            laws.append(Law(name, text, error, needs, **limits))
-            return error
+    def made(error: LawFunction) -> Law:
+        name = error.__name__.replace("_", " ")
+        text = " ".join((error.__doc__ or "").split())
+        return Law(name, text, error, tuple(needs.split()), units, **limits)
 
-        return register
-
-    return law
+    return made
 
 
 def rid_of(model: Model, parts: tuple[str, ...]) -> Model:

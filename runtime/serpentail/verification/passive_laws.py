@@ -1,25 +1,21 @@
 """Laws of the passive tail: its springs, damping and stops, against the same tail without them."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from ..model.model import Model
 from ..model.parameters import total_mass
 from ..model.passive import PARTS, passive_force, stored_energy
-from .contact_laws import HEIGHT, bristles, legs, raised
+from .contact_laws import implicit_step
 from .errors import relative, rounding, sensitivity
-from .law import PIECEWISE, VALUE_LIMIT, Errors, Law, registry, rid_of
-from .states import State
+from .law import PIECEWISE, VALUE_LIMIT, Errors, law, rid_of
+from .states import Case
 from .value_laws import flight
 
-LAWS: list[Law] = []
-law = registry(LAWS)
 
-
-@law("inverse_dynamics", units=VALUE_LIMIT, only="passive")
-def the_tail_itself_asks_for_torques(model: Model, s: State) -> Errors:
+@law("inverse_dynamics", VALUE_LIMIT, only="passive")
+def the_tail_itself_asks_for_torques(model: Model, s: Case) -> Errors:
     """H v_dot + C has the forces of springs, damping and stops on the tail's coordinates alone."""
     bare = rid_of(model, PARTS)
     force = model.inverse_dynamics(s.q, s.v, s.v_dot).astype(float)
@@ -31,8 +27,8 @@ def the_tail_itself_asks_for_torques(model: Model, s: State) -> Errors:
     return relative(force, expected, size + np.abs(expected))
 
 
-@law("energy", units=VALUE_LIMIT, only="passive")
-def springs_and_stops_store_potential_energy(model: Model, s: State) -> Errors:
+@law("energy", VALUE_LIMIT, only="passive")
+def springs_and_stops_store_potential_energy(model: Model, s: Case) -> Errors:
     """Potential energy is that of height plus what the tail stores.
 
     Kinetic energy does not change.
@@ -47,8 +43,8 @@ def springs_and_stops_store_potential_energy(model: Model, s: State) -> Errors:
     }
 
 
-@law("energy_derivatives", units=VALUE_LIMIT, only="passive")
-def stored_energy_changes_by_its_forces(model: Model, s: State) -> Errors:
+@law("energy_derivatives", VALUE_LIMIT, only="passive")
+def stored_energy_changes_by_its_forces(model: Model, s: Case) -> Errors:
     """The gradient of potential energy has the forces of springs and stops, without damping."""
     bare = rid_of(model, PARTS)
     gradient = model.energy_derivatives(s.q, s.v)[2].astype(float)
@@ -60,19 +56,19 @@ def stored_energy_changes_by_its_forces(model: Model, s: State) -> Errors:
     return relative(gradient, expected, size)
 
 
-@law("forward_dynamics", units=VALUE_LIMIT, only="passive")
-def torques_that_make_up_for_it_rid_a_tail_of_it(model: Model, s: State) -> Errors:
+@law("forward_dynamics", VALUE_LIMIT, only="passive")
+def torques_that_make_up_for_it_rid_a_tail_of_it(model: Model, s: Case) -> Errors:
     """With torques that compensate the passive tail, v_dot is that of a tail without it."""
     bare = rid_of(model, PARTS)
-    own = passive_force(model.parameters, s.q[model.layout.tail_q], s.v[model.layout.tail_v])
+    force = passive_force(model.parameters, s.q[model.layout.tail_q], s.v[model.layout.tail_v])
     expected = bare.inverse_dynamics(s.q, s.v, bare.forward_dynamics(s.q, s.v, s.tau))
-    found = bare.inverse_dynamics(s.q, s.v, model.forward_dynamics(s.q, s.v, s.tau + own))
-    scale = np.abs(own).max() + np.abs(expected).max() + np.abs(found).max()
+    found = bare.inverse_dynamics(s.q, s.v, model.forward_dynamics(s.q, s.v, s.tau + force))
+    scale = np.abs(force).max() + np.abs(expected).max() + np.abs(found).max()
     return relative(found, expected, scale)
 
 
-@law("rollout", "energy", "momentum", units=2000, floor=1e-6, only="passive")
-def passive_tails_change_energy_by_their_damping_alone(model: Model, s: State) -> Errors:
+@law("rollout energy momentum", 2000, floor=1e-6, only="passive")
+def passive_tails_change_energy_by_their_damping_alone(model: Model, s: Case) -> Errors:
     """In flight, momentum changes by - M g t and energy by the work of the tail's damping; springs
     and stops store energy and give it back. The tail starts between its stops.
     """
@@ -95,21 +91,14 @@ def passive_tails_change_energy_by_their_damping_alone(model: Model, s: State) -
     }
 
 
-@law(
-    "implicit_factor",
-    "implicit_solve",
-    "mass_matrix",
-    units=VALUE_LIMIT,
-    only="passive",
-    without=PIECEWISE,
-)
-def implicit_steps_know_the_passive_tail(model: Model, s: State) -> Errors:
+@law("implicit_factor implicit_solve mass_matrix", VALUE_LIMIT, only="passive", without=PIECEWISE)
+def implicit_steps_know_the_passive_tail(model: Model, s: Case) -> Errors:
     """High up and untracked, (1 - w J) k = r with J of springs and both dampings, relative to
     cond(H).
     """
     w, damping, values = 1e-3, np.linspace(1e-3, 2e-3, len(s.tau)), model.parameters
     H = model.mass_matrix(s.q).astype(float)
-    k_q, k_v = implicit_step(model, s, damping, w)
+    k_q, k_v, *_ = implicit_step(model, s, w, damping, np.zeros(2))
 
     # H (k_v - r_v) = -w (D k_v + K k_q)
     own = damping + np.asarray(values.get("tail_damping", 0.0))
@@ -121,14 +110,3 @@ def implicit_steps_know_the_passive_tail(model: Model, s: State) -> Errors:
         "v": relative(H @ (k_v - s.dv) / scale, load / scale) / sensitivity(model, s.q),
         "q": relative(k_q, s.dq + w * k_v),
     }
-
-
-def implicit_step(model: Model, s: State, damping: np.ndarray, w: float) -> tuple[Any, Any]:
-    """Return k_q and k_v of right-hand sides dq and dv, far from the ground."""
-    u = (bristles(model),) if model.contacts else ()
-    weight = [w, 1.0] if u else [w]
-    ground = (*u, *legs(model)) if u else ()
-    high, gains = raised(s.q, HEIGHT), np.zeros(2)
-    factors = model.kernel("implicit_factor")(high, s.v, damping, gains, weight, *ground)
-    k_q, k_v, *_ = model.kernel("implicit_solve")(factors, s.dq, s.dv, *u)
-    return k_q.astype(float), k_v.astype(float)

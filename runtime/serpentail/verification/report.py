@@ -24,17 +24,13 @@ from . import (
     value_laws,
 )
 from .law import Law, rid_of
-from .states import State, states
+from .states import Case, states
 
-LAWS = (
-    *value_laws.LAWS,
-    *frame_laws.LAWS,
-    *call_laws.LAWS,
-    *derivative_laws.LAWS,
-    *contact_laws.LAWS,
-    *passive_laws.LAWS,
-    *airborne_laws.LAWS,
+FILES = (
+    *(value_laws, frame_laws, call_laws, derivative_laws),
+    *(contact_laws, passive_laws, airborne_laws),
 )
+LAWS = tuple(each for file in FILES for each in vars(file).values() if isinstance(each, Law))
 OF = {"free": "a torso that moves"}
 STATUSES = ("passed", "failed", "not checked")
 
@@ -81,7 +77,7 @@ def laws(model: Model) -> list[Check]:
     return [check(entry, model, cases) for entry in LAWS]
 
 
-def check(entry: Law, model: Model, cases: list[State]) -> Check:
+def check(entry: Law, model: Model, cases: list[Case]) -> Check:
     """Check one law; one that speaks of functions the scene left out says so."""
     limit, reason = entry.limit(model), unchecked(entry, model)
     model = model if reason else rid_of(model, entry.without)
@@ -113,7 +109,7 @@ def unchecked(entry: Law, model: Model) -> str:
     return f"not generated: {absent}" if absent else ""
 
 
-def errors_at(entry: Law, model: Model, state: State) -> Iterator[tuple[str, float]]:
+def errors_at(entry: Law, model: Model, state: Case) -> Iterator[tuple[str, float]]:
     """Yield (place, error) of one state; nan if the model refuses to compute."""
     try:
         with np.errstate(all="ignore"):  # nan fails

@@ -16,8 +16,8 @@ KINDS = ("random", "straight", "folded")
 
 
 @dataclass(frozen=True)
-class State:
-    """One state of a model, all arguments that its functions take."""
+class Case:
+    """A state of a model at which laws are checked: all arguments that its functions take."""
 
     kind: str
     q: np.ndarray
@@ -51,11 +51,8 @@ class State:
         return np.resize(self.multiplier, len(self.x) + 3)
 
 
-def states(model: Model, count: int = 4, seed: int = 1) -> Iterator[State]:
-    """Yield ``count`` states of each kind, every number exact in the model's real type.
-
-    ModelError for polar coordinates.
-    """
+def states(model: Model, count: int = 4, seed: int = 1) -> Iterator[Case]:
+    """Yield states of each kind, exact in the model's real type; ModelError if it is polar."""
     if model.manifest["scene"]["coordinates"] == "polar":
         remedy = 'verify the same scene with coordinates = "bend"'
         raise ModelError(
@@ -65,11 +62,11 @@ def states(model: Model, count: int = 4, seed: int = 1) -> Iterator[State]:
     for kind in KINDS:
         for k in range(count):
             arrays = random_arrays(model, rng, kind, k)
-            yield State(kind, *(x.astype(real).astype(float) for x in arrays))
+            yield Case(kind, *(x.astype(real).astype(float) for x in arrays))
 
 
 def random_arrays(model: Model, rng: np.random.Generator, kind: str, k: int) -> list[np.ndarray]:
-    """Return the numbers of state k of its kind, in the order of a State's."""
+    """Return the numbers of state k of its kind, in the order of a Case's."""
     tail, length = model.layout.nt, model.parameters["tail_length"]
 
     # where it is, and how it moves
@@ -124,7 +121,7 @@ def blocks(rng: np.random.Generator, tail: int, scales: tuple[float, float, floa
     return np.concatenate([rng.uniform(-s, s, n) for s, n in zip(scales, sizes, strict=True)])
 
 
-def at_origin(s: State) -> State:
+def at_origin(s: Case) -> Case:
     """Return the state with B at the origin."""
     if is_fixed(s.q):
         return s
@@ -139,7 +136,7 @@ def is_fixed(q: np.ndarray) -> bool:
     return layout is not None and layout.fixed
 
 
-def scaled(s: State, factor: float) -> State:
+def scaled(s: Case, factor: float) -> Case:
     """Return another state: all but the attitude times a factor."""
     q = s.q * factor
     if not is_fixed(q):
@@ -154,12 +151,12 @@ def scaled(s: State, factor: float) -> State:
 
 def state_functions(model: Model) -> list[str]:
     """Return the functions of a state alone; those of contact and implicit steps take more."""
-    return functions_of(model, "accelerations", *(field.name for field in fields(State)))
+    return functions_of(model, "accelerations", *(field.name for field in fields(Case)))
 
 
 def called_functions(model: Model) -> list[str]:
     """Return those, and functions of an airborne state."""
-    known = {*vars(State), *(field.name for field in fields(State))}
+    known = {*vars(Case), *(field.name for field in fields(Case))}
     return functions_of(model, *known)
 
 
@@ -170,7 +167,7 @@ def functions_of(model: Model, *known: str) -> list[str]:
     return [name for name in model.kernels if inputs[name] <= {*known}]
 
 
-def outputs(model: Model, name: str, state: State) -> dict[str, np.ndarray]:
+def outputs(model: Model, name: str, state: Case) -> dict[str, np.ndarray]:
     """Return the outputs of a function at a state, by name."""
     return named(model, name, model.kernel(name)(*arguments(model, name, state)))
 
@@ -182,13 +179,13 @@ def named(model: Model, name: str, result: Any) -> dict[str, np.ndarray]:
     return dict(zip(names, results, strict=True))
 
 
-def arguments(model: Model, name: str, state: State) -> list[np.ndarray]:
+def arguments(model: Model, name: str, state: Case) -> list[np.ndarray]:
     """Return the inputs of a function at a state."""
     return [getattr(state, a["name"]) for a in model.manifest["functions"][name]["inputs"]]
 
 
 def casadi_outputs(
-    model: Model, name: str, function: Any, state: State, *more: Any
+    model: Model, name: str, function: Any, state: Case, *more: Any
 ) -> list[np.ndarray]:
     """Return the outputs of a CasADi function at a state, shaped as the model's."""
     results = function(*arguments(model, name, state), *more)

@@ -14,28 +14,26 @@ from ..motion.trajectory import Trajectory
 from ..simulation.schedules import Legs
 from ..simulation.simulate import simulate
 from .errors import block_error, blocks_of, difference, differing, relative, rounding, worst
-from .law import PIECEWISE, VALUE_LIMIT, Errors, Law, fastest, moved, registry, slope
-from .states import State
+from .law import PIECEWISE, VALUE_LIMIT, Errors, fastest, law, moved, slope
+from .states import Case
 
 FLIGHT, STEPS = 0.2, 2000  # s
 SWING = 0.02  # s, of a tail on a fixed base, which gravity folds and whips
 CLEAR = 10.0  # m: more than a flight falls, or than a tail's length
-LAWS: list[Law] = []
-law = registry(LAWS)
 
 
 # Inertia, dynamics, energy, flight
 
 
 @law("mass_matrix")
-def mass_matrix_is_symmetric(model: Model, s: State) -> Errors:
+def mass_matrix_is_symmetric(model: Model, s: Case) -> Errors:
     """H equals its transpose, bit for bit."""
     H = model.mass_matrix(s.q)
     return differing(H, H.T)
 
 
 @law("mass_matrix")
-def mass_matrix_is_positive_definite(model: Model, s: State) -> Errors:
+def mass_matrix_is_positive_definite(model: Model, s: Case) -> Errors:
     """The smallest eigenvalue of H, scaled to a unit diagonal, is above eps times the largest."""
     H = model.mass_matrix(s.q).astype(float)
     if not np.diag(H).min() > 0:
@@ -45,24 +43,24 @@ def mass_matrix_is_positive_definite(model: Model, s: State) -> Errors:
     return worst([rounding(model) - eigenvalues[0] / eigenvalues[-1]])
 
 
-@law("mass_matrix", units=4, only="free")
-def translation_carries_the_whole_mass(model: Model, s: State) -> Errors:
+@law("mass_matrix", 4, only="free")
+def translation_carries_the_whole_mass(model: Model, s: Case) -> Errors:
     """The first block of H is (m_torso + m_tail) 1."""
     return relative(
         model.mass_matrix(s.q)[VELOCITY, VELOCITY], total_mass(model.parameters) * np.eye(3)
     )
 
 
-@law("mass_matrix", "bias_force", "inverse_dynamics", units=VALUE_LIMIT)
-def inverse_dynamics_is_mass_times_acceleration_plus_bias(model: Model, s: State) -> Errors:
+@law("mass_matrix bias_force inverse_dynamics", VALUE_LIMIT)
+def inverse_dynamics_is_mass_times_acceleration_plus_bias(model: Model, s: Case) -> Errors:
     """Inverse dynamics is H v_dot + C, relative to |H| |v_dot| + |C|."""
     H, C = model.mass_matrix(s.q), model.bias_force(s.q, s.v)
     found, scale = model.inverse_dynamics(s.q, s.v, s.v_dot), abs(H) @ abs(s.v_dot) + abs(C)
     return block_error(found, H @ s.v_dot + C, scale, blocks_of(model))
 
 
-@law("mass_matrix", "inverse_dynamics", "forward_dynamics", units=VALUE_LIMIT)
-def forward_dynamics_needs_the_torques_it_was_given(model: Model, s: State) -> Errors:
+@law("mass_matrix inverse_dynamics forward_dynamics", VALUE_LIMIT)
+def forward_dynamics_needs_the_torques_it_was_given(model: Model, s: Case) -> Errors:
     """Inverse dynamics of forward dynamics is [0; tau], relative to |H| |v_dot| + |tau|."""
     v_dot = model.forward_dynamics(s.q, s.v, s.tau)
     applied = np.concatenate([np.zeros(model.nv - len(s.tau)), s.tau])
@@ -72,12 +70,8 @@ def forward_dynamics_needs_the_torques_it_was_given(model: Model, s: State) -> E
 
 
 # behind its stops a tail is pushed so much harder than it moves that roundings of that are seen
-@law(
-    *("mass_matrix", "inverse_dynamics", "forward_dynamics_external"),
-    units=VALUE_LIMIT,
-    without=PIECEWISE,
-)
-def forward_dynamics_inverts_inverse_dynamics(model: Model, s: State) -> Errors:
+@law("mass_matrix inverse_dynamics forward_dynamics_external", VALUE_LIMIT, without=PIECEWISE)
+def forward_dynamics_inverts_inverse_dynamics(model: Model, s: Case) -> Errors:
     """Under the loads that v_dot needs, forward dynamics returns v_dot, relative to cond(H)."""
     force = model.inverse_dynamics(s.q, s.v, s.v_dot)
     load = model.external_force(force[VELOCITY], force[OMEGA])
@@ -86,14 +80,14 @@ def forward_dynamics_inverts_inverse_dynamics(model: Model, s: State) -> Errors:
     )
 
 
-@law("mass_matrix", "energy", units=VALUE_LIMIT)
-def kinetic_energy_is_half_v_H_v(model: Model, s: State) -> Errors:
+@law("mass_matrix energy", VALUE_LIMIT)
+def kinetic_energy_is_half_v_H_v(model: Model, s: Case) -> Errors:
     """T = v . H v / 2."""
     return relative(model.energy(s.q, s.v)[0], s.v @ model.mass_matrix(s.q) @ s.v / 2)
 
 
-@law("mass_matrix", "momentum", units=VALUE_LIMIT, only="free")
-def momentum_is_mass_times_velocity(model: Model, s: State) -> Errors:
+@law("mass_matrix momentum", VALUE_LIMIT, only="free")
+def momentum_is_mass_times_velocity(model: Model, s: Case) -> Errors:
     """Momentum is the upper part of H v, angular momentum the middle part, moved to the COM."""
     linear, angular = model.momentum(s.q, s.v)
     impulse = model.mass_matrix(s.q) @ s.v
@@ -115,8 +109,8 @@ def center_of_mass(model: Model, q: np.ndarray) -> np.ndarray:
     return q[..., POSITION] + (R @ h[..., None])[..., 0] / H[..., :1, 0]
 
 
-@law("mass_matrix", "center_of_mass", units=VALUE_LIMIT, only="free")
-def center_of_mass_is_that_of_the_mass_matrix(model: Model, s: State) -> Errors:
+@law("mass_matrix center_of_mass", VALUE_LIMIT, only="free")
+def center_of_mass_is_that_of_the_mass_matrix(model: Model, s: Case) -> Errors:
     """The COM and its Jacobian follow from H; the Jacobian is the upper part of H over the mass."""
     position, _, J = model.center_of_mass(s.q, s.v)
     upper = model.mass_matrix(s.q)[VELOCITY]
@@ -126,8 +120,8 @@ def center_of_mass_is_that_of_the_mass_matrix(model: Model, s: State) -> Errors:
     }
 
 
-@law("momentum", "center_of_mass", units=VALUE_LIMIT)
-def momentum_is_mass_times_velocity_of_the_center_of_mass(model: Model, s: State) -> Errors:
+@law("momentum center_of_mass", VALUE_LIMIT)
+def momentum_is_mass_times_velocity_of_the_center_of_mass(model: Model, s: Case) -> Errors:
     """Momentum is the mass times the velocity of the COM: of the animal, or of a tail on a fixed
     base.
     """
@@ -135,15 +129,15 @@ def momentum_is_mass_times_velocity_of_the_center_of_mass(model: Model, s: State
     return relative(total_mass(model.parameters) * velocity, model.momentum(s.q, s.v)[0])
 
 
-@law("center_of_mass", units=VALUE_LIMIT)
-def velocity_of_the_center_of_mass_is_J_v(model: Model, s: State) -> Errors:
+@law("center_of_mass", VALUE_LIMIT)
+def velocity_of_the_center_of_mass_is_J_v(model: Model, s: Case) -> Errors:
     """The velocity of the COM is its Jacobian times v, relative to the largest part of that."""
     _, velocity, J = model.center_of_mass(s.q, s.v)
     return relative(velocity, J @ s.v, abs(J) @ abs(s.v))
 
 
-@law("energy", "forward_dynamics", units=VALUE_LIMIT, without=PIECEWISE)
-def energy_changes_by_the_power_of_the_torques(model: Model, s: State) -> Errors:
+@law("energy forward_dynamics", VALUE_LIMIT, without=PIECEWISE)
+def energy_changes_by_the_power_of_the_torques(model: Model, s: Case) -> Errors:
     """Along forward dynamics dE/dt = tau . q_t_dot less the power of the tail's own damping.
 
     The error is relative to energy times the fastest rate.
@@ -160,25 +154,25 @@ def energy_changes_by_the_power_of_the_torques(model: Model, s: State) -> Errors
     return relative(power.sum(), rates @ (s.tau - damped), rate * largest.sum())
 
 
-def flight(model: Model, s: State, **settings: Any) -> Trajectory:
+def flight(model: Model, s: Case, **settings: Any) -> Trajectory:
     """Fly without torques, links turning at up to 10 rad/s: undamped tails whip, long ones more.
 
-    A model with contacts flies above the ground with its legs held. settings: method and
+    A model with contacts flies above the ground with its legs at rest. settings: method and
     tolerance; without them 2000 steps of RK4.
     """
     q, v = s.q.copy(), 10 / fastest(model, s.v) * s.v
     if model.contacts:
         q[2] += CLEAR
-    held: dict[str, Any] = {"legs": Legs.fixed(0.0, 0.0)} if "feet" in model.contacts else {}
+    legs: dict[str, Any] = {"legs": Legs.fixed(0.0, 0.0)} if "feet" in model.contacts else {}
     span = SWING if model.fixed else FLIGHT
     settings = settings or {"method": "rk4", "step": span / STEPS}
-    motion = simulate(model, q, v, t_span=span, **held, **settings)
+    motion = simulate(model, q, v, t_span=span, **legs, **settings)
     assert isinstance(motion, Trajectory)  # one start, one motion
     return motion
 
 
-@law("rollout", "energy", "momentum", units=4 * STEPS, floor=1e-10, without=PARTS)
-def energy_is_constant_in_flight(model: Model, s: State) -> Errors:
+@law("rollout energy momentum", 4 * STEPS, floor=1e-10, without=PARTS)
+def energy_is_constant_in_flight(model: Model, s: Case) -> Errors:
     """In 0.2 s of flight without torques, or 0.02 s on a fixed base (2000 steps of RK4), the sum of
     both energies is constant.
     """
@@ -186,14 +180,8 @@ def energy_is_constant_in_flight(model: Model, s: State) -> Errors:
     return relative(motion.energy, motion.energy[0], abs(motion.kinetic) + abs(motion.potential))
 
 
-@law(
-    *("rollout", "energy", "momentum"),
-    units=4 * STEPS,
-    floor=1e-10,
-    only="free",
-    without=PARTS,
-)
-def momentum_is_constant_in_flight(model: Model, s: State) -> Errors:
+@law("rollout energy momentum", 4 * STEPS, floor=1e-10, only="free", without=PARTS)
+def momentum_is_constant_in_flight(model: Model, s: Case) -> Errors:
     """In flight angular momentum about the COM is constant, and momentum changes by - M g t."""
     motion = flight(model, s)
     weight = total_mass(model.parameters) * model.parameters["gravity"]
@@ -205,14 +193,8 @@ def momentum_is_constant_in_flight(model: Model, s: State) -> Errors:
     }
 
 
-@law(
-    *("rollout", "mass_matrix", "energy", "momentum"),
-    units=4 * STEPS,
-    floor=1e-10,
-    only="free",
-    without=PARTS,
-)
-def center_of_mass_flies_a_parabola(model: Model, s: State) -> Errors:
+@law("rollout mass_matrix energy momentum", 4 * STEPS, floor=1e-10, only="free", without=PARTS)
+def center_of_mass_flies_a_parabola(model: Model, s: Case) -> Errors:
     """In flight the COM is at c + c_dot t - g t^2 / 2."""
     motion = flight(model, s)
     t, centers = motion.t[:, None], center_of_mass(model, motion.q)

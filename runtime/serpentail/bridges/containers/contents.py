@@ -8,20 +8,36 @@ from typing import Any
 
 import numpy as np
 
+from serpentail_scene.layout import Layout
+
 from ...basics.attitude import Array
+from ...model.model import Model
 from ...motion.contact import Contact
 from ...motion.trajectory import Trajectory
 from ...simulation.rollouts import Rollouts
-from .labels import AXES, LEGS, TORSO_Q, TORSO_V, joints, points
 
 NAME = re.compile("[A-Za-z_][A-Za-z0-9_]*")
-MEASURES = {
+# units by the names of numbers
+TORSO_Q = dict.fromkeys(("x", "y", "z"), "m") | dict.fromkeys(("qw", "qx", "qy", "qz"), "1")
+TORSO_V = dict.fromkeys(("vx", "vy", "vz"), "m/s")
+TORSO_V |= dict.fromkeys(("omega_x", "omega_y", "omega_z"), "rad/s")
+AXES = ("x", "y", "z")
+LEGS = ("gamma_right", "delta_right", "gamma_left", "delta_left")
+FOOT = ("right_A", "right_M", "right_T", "left_A", "left_M", "left_T")
+# coordinates of a segment by its kind; of a motion without model by bend
+TAILS = {"articulated": ("alpha", "beta"), "continuum": ("a", "b")}
+POLAR = ("phi", "theta")
+WITHOUT_MODEL = ("pitch", "yaw")
+# dimensions, unit and meaning of the arrays of motions; None: each number has its own unit
+ARRAYS: dict[str, tuple[tuple[str, ...], str | None, str]] = {
+    "q": (("coordinate",), None, "configuration"),
+    "v": (("rate",), None, "velocity"),
+    "tau": (("joint",), "N m", "torques of the tail"),
     "kinetic": ((), "J", "kinetic energy"),
     "potential": ((), "J", "potential energy"),
     "linear_momentum": (("axis",), "kg m/s", "linear momentum, world"),
     "angular_momentum": (("axis",), "kg m^2/s", "angular momentum about the centre of mass, world"),
-}
-TOUCHING = {
+    # on the ground
     "points": (("point", "axis"), "m", "points that can touch the ground, world"),
     "forces": (("point", "axis"), "N", "force of the ground at each of them, world"),
     "bristles": (("point", "plane"), "m", "stretch of the friction springs"),
@@ -30,7 +46,7 @@ TOUCHING = {
 
 
 @dataclass(frozen=True, eq=False)
-class Variable:
+class Quantity:
     """An array, its dimensions, its unit, or one of each label of its last dimension, and words."""
 
     dims: tuple[str, ...]
@@ -46,12 +62,12 @@ class Variable:
 
 @dataclass(frozen=True, eq=False)
 class Contents:
-    """Labels of all dimensions, leading dimensions (time, or run and time), variables, facts."""
+    """Labels of all dimensions, leading dimensions (time, or run and time), quantities, facts."""
 
     leading: tuple[str, ...]
     labels: dict[str, Sequence[Any]]
     groups: Sequence[str]  # of each point
-    variables: dict[str, Variable]
+    quantities: dict[str, Quantity]
     facts: dict[str, Any]
 
 
@@ -60,87 +76,76 @@ def contents(motion: Trajectory | Rollouts) -> Contents:
 
     Arrays are (time, ...) or (run, time, ...), with nan after the end of a run.
     """
+    labels: dict[str, Any] = {"time": motion.t}
     if isinstance(motion, Rollouts):
-        return _of_runs(motion)
-    segments = motion.segments
-    names = joints(segments, motion.model)
-    labels: dict[str, Any] = {"time": motion.t} | _labels(names, motion.layout.fixed)
-    variables, groups = _states(motion, labels, ("time",)), _groups(motion.contact)
-    if motion.contact is not None:
-        labels |= _touch_labels(motion.contact)
-        for name, array in motion.contact.arrays.items():
-            variables[name] = _variable(TOUCHING[name], ("time",), array)
-    return Contents(("time",), labels, groups, variables, facts(motion.info))
+        labels = {"run": np.arange(len(motion))} | labels
+        model: Model | None = motion.source.model
+        contact, touching = _contacts(motion)
+    else:
+        model, contact = motion.model, motion.contact
+        touching = {} if contact is None else contact.arrays
+    leading = tuple(labels)
 
-
-def _of_runs(runs: Rollouts) -> Contents:
-    """What rollouts hold: of each run also when it ended, its error, and its own parameters."""
-    leading, model = ("run", "time"), runs.source.model
-    labels: dict[str, Any] = {"run": np.arange(len(runs)), "time": runs.t}
-    labels |= _labels(joints(model.segments, model), model.fixed)
-    variables = _states(runs, labels, leading)
-    contact, touching = _contacts(runs)
-    if contact is not None:
-        labels |= _touch_labels(contact)
-        for name, array in touching.items():
-            variables[name] = _variable(TOUCHING[name], leading, array)
-    variables["ends"] = Variable(("run",), runs.ends, "s", "when the run ended")
-    errors = np.array(["" if error is None else str(error) for error in runs.errors])
-    variables["errors"] = Variable(("run",), errors, "", "what ended the run early")
-    entries = {entry["name"]: entry for entry in model.manifest["parameters"]}
-    for name, values in runs.source.parameters.changes.items():
-        dims = ("run", "axis")[: values.ndim]
-        entry = entries[name]
-        variables[name] = Variable(dims, values, entry["unit"], entry["meaning"])
-    return Contents(leading, labels, _groups(contact), variables, facts(runs.info))
-
-
-def _states(
-    motion: Any, labels: Mapping[str, Any], leading: tuple[str, ...]
-) -> dict[str, Variable]:
-    """States, torques and measures, which both kinds have under the same names."""
-    tail = len(labels.get("joint", ()))
-    of_torso = len(labels["coordinate"]) > tail
-    q_units = [*(TORSO_Q.values() if of_torso else ()), *["rad"] * tail]
-    v_units = [*(TORSO_V.values() if of_torso else ()), *["rad/s"] * tail]
-    found = {
-        "q": Variable((*leading, "coordinate"), motion.q, q_units, "configuration"),
-        "v": Variable((*leading, "rate"), motion.v, v_units, "velocity"),
-    }
-    if tail:
-        found["tau"] = Variable((*leading, "joint"), motion.tau, "N m", "torques of the tail")
-    measures = {
-        name: _variable(entry, leading, getattr(motion, name)) for name, entry in MEASURES.items()
-    }
-    return found | measures
-
-
-def _variable(
-    entry: tuple[tuple[str, ...], str, str], leading: tuple[str, ...], array: np.ndarray
-) -> Variable:
-    dims, units, words = entry
-    return Variable((*leading, *dims), array, units, words)
-
-
-def _labels(tail: list[str], fixed: bool) -> dict[str, Any]:
-    """Labels of the dimensions that every motion has; none of a torso on a fixed base."""
-    return {
-        "coordinate": [*(() if fixed else TORSO_Q), *tail],
-        "rate": [*(() if fixed else TORSO_V), *(f"{name}_dot" for name in tail)],
-        "axis": AXES,
-    } | ({"joint": tail} if tail else {})
-
-
-def _touch_labels(contact: Contact) -> dict[str, Any]:
-    """Labels of the dimensions of a motion on the ground."""
-    legs = {} if contact.legs is None else {"leg": LEGS}
-    return {"point": points(contact.groups), "plane": AXES[:2]} | legs
-
-
-def _groups(contact: Contact | None) -> list[str]:
-    """The group of each point."""
+    # names of the numbers
+    layout = Layout.of_width(motion.q.shape[-1])
+    assert layout is not None
+    tail = joints(layout.segments, model)
+    torso_q, torso_v = ({}, {}) if layout.fixed else (TORSO_Q, TORSO_V)
+    labels["coordinate"] = [*torso_q, *tail]
+    labels["rate"] = [*torso_v, *(f"{name}_dot" for name in tail)]
+    labels |= {"axis": AXES} | ({"joint": tail} if tail else {})
     groups = {} if contact is None else contact.groups
-    return [name for name, count in groups.items() for _ in range(count)]
+    if contact is not None:
+        labels |= {"point": points(groups), "plane": AXES[:2]}
+        labels |= {} if contact.legs is None else {"leg": LEGS}
+
+    own_units = {
+        "q": [*torso_q.values(), *["rad"] * len(tail)],
+        "v": [*torso_v.values(), *["rad/s"] * len(tail)],
+    }
+    quantities = {}
+    for name, (dims, unit, words) in ARRAYS.items():
+        if set(dims) <= labels.keys():
+            values = touching[name] if name in touching else getattr(motion, name)
+            units = own_units[name] if unit is None else unit
+            quantities[name] = Quantity((*leading, *dims), values, units, words)
+    if isinstance(motion, Rollouts):
+        quantities |= _of_runs(motion)
+    each_group = [name for name, count in groups.items() for _ in range(count)]
+    return Contents(leading, labels, each_group, quantities, facts(motion.info))
+
+
+def joints(segments: int, model: Model | None) -> list[str]:
+    """Return the names (2m,) of the tail coordinates, such as alpha_1, beta_1."""
+    pairs = [WITHOUT_MODEL] * segments
+    if model is not None:
+        polar = model.manifest["scene"]["coordinates"] == "polar"
+        pairs = [POLAR if polar else TAILS[kind] for kind in model.kinds]
+    return [f"{name}_{i + 1}" for i, pair in enumerate(pairs) for name in pair]
+
+
+def points(groups: Mapping[str, int]) -> list[str]:
+    """Return the names of the points that touch the ground, such as feet_right_A, tail_1."""
+    names = []
+    for group, count in groups.items():
+        numbered = tuple(str(k + 1) for k in range(count))
+        whole = (group, count) == ("feet", len(FOOT))
+        names += [f"{group}_{name}" for name in (FOOT if whole else numbered)]
+    return names
+
+
+def _of_runs(runs: Rollouts) -> dict[str, Quantity]:
+    """When each run ended, its error, and its own parameters."""
+    errors = np.array(["" if error is None else str(error) for error in runs.errors])
+    quantities = {
+        "ends": Quantity(("run",), runs.ends, "s", "when the run ended"),
+        "errors": Quantity(("run",), errors, "", "what ended the run early"),
+    }
+    entries = {entry["name"]: entry for entry in runs.source.model.manifest["parameters"]}
+    for name, values in runs.source.parameters.changes.items():
+        dims, entry = ("run", "axis")[: values.ndim], entries[name]
+        quantities[name] = Quantity(dims, values, entry["unit"], entry["meaning"])
+    return quantities
 
 
 def _contacts(runs: Rollouts) -> tuple[Contact | None, dict[str, Array]]:
@@ -175,14 +180,14 @@ def _contact(runs: Rollouts, k: int) -> Contact | None:
 def facts(info: Mapping[str, Any]) -> dict[str, Any]:
     """Return the plain values of an info by their names, and all of it as a text of JSON, "info".
 
-    Files know no truth values: they are 0 and 1.
+    Files know no truth values: they are 0 and 1. A name is left out that not every program reads.
     """
     plain: dict[str, Any] = {}
     for name, value in info.items():
+        if not NAME.fullmatch(name):
+            continue
         if isinstance(value, bool | int):
             plain[name] = int(value) if abs(value) < 2**31 else float(value)
         elif isinstance(value, float | str):
             plain[name] = value
-    # names that every program reads
-    sound = {name: value for name, value in plain.items() if NAME.fullmatch(name)}
-    return sound | {"info": json.dumps(info)}
+    return plain | {"info": json.dumps(info)}

@@ -8,7 +8,7 @@ import numpy as np
 from ... import __version__
 from ...basics.errors import ExportError
 from ...model.model import Model
-from ...show.page.shape import shape, tail_radii, usual_radius
+from ...show.animal import animal_of, usual_radius
 
 AXES = (("alpha", (1, 0, 0)), ("beta", (0, 0, 1)))  # of a link's two joints, in its own frame
 NO_TURN = (0.0, 0.0, 0.0)
@@ -122,7 +122,7 @@ def _bodies(model: Model, count: int) -> Iterable[tuple]:
         np.ravel(p[f"link_{name}"]).tolist() for name in ("lengths", "masses", "centers")
     )
     inertias = map(tuple, np.reshape(p["link_inertias"], (count, 3)).tolist())
-    return zip(lengths, masses, centers, inertias, tail_radii(model).tolist(), strict=True)
+    return zip(lengths, masses, centers, inertias, animal_of(model).tail_radii, strict=True)
 
 
 def _mount_turn(model: Model) -> Vector:
@@ -137,7 +137,7 @@ def _mount_turn(model: Model) -> Vector:
 
 def torso_capsule(model: Model) -> Capsule:
     """Return a capsule as long as the torso, its cross-section of the torso's area."""
-    axes = np.array(shape(model)["semi_axes"])
+    axes = np.array(animal_of(model).semi_axes)
     axis = int(axes.argmax())
     radius = float(np.sqrt(np.prod(np.delete(axes, axis))))
     return Capsule(axis, max(float(axes[axis]) - radius, 0.0), radius)

@@ -6,7 +6,7 @@ from xml.etree import ElementTree as Xml
 
 from ... import __version__
 from ...model.model import Model
-from ...show.page.shape import length
+from ...show.animal import animal_of
 from .export import xml_file
 
 # our unit -> FMI's: its name, and exponents of SI's base units
@@ -140,7 +140,7 @@ def _states(model: Model) -> Iterator[FmuVariable]:
 
 def height(model: Model) -> float:
     """Return the height (m) of B at the start; with contacts a tail straight down is clear."""
-    return length(model) if model.contacts else 0.0
+    return animal_of(model).length if model.contacts else 0.0
 
 
 def legs(model: Model) -> int:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...basics.errors import SerpentailError, SweepError
 from ...model.model import Model
-from ...motion.numbers import NUMBERS
+from ...motion.numbers import UNITS, finite_json, numbers_of
 from ...motion.trajectory import Trajectory
 from ...scenes.file import size_of
 from ...scenes.overrides import changed
@@ -21,13 +21,12 @@ from ...scenes.simulate import scenario_of
 from ...simulation.controllers import Damping, TorqueCurve, TorqueTable
 from ...simulation.rollouts import Rollouts
 from ...simulation.simulate import simulate
-from .axis import array_as_list
 from .job import DATA, STARTS, Job
 from .points import Point
 from .shards import Row
 
 ENDS = ("end_s", "q_end", "v_end", "kinetic_end_J", "potential_end_J")  # outputs by default
-OUTPUTS = (*ENDS, *(number.name for number in NUMBERS))
+OUTPUTS = (*ENDS, *UNITS)
 MOST_TEXT = 2000  # characters of an error
 SHARED = (type(None), Damping, TorqueTable, TorqueCurve)  # controllers that any parameters suit
 Outcome = tuple[str | None, str | None]  # JSON, or the error in place of it
@@ -178,22 +177,16 @@ def _outcomes(rollouts: Rollouts, outputs: Sequence[str]) -> list[Outcome]:
 
 def _outputs(motion: Trajectory, outputs: Sequence[str]) -> dict[str, Any]:
     """Return the outputs of a motion by name."""
-    arrays = (motion.t, motion.q, motion.v, motion.kinetic, motion.potential)
-    ends = {name: x[-1].tolist() for name, x in zip(ENDS, arrays, strict=True)}
-    numbers = {number.name: number for number in NUMBERS if number.name in outputs}
-    return {
-        name: ends[name] if name in ends else numbers[name].of(motion.model, motion)  # type: ignore[arg-type]
-        for name in outputs
-    }
+    arrays = (motion.t[-1], motion.q[-1], motion.v[-1], motion.kinetic[-1], motion.potential[-1])
+    found = dict(zip(ENDS, (np.asarray(x).tolist() for x in arrays), strict=True))
+    found |= numbers_of(motion.model, motion, outputs)  # type: ignore[arg-type]
+    return {name: found[name] for name in outputs}
 
 
 def _as_text(outcome: dict[str, Any]) -> str:
     """Return an outcome as JSON, with null for what is not finite; SweepError if it is no data."""
     try:
-        text = json.dumps(outcome, default=array_as_list)
-        if "NaN" in text or "Infinity" in text:
-            text = json.dumps(json.loads(text, parse_constant=lambda _: None))
-        return text
+        return json.dumps(finite_json(outcome), allow_nan=False)
     except (TypeError, ValueError) as reason:
         raise SweepError(f"run: its outcome is not plain data ({reason})") from None
 

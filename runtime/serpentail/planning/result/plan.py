@@ -13,8 +13,8 @@ from serpentail_scene.layout import TAIL_V
 
 from ...basics.errors import SimulationError
 from ...model.model import Model
-from ...motion.account import UNITS, framed, tail_of
-from ...motion.origin import origin
+from ...motion.archive import origin
+from ...motion.text import SI, framed
 from ...motion.trajectory import Trajectory
 from ...simulation.controllers import Controller, Damping, TorqueCurve
 from ..flight import flight
@@ -79,7 +79,7 @@ class Plan:
     def __repr__(self) -> str:
         """At most six lines: whether it succeeded, what it costs, and how true it is."""
         told, model = self.report, self.trajectory.model
-        moved = tail_of(model) if model else "without its model"
+        moved = model.tail_words() if model else "without its model"
         ended = "success" if self.success else f"no success ({told['status']})"
         chosen = ", ".join(f"{name} {_digits(x)}" for name, x in self.design.items())
         names = "effort", "energy_J", "peak_power_W", *TRUTH
@@ -88,7 +88,7 @@ class Plan:
             [
                 f"Plan of {self.trajectory.info['model']}, {moved}: {ended}",
                 f"{self.duration:.6g} s, {self.mesh.intervals} intervals by {self.rule.name} of "
-                f"degree {self.rule.degree}, {len(self.trajectory.t)} samples; {UNITS}",
+                f"degree {self.rule.degree}, {len(self.trajectory.t)} samples; {SI}",
                 f"effort {effort} N^2 m^2 s, energy {energy} J, peak power {power} W",
                 f"true attitude at the end: {to_plan} deg from the plan, {to_goal} from the goal",
                 f"{told['rounds']} rounds, {told['iterations']} iterations; processor time "
@@ -145,7 +145,7 @@ class Plan:
 
     def _repr_html_(self) -> str:
         """Text and page, for notebooks."""
-        from ...show.page.notebook import in_notebook
+        from ...show.page.view import in_notebook
 
         return in_notebook(self, lambda: self._motions(self.trajectory.model), SHOWN)
 

@@ -1,20 +1,51 @@
 """What the page reads: runs with their samples, numbers, events; plots, notes and warnings."""
 
+from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from ...model.model import Model
 from ...motion.body import weight as weight_of
+from ...motion.numbers import UNITS
 from ...motion.plausibility import warnings_of
+from ...motion.summary import summary
+from ...motion.text import as_word
 from ...motion.trajectory import Trajectory
-from .figures import events, figures
-from .packing import packed
-from .panels import panels
-from .samples import samples, thinned
-from .shape import length, shape
+from ..animal import BELLY, JOINT, Animal, animal_of
+from .samples import packed, samples, thinned
 
 COMMON = 95  # percentile of the forces whose arrow is as long as half the torso
+MOST_EVENTS = 1000  # that a page has
+LABELS = {  # of the numbers that the page shows
+    "duration_s": "duration",
+    "take_off_s": "take-off",
+    "recontact_s": "landing",
+    "landed": "landed, and stands at the end",
+    "least_upright_landing": "least upright from the landing on",
+    "turned_landing_rad": "turned from the landing on",
+    "apex_m": "highest torso",
+    "com_rise_m": "rise of the centre of mass",
+    "tilt_max_deg": "largest tilt of the back",
+    "tilt_end_deg": "tilt at the end",
+    "impulse_N_s": "impulse of the ground",
+    "peak_ground_force_N": "largest force of the ground",
+    "peak_ground_force_weights": "largest force of the ground",
+    "peak_group_force_N": "largest force",
+    "peak_torque_N_m": "largest joint torque",
+    "energy_change_J": "energy gained",
+}
+# plots: title by array, and the least span of an axis, in its unit
+TITLES = {
+    "height": "height of the torso (m)",
+    "tilt": "tilt of the back (deg)",
+    "bends": "bends of the tail's segments (deg)",
+    "torque": "joint torques (N m)",
+    "force": "force of the ground (N), scale compressed",
+    "energy": "energy (J)",
+}
+LEAST = {"height": 1e-3, "tilt": 0.1, "bends": 0.1}
 
 
 def page_data(
@@ -22,27 +53,28 @@ def page_data(
 ) -> dict[str, Any]:
     """Return the data of the page, ready for JSON; most: largest number of samples of a run."""
     shown, notes, warnings, runs = [], [], [], []
-    for motion, name, model in zip(motions, names, models, strict=True):
+    animals = list(map(animal_of, models))
+    for motion, name, model, animal in zip(motions, names, models, animals, strict=True):
         few, step = thinned(motion, most)
         shown.append(few)
         prefix = f"{name}: " if len(motions) > 1 else ""
-        notes += [prefix + each for each in _notes(motion, step)]
-        warnings += [prefix + each for each in warnings_of(model, motion)]
-        numbers = [*figures(model, motion), ("samples", str(len(motion.t)))]
-        words = {"name": name, "numbers": numbers, "events": events(motion, prefix)}
-        runs.append(_run(few, model) | words)
+        notes += [prefix + note for note in _notes(motion, step)]
+        warnings += [prefix + warning for warning in warnings_of(model, motion)]
+        numbers = [*_numbers(model, motion), ("samples", str(len(motion.t)))]
+        words = {"name": name, "numbers": numbers, "events": _events(motion, prefix)}
+        runs.append(_run(few, model, animal) | words)
     weight = max(map(weight_of, models))
     return {
         "runs": runs,
         "notes": notes,
         "warnings": warnings,
-        "plots": panels(names, shown, weight or 1.0),
-        "length": max(map(length, models)),
+        "plots": _plots(names, shown, weight or 1.0),
+        "length": max(animal.length for animal in animals),
         "force_scale": _common_force(shown) or weight or 1.0,
     }
 
 
-def _run(motion: Trajectory, model: Model) -> dict[str, Any]:
+def _run(motion: Trajectory, model: Model, animal: Animal) -> dict[str, Any]:
     """A run as the page reads it: sizes, and arrays as text."""
     arrays = samples(model, motion)
     return {
@@ -51,7 +83,15 @@ def _run(motion: Trajectory, model: Model) -> dict[str, Any]:
         "legs": 2 if "legs" in arrays else 0,
         "contacts": sum(motion.contact.groups.values()) if motion.contact else 0,
         "grounded": motion.contact is not None,
-        "body": shape(model),
+        "body": {
+            "semi_axes": animal.semi_axes,
+            "belly": BELLY,
+            "head": [asdict(ball) for ball in animal.head],
+            "tail_radii": animal.tail_radii,
+            "joint": JOINT if animal.jointed else 1,
+            "jointed": animal.jointed,
+            "leg_radius": animal.leg_radius,
+        },
         "arrays": {name: packed(array) for name, array in arrays.items()},
     }
 
@@ -66,10 +106,64 @@ def _notes(motion: Trajectory, step: int) -> list[str]:
     return notes
 
 
+def _numbers(model: Model, motion: Trajectory) -> list[tuple[str, str]]:
+    """Labels with units, and values, of the numbers that the motion has."""
+    numbers, rows = summary(model, motion), []
+    for name, label in LABELS.items():
+        unit = f" ({UNITS[name]})" if UNITS[name] else ""
+        value = numbers[name]
+        for part, number in (value if isinstance(value, dict) else {"": value}).items():
+            whose = f": {part.replace('_', ' ')}" if part else ""
+            if number is not None:
+                rows.append((f"{label}{whose}{unit}", as_word(number)))
+    return rows
+
+
+def _events(motion: Trajectory, prefix: str) -> list[dict[str, Any]]:
+    """The first events of the motion: time (s), kind, and a label."""
+    return [
+        {
+            "time": event["time"],
+            "kind": event["kind"],
+            "label": f"{prefix}{event['group']} {event['kind'].replace('_', ' ')}",
+        }
+        for event in motion.events[:MOST_EVENTS]
+    ]
+
+
+def _plots(
+    names: Sequence[str], motions: Sequence[Trajectory], weight: float
+) -> list[dict[str, Any]]:
+    """The plots: title, curves of all runs, least span; the weight (N) where forces are scaled."""
+    plots = []
+    for array, title in TITLES.items():
+        curves = []
+        for run, (name, motion) in enumerate(zip(names, motions, strict=True)):
+            for column, label in enumerate(_columns(array, motion)):
+                words = label if len(motions) == 1 else f"{name} {label}".strip()
+                curves.append({"run": run, "array": array, "column": column, "label": words})
+        if curves:
+            compressed = weight if array == "force" else 0
+            plot = {"title": title, "curves": curves, "compressed": compressed}
+            plots.append(plot | {"least": LEAST.get(array, 0)})
+    return plots
+
+
+def _columns(array: str, motion: Trajectory) -> Sequence[str]:
+    """The names of an array's columns; none if a motion does not have it."""
+    if array in ("height", "tilt"):
+        return [] if motion.layout.fixed else [""]
+    if array in ("bends", "torque"):
+        return [f"{bend} {i + 1}" for i in range(motion.segments) for bend in ("pitch", "yaw")]
+    if array == "force":
+        return list(motion.contact.groups) if motion.contact else []
+    return ("total", "kinetic", "potential")
+
+
 def _common_force(motions: list[Trajectory]) -> float:
     """The 95th percentile of the forces that act, N; 0 where none does."""
     touching = [motion.contact.forces for motion in motions if motion.contact is not None]
     with np.errstate(over="ignore"):  # of a run that blows up
-        every = [np.linalg.norm(forces, axis=-1).ravel() for forces in touching]
-    sizes = np.nan_to_num(np.concatenate([[0.0], *every]))
+        lengths = [np.linalg.norm(forces, axis=-1).ravel() for forces in touching]
+    sizes = np.nan_to_num(np.concatenate([[0.0], *lengths]))
     return float(np.percentile(sizes[sizes > 0], COMMON)) if sizes.any() else 0.0

@@ -1,6 +1,8 @@
-"""The samples of a motion in the page, with the positions of the animal's parts."""
+"""The samples of a motion in the page, thinned, with the places of the animal's parts, as text."""
 
+import base64
 import dataclasses
+import gzip
 from typing import Any
 
 import numpy as np
@@ -8,8 +10,10 @@ from numpy.typing import NDArray
 
 from ...basics.attitude import Array, tilt_deg
 from ...model.model import Model
-from ...motion.body import bends, centre_of_mass, leg_points
 from ...motion.trajectory import ARRAYS, Trajectory
+from ..animal import bends, centre_of_mass, poses_of
+
+LARGEST = float(np.finfo(np.float32).max)
 
 
 def thinned_rows(count: int, most: int) -> tuple[NDArray[np.intp], int]:
@@ -36,34 +40,40 @@ def samples(model: Model, motion: Trajectory) -> dict[str, Array]:
     t as two floats whose sum it is; pose: p and quaternion; tail, legs, touching: points in the
     world; forces of the ground at ``touching``; then the plotted curves.
     """
-    t = motion.t.astype(np.float32)
+    t, contact = motion.t.astype(np.float32), motion.contact
+    poses = poses_of(model, motion.q, None if contact is None else contact.legs)
     arrays = {
         "t": np.stack([t, motion.t - t], axis=1),
-        "pose": motion.pose,
-        "tail": model.tail_points(motion.q),
+        "pose": poses.torso,
+        "tail": poses.tail,
         "com": centre_of_mass(model, motion.q, motion.v),
-        "height": motion.pose[:, 2],
+        "height": poses.torso[:, 2],
         "tilt": tilt_deg(motion.attitude),
         "bends": np.degrees(bends(model, motion.tail)),
         "torque": motion.tau,
         "energy": np.stack([motion.energy, motion.kinetic, motion.potential], axis=1),
     }
-    return {
-        name: np.asarray(array, float) for name, array in (arrays | _ground(model, motion)).items()
-    }
+    if contact is not None:
+        # where no force acts no arrow is drawn, so no point is needed
+        pushed = np.abs(contact.forces).max(axis=2, keepdims=True) > 0
+        arrays["touching"] = np.where(pushed, contact.points, 0)
+        arrays["forces"] = contact.forces
+        totals = [contact.of(group).total for group in contact.groups]
+        arrays["force"] = np.stack(totals, axis=1)
+    if poses.legs is not None:
+        arrays["legs"] = poses.legs
+    return {name: np.asarray(array, float) for name, array in arrays.items()}
 
 
-def _ground(model: Model, motion: Trajectory) -> dict[str, Array]:
-    """Legs, points that touch and their forces, and each group's total; none in flight."""
-    contact = motion.contact
-    if contact is None:
-        return {}
-    # where no force acts no arrow is drawn, so no point is needed
-    pushed = np.abs(contact.forces).max(axis=2, keepdims=True) > 0
-    arrays = {
-        "touching": np.where(pushed, contact.points, 0),
-        "forces": contact.forces,
-        "force": np.stack([contact.of(group).total for group in contact.groups], axis=1),
-    }
-    legs = leg_points(model, motion.q, contact.legs)
-    return arrays if legs is None else arrays | {"legs": legs}
+def packed(samples: NDArray[np.float64]) -> str:
+    """Return samples (K, ...) as text: float32, their bits' differences by bytes, gzip, base64.
+
+    A smooth column's bits change little from sample to sample, so the high bytes of their
+    differences are mostly zero: two to three times smaller than gzip alone, and not a bit is lost.
+    Numbers beyond float32 become its largest.
+    """
+    columns = samples.reshape(len(samples), -1).T
+    bits = np.ascontiguousarray(np.clip(columns, -LARGEST, LARGEST), "<f4").view("<u4")
+    steps = np.diff(bits, axis=1, prepend=np.zeros((len(bits), 1), "<u4"))
+    planes = np.ascontiguousarray(steps).reshape(-1, 1).view(np.uint8).T
+    return base64.b64encode(gzip.compress(planes.tobytes(), mtime=0)).decode("ascii")

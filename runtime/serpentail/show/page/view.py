@@ -1,27 +1,42 @@
-"""``view``: writes motions to a page that needs only a browser."""
+"""``view``: writes motions to a page that needs only a browser; notebooks show it in a frame."""
 
 import json
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import Any, overload
 
 from ...basics.checks import real_array
 from ...basics.errors import ViewError
 from ...basics.files import replacing
 from ...model.model import Model
 from ...motion.trajectory import Trajectory
+from ..motions import checked_models, checked_motions, checked_names
 from .data import page_data
-from .packing import packed
-from .samples import thinned_rows
-
-if TYPE_CHECKING:
-    from .notebook import Page
+from .samples import packed, thinned_rows
 
 MOST = 2400  # samples of a run in a page
+MOST_NOTEBOOK = 601  # such as 0.6 s at 1 kHz: notebooks stay small
+HEIGHT = 620  # px, of the frame in a notebook
 PAGE = Path(__file__).with_name("page.html")  # made of the sources in viewer/ when this is built
+
+
+@dataclass(frozen=True)
+class Page:
+    """The page of motions as a text, which a notebook shows in a frame."""
+
+    html: str = field(repr=False)
+
+    def _repr_html_(self) -> str:
+        """For notebooks: a frame that lets the page run its own scripts and nothing else."""
+        source = self.html.replace("&", "&amp;").replace('"', "&quot;")
+        return (
+            f'<iframe sandbox="allow-scripts" title="page of the run" width="100%" '
+            f'height="{HEIGHT}" style="border:0" srcdoc="{source}"></iframe>'
+        )
 
 
 @overload
@@ -44,7 +59,7 @@ def view(
     names: Sequence[str] | None = None,
     model: Model | None = None,
     markers: Sequence[Any] | None = None,
-) -> "Page":
+) -> Page:
     """Return a page that shows motions over each other, for a notebook."""
 
 
@@ -55,7 +70,7 @@ def view(
     names: Sequence[str] | None = None,
     model: Model | None = None,
     markers: Sequence[Any] | None = None,
-) -> "Path | Page":
+) -> Path | Page:
     """Write a page that shows motions over each other in a browser.
 
     Parameters
@@ -90,9 +105,7 @@ def view(
     >>> st.view([planned, true], "compare.html", names=["planned", "true"])  # doctest: +SKIP
     """
     if path is None:
-        from .notebook import MOST_SHOWN, Page
-
-        return Page(page_text(motions, names, model, MOST_SHOWN, markers))
+        return Page(page_text(motions, names, model, MOST_NOTEBOOK, markers))
     target = checked_path(path)
     text = page_text(motions, names, model, markers=markers)
     try:
@@ -113,7 +126,7 @@ def page_text(
     """Return the page of motions as text, with at most ``most`` samples of each; see ``view``."""
     motions = checked_motions(motions)
     names = checked_names(names, motions)
-    models = [model_of(k, motion, model) for k, motion in enumerate(motions)]
+    models = checked_models(motions, model)
     page, data = template(), page_data(motions, names, models, most)
     if markers is not None and len(markers) != len(motions):
         needs = f"needs one of each of {len(motions)} motions"
@@ -137,17 +150,6 @@ def packed_markers(motion: Trajectory, seen: Any, most: int) -> tuple[str, int]:
     return packed(places[thinned_rows(len(motion.t), most)[0]]), places.shape[1]
 
 
-def checked_motions(motions: Any) -> list[Trajectory]:
-    """Return the motions as a list; ViewError if it is empty or holds something else."""
-    listed = list(motions) if isinstance(motions, list | tuple) else [motions]
-    for k, motion in enumerate(listed):
-        if not isinstance(motion, Trajectory):
-            raise ViewError(f"motions[{k}]: type {type(motion).__name__}: needs a Trajectory")
-    if not listed:
-        raise ViewError("motions: none: needs one Trajectory or more")
-    return listed
-
-
 def checked_path(path: Any) -> Path:
     """Return the path of a page; ViewError if it is not the name of an .html file."""
     try:
@@ -159,35 +161,24 @@ def checked_path(path: Any) -> Path:
     return target
 
 
-def checked_names(names: Any, motions: list[Trajectory]) -> list[str]:
-    """Return a name for each motion; ViewError unless they are as many, and different."""
-    if names is None:
-        kinds = ["planned" if m.info.get("kind") == "plan" else "run" for m in motions]
-        return [
-            kind if kinds.count(kind) == 1 else f"{kind} {k + 1}" for k, kind in enumerate(kinds)
-        ]
-    listed = list(names) if isinstance(names, list | tuple) else []
-    whole = all(isinstance(name, str) and name.strip() for name in listed)
-    if not whole or len(listed) != len(motions) or len(set(listed)) != len(listed):
-        raise ViewError(f"names: value {names!r:.200}: needs {len(motions)} names that differ")
-    return listed
+def in_notebook(
+    thing: object,
+    motions: Callable[[], Sequence[Trajectory]],
+    names: Sequence[str] | None = None,
+) -> str:
+    """Return the HTML of an object: its text and the page of its motions; it never raises.
 
-
-def model_of(k: int, motion: Trajectory, model: Any) -> Model:
-    """Return the model of motion k; ViewError if none fits."""
-    found = motion.model if motion.model is not None else model
-    if found is None:
-        raise ViewError(
-            f"motions[{k}]: was loaded from a file, which has no model: give model=st.load(folder)"
-        )
-    if found is model and not isinstance(model, Model):
-        raise ViewError(f"model: type {type(model).__name__}: needs a Model, as st.load returns")
-    if motion.q.shape[1] != found.nq:
-        raise ViewError(
-            f"motions[{k}]: q has {motion.q.shape[1]} numbers, {found.name} has {found.nq}: give "
-            "its own model"
-        )
-    return found
+    The page is in a frame of its own, because notebooks do not run scripts of outputs. If there is
+    no page (no model is known, it lacks ``tail_points``, or the page was not built), a line gives
+    the reason.
+    """
+    text = f"<pre>{escape(repr(thing))}</pre>"
+    try:
+        shown = motions()
+        page = Page(page_text(shown, names and names[: len(shown)], most=MOST_NOTEBOOK))
+    except Exception as reason:  # whatever it is, the text above must be seen
+        return f"{text}<p>Without the page of the run: {escape(str(reason))}</p>"
+    return text + page._repr_html_()
 
 
 def template() -> str:

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from ...basics.errors import ViewError
 from ...basics.files import replacing
-from .animal import FORCE, LEG, SHADE, SHADOW
-from .style import HEAD, INK, QUIET, TAIL, TORSO
+from .style import FORCE, HEAD, INK, LEG, QUIET, SHADE, SHADOW, TAIL, TORSO
 
 Picture = NDArray[np.uint8]  # (height, width, 3), both even
 RATE = 25  # frames a second
@@ -25,11 +24,11 @@ def encoder() -> str:
         from imageio_ffmpeg import get_ffmpeg_exe
 
         return str(get_ffmpeg_exe())
-    found = shutil.which("ffmpeg")
-    if found is None:
+    program = shutil.which("ffmpeg")
+    if program is None:
         remedy = 'pip install "serpentail[film]", or write a .gif'
         raise ViewError(f"an .mp4 needs ffmpeg, which is not on PATH: {remedy}")
-    return found
+    return program
 
 
 def write_gif(path: Path, pictures: Iterator[Picture]) -> None:
@@ -47,10 +46,7 @@ def write_gif(path: Path, pictures: Iterator[Picture]) -> None:
 
 
 def palette() -> list[int]:
-    """Return the colours of a film and of the edges between them, as red, green and blue.
-
-    They are the same for all frames, so that only what moves is stored.
-    """
+    """Return red, green, blue of all colours and their edges, the same in all frames."""
     from matplotlib.colors import to_rgb
 
     ink = np.array([to_rgb(colour) for colour in (INK, QUIET, TAIL, HEAD, LEG, FORCE, SHADOW)])
@@ -85,10 +81,10 @@ def _feed(command: list[str], first: Picture, pictures: Iterator[Picture]) -> No
             process.stdin.close()
         except BrokenPipeError:
             pass  # it ended, and says why
-        said = process.stderr.read().decode(errors="replace").split("\n")
+        messages = process.stderr.read().decode(errors="replace").split("\n")
         if process.wait() != 0:
-            told = [line for line in said if line.strip()]
-            raise OSError(f"ffmpeg: {told[-1] if told else process.returncode}")
+            lines = [line for line in messages if line.strip()]
+            raise OSError(f"ffmpeg: {lines[-1] if lines else process.returncode}")
     finally:
         process.kill()
         process.wait()

@@ -7,18 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...basics.checks import numbers_in, refusal
-from ...basics.errors import ViewError
 from ...basics.extras import needed
 from ...model.model import Model
-from ...motion.body import centre_of_mass
 from ...motion.trajectory import Trajectory
-from ..page.view import checked_motions, checked_names, model_of
-from .animal import Pen, draw_animal, draw_ground, draw_marks, draw_shadow
-from .frames import Frame, frames, largest_force, moments, way
-from .page import LEFT, Page, page_of, path_window
-from .strip import Strip
-from .style import INK, QUIET, Array, drawn
+from ..motions import checked_motions
+from .frames import Frame, drawn_points, window_around
+from .pen import Pen, draw_animal, draw_ground, draw_moment
+from .sheet import LEFT, Sheet, sheet_of
+from .strip import Strip, strip_of
+from .style import INK, Array, drawn
 from .views import SIDE, View, views_of
 
 if TYPE_CHECKING:
@@ -79,92 +76,60 @@ def filmstrip(
     return drawn(lambda: _draw(strip), path)
 
 
-def strip_of(
-    motions: list[Trajectory],
-    wanted: int | Sequence[float] | Array,
-    views: list[View],
-    names: Sequence[str] | None,
-    model: Model | None,
-) -> Strip:
-    """Return what to draw of motions."""
-    told = checked_names(names, motions) if len(motions) > 1 or names else [""]
-    models = [model_of(k, motion, model) for k, motion in enumerate(motions)]
-    rows = _rows(models, motions, wanted)
-    largest = largest_force(motions, rows)
-    pairs = list(zip(models, motions, rows, strict=True))
-    films = [frames(*pair, largest) for pair in pairs]
-    coms = [centre_of_mass(model, motion.q, motion.v) for model, motion, _ in pairs]
-    lowest = min(frame.lowest for film in films for frame in film)
-    grounded = lowest > 0 or any(motion.contact is not None for motion in motions)
-    return Strip(films, coms, views, told, grounded, largest)
-
-
-def _rows(models: list[Model], motions: list[Trajectory], wanted: Any) -> Array:
-    """The samples (motions, frames) to draw, those nearest to the times."""
-    times = numbers_in(wanted)
-    if isinstance(wanted, int | np.integer) and not isinstance(wanted, bool) and wanted > 0:
-        tracks = [(pair[1].t, way(*pair)) for pair in zip(models, motions, strict=True)]
-        times = moments(tracks, int(wanted))
-    elif times is None or times.ndim != 1 or not times.size or not np.isfinite(times).all():
-        raise refusal("frames", wanted, "a whole number from 1, or times in s", ViewError)
-    nearest = [[int(np.abs(m.t - time).argmin()) for time in np.sort(times)] for m in motions]
-    return np.unique(nearest, axis=1)
-
-
 def _draw(strip: Strip) -> tuple["Figure", np.ndarray]:
-    """The strip's page."""
+    """The strip's sheet."""
     from .figure import Drawing
 
     windows, key = strip.windows(), strip.key()
     lines = [(film, row) for film in range(len(strip.films)) for row in range(len(windows))]
     shown = None if strip.anchored else _path_aspect(strip)
-    page = page_of(len(strip.films[0]), [windows[row] for _, row in lines], len(key), shown)
-    figure = Drawing(figsize=page.size)
-    axes = np.empty((len(lines), page.frames), dtype=object)
+    sheet = sheet_of(len(strip.films[0]), [windows[row] for _, row in lines], len(key), shown)
+    figure = Drawing(figsize=sheet.size)
+    axes = np.empty((len(lines), sheet.frames), dtype=object)
     for line, (film, row) in enumerate(lines):
-        axes[line] = _draw_row(figure, page, line, strip, (film, row), windows[row])
-    _draw_key(figure, page, windows[0], key)
-    if page.path is not None:
-        _draw_path(page.add(figure, page.path_panel()), strip)
+        axes[line] = _draw_row(figure, sheet, line, strip, (film, row), windows[row])
+    _draw_key(figure, sheet, windows[0], key)
+    if sheet.path is not None:
+        _draw_path(sheet.add(figure, sheet.path_panel()), strip)
     return figure, axes
 
 
 def _path_aspect(strip: Strip) -> float | None:
-    """Return width over height of the panel of the path.
-
-    None if the centre of mass moves less than half a torso, or if there are several motions.
-    """
-    still = np.ptp(strip.coms[0][:, 1:], axis=0).max() < max(strip.every[0].body.semi_axes)
+    """Width over height of the path's panel; None for several motions, or one that hardly moves."""
+    still = np.ptp(strip.coms[0][:, 1:], axis=0).max() < max(strip.every[0].animal.semi_axes)
     if len(strip.films) > 1 or still:
         return None
-    low, high = path_window(strip.films[0], strip.coms[0])
+    low, high = _path_window(strip)
     return float((high - low)[0] / (high - low)[1])
 
 
+def _path_window(strip: Strip) -> Array:
+    """The corners (2, 2) of the path's panel."""
+    shapes = [drawn_points(frame, SIDE) for frame in strip.films[0]]
+    return window_around([*shapes, SIDE.of(strip.coms[0])[:, :2]])
+
+
 def _draw_row(
-    figure: "Figure", page: Page, line: int, strip: Strip, which: tuple[int, int], window: Array
+    figure: "Figure", sheet: Sheet, line: int, strip: Strip, which: tuple[int, int], window: Array
 ) -> list["Axes"]:
     """One view of every frame of a motion; its name and directions at the left."""
     film, view = strip.films[which[0]], strip.views[which[1]]
     every = []
     for k, frame in enumerate(film):
-        x, y, width, height = page.panel(k, line)
-        axes = page.add(figure, (x, y, width, height))
+        x, y, width, height = sheet.panel(k, line)
+        axes = sheet.add(figure, (x, y, width, height))
         axes.set(xlim=window[:, 0], ylim=window[:, 1], xticks=[], yticks=[])
         axes.spines[:].set_visible(True)
         pen = Pen(axes, frame, view, strip.origin(frame), strip.grounded)
         if strip.grounded:
             draw_ground(axes, view, pen.origin)
-            draw_shadow(pen)
-        pen.plot(strip.coms[which[0]], ":", 0.1, color=QUIET, linewidth=1.0)
-        draw_animal(pen)
-        draw_marks(pen)
+        draw_moment(pen, strip.coms[which[0]])
         if line == 0:
             axes.set_title(_label(k, film), pad=3)
         if x == LEFT:
             place = (0, y + height / 2 - 0.45, x, 0.9)
             name = strip.names[which[0]] if which[1] == 0 else ""
-            _draw_directions(page.add(figure, place), view, name)
+            _draw_directions(sheet.add(figure, place), view, name)
         every.append(axes)
     return every
 
@@ -191,26 +156,28 @@ def _draw_directions(axes: "Axes", view: View, motion: str) -> None:
             axes.text(place[0], place[1], f"${name}$", ha="center", va="center", fontsize=7)
 
 
-def _draw_key(figure: "Figure", page: Page, window: Array, key: dict[str, dict[str, Any]]) -> None:
-    """The scale bar and what the marks mean, at the foot of the page."""
+def _draw_key(
+    figure: "Figure", sheet: Sheet, window: Array, key: dict[str, dict[str, Any]]
+) -> None:
+    """The scale bar and what the marks mean, at the foot of the sheet."""
     from matplotlib.lines import Line2D
 
-    length = 0.05 * page.column / float(window[1, 0] - window[0, 0])
-    axes = page.add(figure, (LEFT, page.foot - 0.2, 1.0, 0.16))
+    length = 0.05 * sheet.column / float(window[1, 0] - window[0, 0])
+    axes = sheet.add(figure, (LEFT, sheet.foot - 0.2, 1.0, 0.16))
     axes.set(xlim=(0, 1), ylim=(0, 1))
     axes.set_axis_off()
     axes.plot([0, length], [0.5, 0.5], color=INK, linewidth=2, solid_capstyle="butt", clip_on=False)
     axes.text(length + 0.06, 0.5, "50 mm", va="center_baseline")
     handles = [Line2D([], [], label=name, **look) for name, look in key.items()]
-    corner = ((LEFT + length + 0.55) / page.size[0], (page.foot - 0.06) / page.size[1])
-    look = {"ncols": page.key_columns, "columnspacing": 1.2, "borderaxespad": 0, "borderpad": 0}
+    corner = ((LEFT + length + 0.55) / sheet.size[0], (sheet.foot - 0.06) / sheet.size[1])
+    look = {"ncols": sheet.key_columns, "columnspacing": 1.2, "borderaxespad": 0, "borderpad": 0}
     figure.legend(handles=handles, loc="upper left", bbox_to_anchor=corner, **look)
 
 
 def _draw_path(axes: "Axes", strip: Strip) -> None:
     """The motion from the side in true scale, every frame in its place, numbered at its COM."""
     film, com = strip.films[0], strip.coms[0]
-    low, high = path_window(film, com)
+    low, high = _path_window(strip)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="$y$ [m]", ylabel="$z$ [m]")
     pens = [Pen(axes, frame, SIDE, np.zeros(3), strip.grounded, k) for k, frame in enumerate(film)]
     if strip.grounded:

@@ -10,8 +10,8 @@ from serpentail_scene.layout import OMEGA
 
 from ...basics.attitude import pitch_roll_yaw, tilt_deg
 from ...model.model import Model
-from ...motion.body import bends
 from ...motion.trajectory import Trajectory
+from ..animal import bends
 from .style import INK, TAIL, Array
 
 # Okabe and Ito, dashed for grey prints
@@ -35,13 +35,13 @@ class Panel:
     def without_still(self) -> "Panel":
         """The panel with the curves that do not stay zero."""
         moves = np.nanmax(np.abs(self.curves), axis=0, initial=0) > SEEN * self.span
-        kept, gone = (np.flatnonzero(which).tolist() for which in (moves, ~moves))
+        moving, still = (np.flatnonzero(which).tolist() for which in (moves, ~moves))
         return replace(
             self,
-            curves=self.curves[:, kept],
-            names=[self.names[k] for k in kept],
-            styles=[self.styles[k] for k in kept],
-            still=[self.names[k] for k in gone],
+            curves=self.curves[:, moving],
+            names=[self.names[k] for k in moving],
+            styles=[self.styles[k] for k in moving],
+            still=[self.names[k] for k in still],
         )
 
 
@@ -65,16 +65,13 @@ def tilt(motion: Trajectory, model: Model | None) -> Panel:
 
 
 def tail(motion: Trajectory, model: Model | None) -> Panel:
-    """Bends of the segments, for articulated ones the sum of their links' angles.
-
-    Tail coordinates if no model is known.
-    """
+    """Bends of the segments: of links the sum of their angles; without a model coordinates."""
     names, styles, order = of_segments(motion)
     if model is None:
-        told, angles = "tail coord.\n[deg]", motion.tail
+        label, angles = "tail coord.\n[deg]", motion.tail
     else:
-        told, angles = "bend of\nsegment [deg]", bends(model, motion.tail)
-    return Panel(told, np.degrees(angles[:, order]), names, styles, 1.0)
+        label, angles = "bend of\nsegment [deg]", bends(model, motion.tail)
+    return Panel(label, np.degrees(angles[:, order]), names, styles, 1.0)
 
 
 def torque(motion: Trajectory, model: Model | None) -> Panel:
@@ -90,8 +87,8 @@ def force(motion: Trajectory, model: Model | None) -> Panel:
         return Panel("normal force\n[N]", np.zeros((len(motion.t), 0)), (), (), 1.0)
     names = list(contact.groups)
     curves = np.stack([contact.of(name).forces[..., 2].sum(axis=1) for name in names], axis=1)
-    told = "normal force\n[N]" if len(names) > 1 else f"normal force\nof {names[0]} [N]"
-    return Panel(told, curves, names, TRIPLE[: len(names)], 1.0)
+    label = "normal force\n[N]" if len(names) > 1 else f"normal force\nof {names[0]} [N]"
+    return Panel(label, curves, names, TRIPLE[: len(names)], 1.0)
 
 
 def rate(motion: Trajectory, model: Model | None) -> Panel:

@@ -160,10 +160,7 @@ def _limits(panel: Panel) -> tuple[float, float]:
 
 
 def _legend_rows(panel: Panel, width: float) -> tuple[int, int]:
-    """Return rows and columns of a legend on axes of a width in inches; none for a single curve.
-
-    The panel's label then names the curve.
-    """
+    """Rows and columns of a legend on axes of a width in inches; none for a single curve."""
     labels = [*panel.names, *([f"{_listed(panel.still)}: 0"] if panel.still else [])]
     if len(labels) < 2:
         return 0, 0

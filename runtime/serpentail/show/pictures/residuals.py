@@ -50,8 +50,8 @@ def _figure(motion: Trajectory, residuals: Residuals, bands: Bands) -> tuple["Fi
         motion, [Panel("residual\n[mm]", distances, names, dots, 0.1), tau, power]
     )
     usual = 1e3 * noise * np.sqrt(3)
-    told = f"rms of noise: {usual:.2g} mm"
-    every[0].axhline(usual, color=QUIET, linewidth=0.8, zorder=0.5, label=told)
+    noise_label = f"rms of noise: {usual:.2g} mm"
+    every[0].axhline(usual, color=QUIET, linewidth=0.8, zorder=0.5, label=noise_label)
     labelled(every[0], len(names) + 1)
     if bands is not None:
         times, low, high, probability = bands

@@ -23,6 +23,8 @@ METADATA: dict[str, dict[str, Any]] = {
 }
 DPI = 200
 INK, QUIET, TORSO, TAIL, HEAD = "#222222", "#8c8c8c", "#c6e0f0", "#d55e00", "#0072b2"
+LEG, FORCE = "#009e73", "#cc79a7"  # Okabe and Ito
+SHADE, SHADOW = "#ecebe6", "#c9c7bf"  # the ground
 STYLE: dict[str, Any] = {
     "svg.hashsalt": "serpentail",
     "font.size": 8,
@@ -37,35 +39,27 @@ STYLE: dict[str, Any] = {
 }
 
 
-def writable(path: str | os.PathLike[str]) -> Path:
-    """Return the path if its suffix is a known format; ViewError otherwise."""
-    path = Path(path)
-    if path.suffix.lower() not in METADATA:
-        raise ViewError(
-            f"figure {str(path)!r} has suffix {path.suffix!r}: use one of {', '.join(METADATA)}"
-        )
-    return path
-
-
 Drawn = tuple["Figure", Any]  # with its axes
 
 
 def drawn(draw: Callable[[], Drawn], path: str | os.PathLike[str] | None) -> Drawn:
-    """Draw in the shared style; with a path, write the figure too."""
+    """Draw in the shared style; with a path, write the figure too, whole or not at all.
+
+    The same figure gives the same bytes. ViewError if the path's suffix is of no known format.
+    """
     from matplotlib import style
 
-    target = None if path is None else writable(path)
+    kind = "" if path is None else Path(path).suffix.lower()
+    if path is not None and kind not in METADATA:
+        known = ", ".join(METADATA)
+        raise ViewError(
+            f"figure {str(path)!r} has suffix {Path(path).suffix!r}: use one of {known}"
+        )
     with style.context(STYLE, after_reset=True):
         figure, axes = draw()
-        if target is not None:
-            write(target, figure)
+        if path is not None:
+            picture = io.BytesIO()  # Matplotlib would hide a failed write, and leave its file open
+            figure.savefig(picture, format=kind[1:], metadata=METADATA[kind], dpi=DPI)
+            with replacing(Path(path)) as part:
+                part.write_bytes(picture.getvalue())
     return figure, axes
-
-
-def write(path: Path, figure: "Figure") -> None:
-    """Write a figure whole or not at all; the same figure gives the same bytes."""
-    kind = path.suffix.lower()
-    drawn = io.BytesIO()  # Matplotlib would hide that a write failed, and leave its file open
-    figure.savefig(drawn, format=kind[1:], metadata=METADATA[kind], dpi=DPI)
-    with replacing(path) as part:
-        part.write_bytes(drawn.getvalue())

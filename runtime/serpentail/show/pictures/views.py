@@ -12,10 +12,7 @@ from .style import Array
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A parallel view.
-
-    The rows of its matrix are the world directions right, up and towards the viewer.
-    """
+    """A parallel view; the rows of its matrix are the directions right, up and to the viewer."""
 
     name: str
     matrix: Array
@@ -43,10 +40,7 @@ NAMED = {view.name: view for view in (SIDE, TOP, looking("oblique", 40, 20))}
 
 
 def views_of(wanted: Sequence[str | tuple[float, float]]) -> list[View]:
-    """Return the views of names or of (azimuth, elevation) in degrees.
-
-    ViewError if one is wrong.
-    """
+    """Return the views of names or of (azimuth, elevation), deg; ViewError if one is wrong."""
     if isinstance(wanted, str) or not isinstance(wanted, Sequence) or not wanted:
         needs = 'a tuple of names or of (azimuth, elevation), such as ("side", (60, 15))'
         raise refusal("views", wanted, needs, ViewError)

@@ -1,8 +1,13 @@
-"""Conversions of motions to other libraries' containers and files."""
+"""Methods of motions whose work is done in rooms above this one: pictures, pages, tables, files.
+
+Each imports what it needs when it is called.
+"""
 
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from ..model.model import Model
 
 if TYPE_CHECKING:
     import pandas
@@ -10,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Exports:
-    """Conversions of trajectories and rollouts; they import what they need when they are called.
+    """Conversions of trajectories and rollouts.
 
     Coordinates have names such as x, qw, alpha_1; everything is in SI units. Runs that failed or
     ended early have nan after their end.
@@ -33,9 +38,9 @@ class Exports:
         ExtraMissing
             xarray is not installed.
         """
-        from ..bridges.containers.labelled import dataset
+        from ..bridges.containers.tables import dataset
 
-        return dataset(self._contents())
+        return dataset(self)  # type: ignore[arg-type]
 
     def to_dataframe(self) -> "pandas.DataFrame":
         """Convert to a pandas table; needs the extra "pandas".
@@ -53,7 +58,7 @@ class Exports:
         """
         from ..bridges.containers.tables import frame
 
-        return frame(self._contents())
+        return frame(self)  # type: ignore[arg-type]
 
     def to_csv(self, path: str | os.PathLike[str]) -> Path:
         """Write the table of ``to_dataframe`` as CSV, whole or not at all; needs no extra.
@@ -73,9 +78,9 @@ class Exports:
         NotWritten
             The file cannot be written.
         """
-        from ..bridges.containers.tables import write
+        from ..bridges.containers.tables import write_table
 
-        return write(self._contents(), path)
+        return write_table(self, path)  # type: ignore[arg-type]
 
     def to_netcdf(self, path: str | os.PathLike[str]) -> Path:
         """Write the dataset of ``to_xarray`` as NetCDF 3, whole or not at all.
@@ -97,12 +102,53 @@ class Exports:
         NotWritten
             The file cannot be written.
         """
-        from ..bridges.containers.labelled import write
+        from ..bridges.containers.tables import write_dataset
 
-        return write(self._contents(), path)
+        return write_dataset(self, path)  # type: ignore[arg-type]
 
-    def _contents(self) -> Any:
-        """Return what it holds, with names and units."""
-        from ..bridges.containers.contents import contents
 
-        return contents(self)  # type: ignore[arg-type]
+class Showable:
+    """Ways to see one motion; ``model`` is that of a motion which was read from a file."""
+
+    def view(self, path: str | os.PathLike[str] = "run.html", model: Model | None = None) -> Path:
+        """Write an .html page that shows this motion in a browser, and return its path.
+
+        Arguments and errors are those of ``serpentail.view``.
+        """
+        from ..show.page.view import view
+
+        return view(self, path, model=model)  # type: ignore[call-overload]
+
+    def _repr_html_(self) -> str:
+        """Text and page, for notebooks."""
+        from ..show.page.view import in_notebook
+
+        return in_notebook(self, lambda: [self])  # type: ignore[list-item]
+
+    def film(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Write a moving film, a filmstrip or a page, as the suffix tells; return its path.
+
+        Options and errors are those of ``serpentail.film``.
+        """
+        from ..show.pictures.film import film
+
+        return film(self, path, **options)  # type: ignore[arg-type]
+
+    def filmstrip(self, path: str | os.PathLike[str] | None = None, **options: Any) -> Any:
+        """Draw moments of the motion side by side; return Matplotlib's figure and its axes.
+
+        With a path the figure is written, too. Options and errors are those of
+        ``serpentail.filmstrip``.
+        """
+        from ..show.pictures.filmstrip import filmstrip
+
+        return filmstrip(self, path, **options)  # type: ignore[arg-type]
+
+    def plot(self, *panels: str, **options: Any) -> Any:
+        """Draw panels over time, by default all that do not stay zero; return figure and axes.
+
+        Names of panels, options and errors are those of ``serpentail.plot``.
+        """
+        from ..show.pictures.plot import plot
+
+        return plot(self, *panels, **options)  # type: ignore[arg-type]

@@ -12,14 +12,15 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from PIL import Image, ImageSequence
+from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 import serpentail as st
 from serpentail.show.pictures import encode
-from serpentail.show.pictures.animal import Pen, above_ground, hull
-from serpentail.show.pictures.filmstrip import strip_of
+from serpentail.show.pictures.film import even, pictures, speed_words
 from serpentail.show.pictures.frames import frames, silhouette
-from serpentail.show.pictures.movie import even, pictures, speed_words
+from serpentail.show.pictures.pen import Pen, above_ground
+from serpentail.show.pictures.strip import strip_of
 from serpentail.show.pictures.views import NAMED, SIDE, TOP, looking, views_of
 from tests.support.drawn_flight import SEMI_AXES, flight
 from tests.support.rows import row
@@ -254,7 +255,8 @@ def test_what_is_above_the_ground_is_outlined():
         frame = film_frame(seed, height)
         world = frame.torso + surface(300) @ frame.rotation.T
         shadow = view.of(world[world[:, 2] >= 0])[:, :2]
-        outline = hull(view.of(above_ground(frame))[:, :2])
+        outline = view.of(above_ground(frame))[:, :2]
+        outline = outline[ConvexHull(outline).vertices]
         with row(seed, view.name, height):
             np.testing.assert_allclose(widths(outline), widths(shadow), atol=5e-4)
     # above the ground there is no part below

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .frames import Frame, tick
-from .style import HEAD, INK, TAIL, TORSO, Array
+from .style import FORCE, HEAD, INK, LEG, QUIET, SHADE, SHADOW, TAIL, TORSO, Array
 from .views import TOP, View
 
 if TYPE_CHECKING:
@@ -16,8 +16,6 @@ WIDTH = 1.4  # points, of the tail
 THIN, THICK = 0.4, 2.5  # of a tail of its own: least and largest width over that
 MOST_DOTS = 20  # more tail points than this are drawn without dots
 LARGE_DOTS = 8  # more joints than this get small marks, so that the tail's colour stays visible
-LEG, FORCE = "#009e73", "#cc79a7"  # Okabe and Ito
-SHADE, SHADOW = "#ecebe6", "#c9c7bf"  # the ground
 PALE = 0.3  # opacity of parts below it
 GRIDS = np.array([0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10])  # m, between lines on the ground
 LINES = 8  # of the ground's grid that are seen, about
@@ -69,13 +67,13 @@ class Pen:
             return
         self.fill(outline, 0.4, alpha=PALE, **look)
         if len(above):
-            self.fill(hull(self.flat(above)), 0.41, **look)
+            from scipy.spatial import ConvexHull
+
+            flat = self.flat(above)
+            self.fill(flat[ConvexHull(flat).vertices], 0.41, **look)
 
     def line(self, corners: Array, **look: Any) -> None:
-        """Draw a line below the torso, and again above it where the torso cannot hide it.
-
-        The latter part has a white rim, to show that it passes in front.
-        """
+        """Draw a line below the torso, and, where it passes in front, above it with a white rim."""
         fine = np.linspace(0, len(corners) - 1, 16 * (len(corners) - 1) + 1)
         world = np.stack([np.interp(fine, np.arange(len(corners)), c) for c in corners.T], axis=1)
         above, below = self.parted(world)
@@ -109,10 +107,7 @@ class Pen:
         )
 
     def parted(self, world: Array) -> tuple[Array, Array | None]:
-        """Return world points above the ground and below it, nan elsewhere.
-
-        None if there are none.
-        """
+        """World points above the ground and below it, nan elsewhere; None if none is below."""
         below = world[:, 2:] < 0
         if not self.grounded or not below.any():
             return world, None
@@ -128,7 +123,7 @@ def above_ground(frame: Frame) -> Array | None:
 
     On the unit sphere they are a cap about n = diag(a) R^T e_z / d: z = p_z + d cos(polar).
     """
-    normal = frame.rotation[2] * frame.body.semi_axes
+    normal = frame.rotation[2] * frame.animal.semi_axes
     depth = np.linalg.norm(normal)
     if frame.torso[2] >= depth:
         return None
@@ -139,14 +134,15 @@ def above_ground(frame: Frame) -> Array | None:
     beside = np.linalg.svd(normal[None])[2][1:]
     ring = np.cos(around)[..., None] * beside[0] + np.sin(around)[..., None] * beside[1]
     sphere = np.cos(polar)[..., None] * normal / depth + np.sin(polar)[..., None] * ring
-    return frame.world(sphere.reshape(-1, 3) * frame.body.semi_axes)
+    return frame.world(sphere.reshape(-1, 3) * frame.animal.semi_axes)
 
 
-def hull(points: Array) -> Array:
-    """The convex outline (k, 2) of points (n, 2)."""
-    from scipy.spatial import ConvexHull
-
-    return points[ConvexHull(points).vertices]
+def draw_moment(pen: Pen, path: Array) -> None:
+    """The animal with its marks and shadow, and the path (K, 3) of its centre of mass."""
+    _draw_shadow(pen)
+    pen.plot(path, ":", 0.1, color=QUIET, linewidth=1.0)
+    draw_animal(pen)
+    _draw_marks(pen)
 
 
 def draw_animal(pen: Pen) -> None:
@@ -154,46 +150,42 @@ def draw_animal(pen: Pen) -> None:
     pen.torso()
     for leg in pen.frame.legs:
         pen.line(leg, color=LEG, linewidth=1.4)
-    draw_tail(pen)
-    count = len(pen.frame.tail) - 1
+    _draw_tail(pen)
+    count = len(pen.frame.tail)
     if count <= MOST_DOTS:
         size = 2.4 if count <= LARGE_DOTS else 1.2
-        pen.dots(pen.frame.tail[1:], color=INK, markersize=size, markeredgewidth=0)
+        pen.dots(pen.frame.tail, color=INK, markersize=size, markeredgewidth=0)
     pen.arrows(pen.frame.arrows)
 
 
-def draw_tail(pen: Pen) -> None:
+def _draw_tail(pen: Pen) -> None:
     """The tail, of one width or as thick as its links are."""
-    tail, thickness = pen.frame.tail, pen.frame.body.thickness
-    if not thickness:
+    tail, animal = pen.frame.tail, pen.frame.animal
+    if animal.alike:
         pen.line(tail, color=TAIL, linewidth=WIDTH)
         return
-    pen.line(tail[:2], color=TAIL, linewidth=WIDTH)
-    for k, thick in enumerate(thickness, 1):
-        width = WIDTH * min(max(thick, THIN), THICK)
+    for k, thickness in enumerate(np.divide(animal.tail_radii, np.mean(animal.tail_radii))):
+        width = WIDTH * min(max(thickness, THIN), THICK)
         pen.line(tail[k : k + 2], color=TAIL, linewidth=width)
 
 
-def draw_marks(pen: Pen) -> None:
-    """The back's midline and tick, and the head: a dot on the near side, a ring on the far one.
-
-    None on a fixed base.
-    """
-    if not pen.frame.body.marked:
+def _draw_marks(pen: Pen) -> None:
+    """The back's midline and tick, and the head: a dot on the near side, a ring on the far one."""
+    if pen.frame.animal.fixed:
         return
-    _, length, height = pen.frame.body.semi_axes
+    _, length, height = pen.frame.animal.semi_axes
     angle = np.linspace(0, np.pi, 61)
     back = pen.frame.world(
         np.stack([0 * angle, length * np.cos(angle), height * np.sin(angle)], axis=1)
     )
     pen.plot(pen.visible(back), "-", 0.5, color=INK, linewidth=0.7)
-    pen.line(pen.frame.world(tick(pen.frame.body)), color=INK, linewidth=1.4)
+    pen.line(pen.frame.world(tick(pen.frame.animal)), color=INK, linewidth=1.4)
     head = pen.frame.world([[0, length, 0]])
     fill = HEAD if pen.frame.in_front(head, pen.view)[0] else "white"
     pen.plot(head, "o", 0.8, color=HEAD, markersize=4, markerfacecolor=fill)
 
 
-def draw_shadow(pen: Pen) -> None:
+def _draw_shadow(pen: Pen) -> None:
     """Draw the animal's shadow at noon, in views from above the ground."""
     if not pen.grounded or pen.view.matrix[2, 2] <= 0:
         return
@@ -203,10 +195,7 @@ def draw_shadow(pen: Pen) -> None:
 
 
 def draw_ground(axes: "Axes", view: View, origin: Array) -> None:
-    """The ground z = 0 that the axes' limits have in them, from aside a line over a shaded half.
-
-    In views from above it is a grid.
-    """
+    """The ground z = 0: from aside a line over a shaded half, from above a grid."""
     (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
     height = -view.of(origin)[1]
     if view.matrix[2, 2] < EDGE_ON:

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.show.live.poses import animal
-from serpentail.show.page.packing import packed
-from serpentail.show.page.shape import shape
-from serpentail.show.pictures.frames import body_of
+from serpentail.show.animal import animal_of, poses_of
+from serpentail.show.live.live import instances
+from serpentail.show.page.samples import packed
 from tests.motion.conftest import at_height, scene_of, told
 from tests.support import page, zoo
 from tests.support.page import data_of
@@ -187,25 +186,27 @@ def test_links_and_arcs_are_drawn_as_thick_as_they_are():
         if name == "mixed":  # an arc, two links, an arc, three links
             radii = np.concatenate([arcs[:3], links[:2], arcs[3:], links[2:]])
         q = at_height(model, 0.0, 2)
-        scales = animal(model, q, None)["tail"].scales
+        animal = animal_of(model)
+        scales = instances(animal, poses_of(model, q, None))["tail"].scales
         with row(name):
-            np.testing.assert_allclose(shape(model)["tail_radii"], radii)
-            np.testing.assert_allclose(body_of(model).thickness, radii / radii.mean())
+            np.testing.assert_allclose(animal.tail_radii, radii)
+            assert not animal.alike
             np.testing.assert_allclose(scales[: len(radii), 0], radii)
             np.testing.assert_allclose(scales[len(radii) :, 1], radii)
 
 
 def test_equal_links_have_one_thickness_and_thin_torsos_and_fixed_bases_are_seen():
     model = zoo.model("m2_n2")
-    assert body_of(model).thickness == ()
-    found = shape(model)
-    np.testing.assert_allclose(found["tail_radii"], RADIUS * (1.15 - 0.5 * np.arange(4) / 5))
-    assert found["jointed"] and not shape(zoo.model("arcs2"))["jointed"]
+    animal = animal_of(model)
+    np.testing.assert_allclose(animal.tail_radii, RADIUS * (1.15 - 0.5 * np.arange(4) / 5))
+    assert animal.alike and animal.jointed and not animal_of(zoo.model("arcs2")).jointed
     flat = model.with_parameters(torso_inertia=(8e-5, 8e-5, 1.6e-4))  # a disc
-    least, most, _ = np.sort(shape(flat)["semi_axes"])
+    least, most, _ = np.sort(animal_of(flat).semi_axes)
     assert least == 0.15 * most
     # a fixed base is a ball at the mount
     model = zoo.model("fixed")
     reach = np.linalg.norm(model.parameters["tail_mount"])
-    assert shape(model)["semi_axes"] == [max(reach, 2 * RADIUS)] * 3
-    assert shape(model.with_parameters(tail_mount=(0, 0, 0)))["semi_axes"] == [2 * RADIUS] * 3
+    assert animal_of(model).semi_axes == (max(reach, 2 * RADIUS),) * 3
+    assert not animal_of(model).head
+    model = model.with_parameters(tail_mount=(0, 0, 0))
+    assert animal_of(model).semi_axes == (2 * RADIUS,) * 3

@@ -1,4 +1,4 @@
-"""The page of a filmstrip: the places of its panels, and the part of the world in each."""
+"""The sheet of a filmstrip: the places of its panels, of its key and of the path."""
 
 import math
 from collections.abc import Sequence
@@ -7,15 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .frames import Frame, tick
 from .style import Array
-from .views import SIDE, View
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-GAP, LEFT, TITLES = 0.06, 0.72, 0.24  # page margins, inches
+GAP, LEFT, TITLES = 0.06, 0.72, 0.24  # margins, inches
 RULER, TICKS = 0.62, 0.42  # margins at the left of and below the path, inches
 KEY_LINE, KEY_COLUMN = 0.17, 1.55  # a mark of the key, inches
 LEAST_WIDTH, MOST_WIDTH = 6.4, 10.0  # of all panels, inches
@@ -23,8 +21,8 @@ TALLEST_PATH = 3.2  # panel of the path below a film, inches
 
 
 @dataclass(frozen=True)
-class Page:
-    """A filmstrip's page, in inches."""
+class Sheet:
+    """A filmstrip's sheet, in inches."""
 
     frames: int
     column: float  # width of a panel
@@ -75,13 +73,13 @@ class Page:
 
     @property
     def base(self) -> float:
-        """Height of the film's lower edge on the page."""
+        """Height of the film's lower edge on the sheet."""
         below = self.path is not None and not self.beside
         return self.foot + (TICKS + GAP + self.path_size[1] if below else 0.0)
 
     @property
     def size(self) -> tuple[float, float]:
-        """Width and height of the page."""
+        """Width and height of the sheet."""
         reach = RULER + self.path_size[0] if self.beside else 0
         return LEFT + max(self.film[0] + reach, LEAST_WIDTH) + 3 * GAP, self.base + self.film[1]
 
@@ -103,36 +101,9 @@ class Page:
         return x, self.foot + TICKS, *self.path_size
 
 
-def page_of(frames: int, windows: Sequence[Array], marks: int, path: float | None) -> Page:
-    """Return the page of panels for windows of equal widths, one for each row, at one scale."""
+def sheet_of(frames: int, windows: Sequence[Array], marks: int, path: float | None) -> Sheet:
+    """Return the sheet of panels for windows of equal widths, one for each row, at one scale."""
     sizes = np.array([window[1] - window[0] for window in windows])
     wide = sizes[0, 0]
     column = min(max(1.4 * math.sqrt(wide / sizes[:, 1].max()), 0.85), 1.9)
-    return Page(frames, column, tuple(column * sizes[:, 1] / wide), marks, path)
-
-
-def drawn_points(frame: Frame, view: View) -> Array:
-    """Everything a frame shows, as points (n, 2) in a view."""
-    lines = np.vstack([frame.tail, frame.world(tick(frame.body)), *frame.legs])
-    return np.vstack([frame.outline(view), view.of(lines)[:, :2]])
-
-
-def window_around(shapes: Sequence[Array], margin: float = 0.012) -> Array:
-    """Lower and upper corner (2, 2) of a box around all shapes."""
-    every = np.vstack(shapes)
-    return np.array([every.min(axis=0) - margin, every.max(axis=0) + margin])
-
-
-def of_equal_widths(windows: Sequence[Array]) -> list[Array]:
-    """The windows, each widened to both sides until all are as wide as the widest."""
-    widest = max(float(window[1, 0] - window[0, 0]) for window in windows)
-    found = []
-    for window in windows:
-        more = (widest - float(window[1, 0] - window[0, 0])) / 2
-        found.append(window + np.array([[-more, 0], [more, 0]]))
-    return found
-
-
-def path_window(film: Sequence[Frame], com: Array) -> Array:
-    """The corners (2, 2) of the path panel."""
-    return window_around([*(drawn_points(frame, SIDE) for frame in film), SIDE.of(com)[:, :2]])
+    return Sheet(frames, column, tuple(column * sizes[:, 1] / wide), marks, path)

@@ -1,9 +1,16 @@
-"""Reports as text: aligned columns of names, values with five digits and units; Markdown tables."""
+"""Motions and reports as text: what a REPL shows, aligned columns with units, Markdown tables."""
 
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from ..basics.short_repr import cut
+
+if TYPE_CHECKING:
+    from .trajectory import Trajectory
+
+SI = "SI: s, m, rad, kg, N"
+WIDTH = 96  # characters of a line in a REPL
 DECIMALS = 12  # smaller numbers are rounding
 WIDEST = 32  # the column of values: long texts, such as reasons, make it no wider
 NONE: Mapping[str, Any] = MappingProxyType({})
@@ -13,10 +20,7 @@ Row = tuple[str, ...]  # name, value, error, unit
 def as_text(
     report: Mapping[str, Any], units: Mapping[str, str] = NONE, errors: Mapping[str, Any] = NONE
 ) -> str:
-    """Return a report as lines of name, value, estimated error if there is one, and unit.
-
-    An entry with parts has one line for each.
-    """
+    """Return a report as lines of name, value, estimated error and unit; one line for each part."""
     table = []
     for name, value in report.items():
         table += _rows(name, value, units.get(name, ""), errors.get(name))
@@ -68,3 +72,53 @@ def _rows(name: str, value: Any, unit: str, error: Any) -> list[Row]:
     if isinstance(value, list) and value and all(isinstance(each, str) for each in value):
         return [(name, each, "", "") for each in value]
     return [(name, as_word(value), as_error(error), unit if value is not None else "")]
+
+
+def short_text(motion: "Trajectory") -> str:
+    """Return what a REPL shows of a trajectory: at most six lines."""
+    first, last = motion.t[[0, -1]]
+    moved = motion.model.tail_words() if motion.model else "without its model"
+    name = motion.info.get("model", "a tail")
+    lines = [
+        f"Trajectory of {name}, {moved}: {len(motion.t)} samples, {first:.6g} to {last:.6g} s",
+        arrays_of(motion),
+        _touched(motion),
+        how_made(motion.info),
+    ]
+    return framed(lines + _ended(motion))
+
+
+def arrays_of(motion: Any) -> str:
+    """Return the shapes of q, v and tau, and the units."""
+    shapes = [f"{name} {getattr(motion, name).shape}" for name in ("q", "v", "tau")]
+    return f"{', '.join(shapes)}; {SI}"
+
+
+def how_made(info: dict[str, Any]) -> str:
+    """Return how a motion was made, as far as its info says so."""
+    if "method" not in info:
+        return "planned" if info.get("kind") == "plan" else "by an unknown method"
+    counts = [f"{info[name]} {name}" for name in ("steps", "rejected") if name in info]
+    return f"by {info['method']}: {', '.join(counts)}"
+
+
+def framed(lines: list[str]) -> str:
+    """Return lines as the text of one object, each cut to the width."""
+    return "<" + "\n  ".join(cut(line, WIDTH) for line in lines) + ">"
+
+
+def _touched(motion: "Trajectory") -> str:
+    """What touches the ground, and how often that changes."""
+    if motion.contact is None:
+        return "on a fixed base" if motion.layout.fixed else "in flight"
+    points = [f"{count} of the {group}" for group, count in motion.contact.groups.items()]
+    count = len(motion.info.get("events", []))
+    return f"on the ground by points: {', '.join(points)}; {count} events"
+
+
+def _ended(motion: "Trajectory") -> list[str]:
+    """What went wrong."""
+    if "failure" in motion.info:
+        return [f"failed: {motion.info['failure']}"]
+    warnings = motion.info.get("warnings", [])
+    return [f"{len(warnings)} warnings, the first: {warnings[0]}"] if warnings else []

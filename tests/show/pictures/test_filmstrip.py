@@ -10,11 +10,10 @@ from matplotlib.colors import to_rgb
 from PIL import Image
 
 import serpentail as st
-from serpentail.show.pictures.animal import PALE, SHADOW
-from serpentail.show.pictures.filmstrip import strip_of
-from serpentail.show.pictures.frames import moments, way
-from serpentail.show.pictures.page import drawn_points
-from serpentail.show.pictures.style import STYLE, TORSO
+from serpentail.show.pictures.frames import drawn_points
+from serpentail.show.pictures.pen import PALE
+from serpentail.show.pictures.strip import moments, strip_of, way_of
+from serpentail.show.pictures.style import SHADOW, STYLE, TORSO
 from serpentail.show.pictures.views import NAMED, SIDE, views_of
 from tests.support.drawn_flight import SPEEDS, flight
 from tests.support.rows import row
@@ -131,7 +130,7 @@ def test_moments_do_not_repeat_what_rests():
     q = motion.q.copy()
     q[:, 3:7] = 1, 0, 0, 0
     q[:, 1] = 0.5 - np.abs(np.linspace(-1, 1, 101)) / 2
-    gone = way(motion.model, dataclasses.replace(motion, q=2 * q - q * (np.arange(7) > 2)))
+    gone = way_of(motion.model, dataclasses.replace(motion, q=2 * q - q * (np.arange(7) > 2)))
     assert gone[0] == 0 and gone[-1] == pytest.approx(2) and (np.diff(gone) > 0).all()
 
 

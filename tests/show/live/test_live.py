@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import serpentail as st
-from serpentail.show.live.poses import rods
+from serpentail.show.live.live import rods
 from tests.support import zoo
 
 LEGS = st.Legs.fixed(3.6, -0.3)
@@ -48,7 +48,7 @@ def assert_at(view, q, legs):
 
 def test_a_run_is_shown_where_it_has_come_to(view):
     motion = dropped(watch=view)
-    names = {f"/animal/{part}" for part in ("back", "belly", "head", "tail", "legs")}
+    names = {f"/animal/{part}" for part in ("back", "belly", "fur", "eye", "tail", "legs")}
     assert {node.name for node in view.nodes.values()} == names
     assert_at(view, motion.q[-1], motion.contact.legs[-1])
     assert view.text.content == "t = 0.1000 s"
@@ -60,9 +60,9 @@ def test_a_run_is_shown_where_it_has_come_to(view):
     q = np.array([0, 0, 1, 0, 1.0, 0, 0, 0, 0])  # upside down: half a turn about x
     still = st.simulate(zoo.model("feet"), q, np.zeros(8), legs=LEGS, t_span=1e-4, method="rk4")
     view(still.resample(still.t[:1]))
-    nodes = [view.nodes[name] for name in ("back", "belly", "head")]
-    back, belly, head = (node.batched_positions[0] for node in nodes)
-    assert belly[2] > back[2] and head[1] < back[1] - 0.5 * nodes[0].batched_scales[0, 1]
+    back, head = view.nodes["back"], view.nodes["fur"]
+    _, y, z = head.batched_positions[0] - back.batched_positions[0]
+    assert z < 0 and y < -0.5 * back.batched_scales[0, 1]
     other = st.simulate(zoo.model("m2_n2"), [0, 0, 0, 1, *[0] * 7], np.zeros(10), t_span=0.01)
     for news in (3, None, "run", other):
         with pytest.raises(st.ViewError, match=r"news: value .*Trajectory or a Plan.* q has 9"):
