@@ -13,8 +13,8 @@ import numpy as np
 
 import serpentail as st
 from benchmarks.fixtures import built, label
-from serpentail.model.batch import MIN_BATCH
 from serpentail.model.kernel import aligned, argument_record
+from serpentail.model.library import MIN_BATCH
 
 STATES, ROUNDS = 512, 100  # a batch that stays in the cache
 MANY = 20  # factor: that many more in a call from Python

@@ -14,7 +14,7 @@ import numpy as np
 
 import serpentail as st
 from benchmarks.fixtures import built, label
-from serpentail.model.batch import MIN_BATCH
+from serpentail.model.library import MIN_BATCH
 from serpentail.model.stepping.held import Held
 
 SIZES = ((1, 3), (3, 4), (3, None))

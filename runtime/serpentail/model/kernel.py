@@ -16,9 +16,8 @@ from serpentail_scene.layout import PER_SEGMENT, QUATERNION
 from ..basics.checks import real_array, refuse_not_finite
 from ..basics.errors import StateError
 from ..compiling.threads import shared
-from .batch import BatchLibrary, RecordFunction
 from .fast_call import Call, call_of, declined, waiting
-from .library import NOT_POSITIVE_DEFINITE, OUT_OF_RANGE
+from .library import NOT_POSITIVE_DEFINITE, OUT_OF_RANGE, BatchLibrary, RecordFunction
 
 MOST_ARRAYS = 10
 QUATERNIONS = {"q": QUATERNION, "x": slice(0, 4)}  # where they are, by the first argument's name

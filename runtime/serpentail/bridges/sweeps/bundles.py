@@ -6,16 +6,13 @@ import io
 import zipfile
 import zlib
 from collections import OrderedDict
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ...basics.errors import SerpentailError
-from ...compiling.cache import MODELS, cache_folder, refuse_others, workshop
+from ...compiling.cache import cache_folder, workshop
 from ...model.load import model_from
-from ...model.manifest import CheckedFolder, read_folder
+from ...model.manifest import CheckedFolder, in_cache, read_folder, snapshot
 from ...model.model import Model
-from ...model.snapshot import contents, snapshot
 from ..exporting.bundle import zipped
 from .job import Job
 
@@ -32,7 +29,7 @@ class Bundle:
     @classmethod
     def of(cls, checked: CheckedFolder) -> "Bundle":
         """Return the bundle of a folder that was checked."""
-        return cls(checked.manifest_hash, zlib.compress(zipped(contents(checked))))
+        return cls(checked.manifest_hash, zlib.compress(zipped(checked.contents())))
 
 
 _models: OrderedDict[tuple[str, str], Model] = OrderedDict()
@@ -53,13 +50,10 @@ def model_of(bundle: Bundle | None, job: Job) -> Model | None:
 
 def unpacked(bundle: Bundle) -> CheckedFolder:
     """Return the folder of a bundle in this machine's cache; unpack it if it is missing."""
-    cache = cache_folder(None)
-    place = cache / MODELS / bundle.manifest_hash
-    with suppress(SerpentailError):
-        refuse_others(cache, place.parent, place)
-        found = read_folder(place)
-        if found.manifest_hash == bundle.manifest_hash:
-            return found
+    cache = cache_folder()
+    found = in_cache(bundle.manifest_hash, cache)
+    if found:
+        return found
     with workshop(cache) as part:
         with zipfile.ZipFile(io.BytesIO(zlib.decompress(bundle.content))) as archive:
             archive.extractall(part)

@@ -19,7 +19,7 @@ import numpy as np
 
 from ...basics.errors import SweepError
 from ...compiling.commands import inherited
-from ...compiling.cores import VARIABLE
+from ...compiling.threads import VARIABLE
 from .axes import Axes, Point
 from .bundles import Bundle
 from .runs import Told
