@@ -162,9 +162,10 @@ class Model(Functions, StepMethods):
         self.batch_library = batch_library or BatchLibrary(checked, profile)
         self.kernels: dict[str, Kernel] = {}
         if library is not None:
-            libraries = library, self.batch_library
             for name in manifest["functions"]:
-                self.kernels[name] = Kernel(libraries, manifest, name, self.parameter_vector)
+                self.kernels[name] = Kernel(
+                    library, self.batch_library, manifest, name, self.parameter_vector
+                )
 
     def __repr__(self) -> str:
         return f"<serpentail.Model {self.name}: {self.tail_words()}, nv = {self.nv}>"
