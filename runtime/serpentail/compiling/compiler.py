@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..basics.checks import one_of
 from ..basics.errors import CompileFailed, ModelError, SerpentailError
 from ..basics.progress import Stage
 from .cache import (
@@ -20,8 +21,6 @@ from .cache import (
     cache_folder,
     digest,
     find,
-    refuse_open,
-    refuse_others,
     regular_bytes,
     store,
     workshop,
@@ -29,11 +28,11 @@ from .cache import (
 from .cache_limit import keep_within, limit
 from .commands import Finished
 from .toolchain import (
+    PROFILES,
     SHARED_FLAGS,
     Toolchain,
-    check_profile,
     examine,
-    known,
+    noted_toolchain,
     run_command,
     run_commands,
 )
@@ -62,7 +61,7 @@ def compile_library(
     """
     texts = _read(sources, include)
     digests = {name: hashlib.sha256(text).hexdigest() for name, text in texts.items()}
-    return library_of(texts, digests, profile, cache_folder(cache), flags)
+    return library_of(digests, lambda: texts, profile, cache_folder(cache), flags)
 
 
 def _read(sources: Sequence[Path], include: Path) -> Texts:
@@ -82,13 +81,13 @@ def _read(sources: Sequence[Path], include: Path) -> Texts:
 
 
 def library_of(
-    texts: Texts,
     digests: Mapping[str, str],
+    texts: Callable[[], Texts],
     profile: str,
     cache: Path,
     flags: tuple[str, ...] = (),
 ) -> Path:
-    """Return the library of texts, which have these SHA-256.
+    """Return the library of texts with these SHA-256, which are read only to compile them.
 
     flags: added to the profile's. One process compiles while others wait for it. Errors as of
     ``compile_library``.
@@ -96,7 +95,7 @@ def library_of(
     library = library_in_cache(digests, profile, cache, flags)
     if library:
         return library
-    with alone(cache, lock_name(digests, profile)):
+    with alone(cache, digest([sorted(digests.items()), profile])):
         library = library_in_cache(digests, profile, cache, flags)
         if library:
             return library
@@ -105,25 +104,15 @@ def library_of(
         toolchain = examine(profile, cache)
         place = cache / LIBRARIES / toolchain.key(digests, flags)
         found = find(cache, LIBRARIES, place.name)
-        return found[0] if found else _build(texts, toolchain, flags, place)
-
-
-def lock_name(digests: Mapping[str, str], profile: str) -> str:
-    """Return the name of the lock under which texts are compiled."""
-    return digest([sorted(digests.items()), profile])
+        return found[0] if found else _build(texts(), toolchain, flags, place)
 
 
 def library_in_cache(
     digests: Mapping[str, str], profile: str, cache: Path, flags: tuple[str, ...] = ()
 ) -> Path | None:
-    """Return the library of texts with these SHA-256 if it is there; no process is started.
-
-    SerpentailError for an unknown profile, or a cache into which others can put libraries.
-    """
-    check_profile(profile)
-    refuse_others(cache)
-    refuse_open(cache)
-    toolchain = known(profile, cache)
+    """Return the library of texts with these SHA-256 if it is there; no process is started."""
+    one_of("profile", profile, PROFILES, SerpentailError)
+    toolchain = noted_toolchain(profile, cache)
     found = toolchain and find(cache, LIBRARIES, toolchain.key(digests, flags))
     return found[0] if found else None
 
@@ -149,7 +138,7 @@ def opened(compiled: Callable[[], Path], kind: type[ctypes.CDLL] = ctypes.CDLL) 
 
 def describe_compiler(profile: str = "fast") -> dict[str, object]:
     """Return the command (less its folder), version and flags that `compile_library` would use."""
-    check_profile(profile)
+    one_of("profile", profile, PROFILES, SerpentailError)
     toolchain = examine(profile, cache_folder())
     program, *arguments = toolchain.command
     return {

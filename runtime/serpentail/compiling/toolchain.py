@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from ..basics.checks import one_of
 from ..basics.errors import CompilerNotFound, SerpentailError
 from .cache import COMPILERS, digest, read_note, write_note
 from .commands import Finished, run_all
@@ -45,13 +44,10 @@ PLACES = (
     *("PATH", "HOME", "TMPDIR", "XDG_CACHE_HOME", "XDG_CONFIG_HOME", "PYTHONPATH"),
     *("APPDATA", "LOCALAPPDATA", "PATHEXT", "SYSTEMROOT", "TEMP", "TMP", "USERPROFILE"),  # Windows
 )
-KEPT = ("LD_LIBRARY_PATH", "SDKROOT", "DEVELOPER_DIR", "MACOSX_DEPLOYMENT_TARGET")
-KEPT_OF = ("CCACHE_", "SCCACHE_", "ZIG_", "NIX_")  # wrappers of compilers
-# lines of /proc/cpuinfo that tell the processor's model and features
-CPU_LINES = (
-    *("model name", "flags", "Features", "CPU implementer", "CPU part"),
-    *("cpu\t", "isa", "uarch"),
-)
+VARIABLES = ("LD_LIBRARY_PATH", "SDKROOT", "DEVELOPER_DIR", "MACOSX_DEPLOYMENT_TARGET")
+PREFIXES = ("CCACHE_", "SCCACHE_", "ZIG_", "NIX_")  # of wrappers of compilers
+# beginnings of lines of /proc/cpuinfo that tell the processor's model and features
+CPU_LINES = ("model name", "flags", "Features", "CPU ", "cpu\t", "isa", "uarch")
 
 
 @dataclass(frozen=True)
@@ -69,13 +65,11 @@ class Toolchain:
         """
         program = os.path.basename(os.path.realpath(self.command[0]))
         command = (program, *self.command[1:], *self.flags, *more, *SHARED_FLAGS)
-        machine = (processor(), kept_variables(), c_library())
+        machine: list[object] = [processor(), compiler_variables()]
+        with contextlib.suppress(AttributeError, ValueError, OSError):
+            # a library that is linked to a newer C library may not load
+            machine.append(os.confstr("CS_GNU_LIBC_VERSION") or "")
         return digest([sorted(texts.items()), command, self.version, *machine])
-
-
-def check_profile(profile: str) -> None:
-    """Raise SerpentailError unless `profile` is known."""
-    one_of("profile", profile, PROFILES, SerpentailError)
 
 
 def candidates() -> Iterator[tuple[str, ...]]:
@@ -95,7 +89,7 @@ def candidates() -> Iterator[tuple[str, ...]]:
         yield (sys.executable, "-m", "ziglang", "cc")
 
 
-def known(profile: str, cache: Path) -> Toolchain | None:
+def noted_toolchain(profile: str, cache: Path) -> Toolchain | None:
     """Return the compiler that worked when such a machine was examined; starts no process."""
     note = read_note(cache, COMPILERS, _note_key(profile))
     if note is None:
@@ -122,7 +116,7 @@ def _note_key(profile: str) -> str:
     """Return the name of a note: programs, flags to choose from, machine."""
     commands = [(command, [*map(_file_identity, command)]) for command in candidates()]
     flags = (PROFILES[profile], CPU_FLAGS[profile])
-    return digest([commands, flags, processor(), kept_variables()])
+    return digest([commands, flags, processor(), compiler_variables()])
 
 
 def _file_identity(word: str) -> tuple[object, ...]:
@@ -179,18 +173,18 @@ def run_commands(
     """
     places = {name: os.environ[name] for name in PLACES if name in os.environ}
     try:
-        return run_all(commands, {**places, **kept_variables(), "LC_ALL": "C"}, tick)
+        return run_all(commands, {**places, **compiler_variables(), "LC_ALL": "C"}, tick)
     except OSError as error:
         reason = error.strerror or str(error)
         return [Finished(each, 127, "", reason) for each in commands]
 
 
-def kept_variables() -> dict[str, str]:
+def compiler_variables() -> dict[str, str]:
     """Return the environment variables that may change what a compiler makes."""
     return {
         name: value
         for name, value in sorted(os.environ.items())
-        if name in KEPT or name.startswith(KEPT_OF)
+        if name in VARIABLES or name.startswith(PREFIXES)
     }
 
 
@@ -204,10 +198,3 @@ def processor() -> str:
     if hasattr(os, "uname"):
         return " ".join(os.uname())
     return os.environ.get("PROCESSOR_IDENTIFIER", sys.platform)  # on Windows
-
-
-def c_library() -> str:
-    """Return the C library's version, because a library linked to a newer one may not load."""
-    with contextlib.suppress(AttributeError, ValueError, OSError):
-        return os.confstr("CS_GNU_LIBC_VERSION") or ""
-    return ""

@@ -81,12 +81,12 @@ def model_library(checked: CheckedFolder, sources: Sequence[str], profile: str) 
     If it has to be compiled, the cache gets a snapshot of the model, too.
     """
     cache, digests = cache_folder(), _digests(checked, sources)
-    library = library_in_cache(digests, profile, cache)
-    if library is None:
+
+    def texts() -> dict[str, bytes]:
         snapshot(checked, cache)
-        texts = {name: checked.files[name] for name in digests}
-        library = library_of(texts, digests, profile, cache)
-    return library
+        return {name: checked.files[name] for name in digests}
+
+    return library_of(digests, texts, profile, cache)
 
 
 def _digests(checked: CheckedFolder, sources: Sequence[str]) -> dict[str, str]:
