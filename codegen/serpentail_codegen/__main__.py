@@ -60,51 +60,45 @@ def scene_of(arguments: argparse.Namespace) -> Scene:
         chosen["functions"] = names if names == "all" else names.split(",")
     if arguments.baked:
         chosen["baked"] = True
-    scene, own = _with_options(arguments, chosen)
+    if arguments.scene:
+        own = load_scene(arguments.scene)
+        scene = parse_scene(scene_to_dict(own) | chosen, own.name)
+    else:
+        size = (arguments.tail, arguments.segments, arguments.links)
+        if None in size[:2]:
+            missing = "give a scene file, or --tail and --segments (and --links): see --help"
+            raise SceneError([Problem("scene", None, missing)])
+        own, scene = scene_for(*size), scene_for(*size, **chosen)
     if arguments.name:
         return scene
     name = own.name + suffix(scene, own, arguments.functions)
     return parse_scene(scene_to_dict(scene) | {"name": name}, name)
 
 
-def _with_options(arguments: argparse.Namespace, chosen: dict[str, Any]) -> tuple[Scene, Scene]:
-    """Return a scene with the options applied, and the same scene without them."""
-    if arguments.scene:
-        own = load_scene(arguments.scene)
-        return parse_scene(scene_to_dict(own) | chosen, own.name), own
-    size = (arguments.tail, arguments.segments, arguments.links)
-    if None in size[:2]:
-        missing = "give a scene file, or --tail and --segments (and --links): see --help"
-        raise SceneError([Problem("scene", None, missing)])
-    return scene_for(*size, **chosen), scene_for(*size)
-
-
 def main(argv: list[str] | None = None) -> int:
     """Generate the model if its folder is not up to date; return the exit status."""
     try:
-        arguments = parser().parse_args(argv)
-        if arguments.schema:
-            print(json.dumps(scene_schema()))
-            return 0
-        scene = scene_of(arguments)
-        if arguments.given:
-            load_scene(arguments.given)
-    except SceneError as error:
+        print(_answer(parser().parse_args(argv)))
+    except SceneError as error:  # of the scene, or a folder that cannot be written
         print(error, file=sys.stderr)
         return 2
+    return 0
+
+
+def _answer(arguments: argparse.Namespace) -> str:
+    """Do what the arguments ask for, and return what to print."""
+    if arguments.schema:
+        return json.dumps(scene_schema())
+    scene = scene_of(arguments)
+    if arguments.given:
+        load_scene(arguments.given)
     folder = arguments.output / scene.name
     if arguments.print_folder:
-        print(folder)
-        return 0
+        return str(folder)
     start = time.perf_counter()
-    try:
-        changed = made(scene, folder, arguments.progress)
-    except SceneError as error:  # its folder cannot be written
-        print(error, file=sys.stderr)
-        return 2
+    changed = made(scene, folder, arguments.progress)
     outcome = f"{len(changed)} files written" if changed else "up to date"
-    print(f"{folder}: {outcome}, {time.perf_counter() - start:.2f} s")
-    return 0
+    return f"{folder}: {outcome}, {time.perf_counter() - start:.2f} s"
 
 
 def made(scene: Scene, folder: Path, progress: Path | None = None) -> list[str]:

@@ -183,7 +183,7 @@ try:
 except KeyboardInterrupt:
     told["ended"] = time.monotonic() - begun < 30
 Path.read_text = lambda *_, **__: open("/no/such/file")
-told["named"] = bool(toolchain.processor())
+told["named"] = bool(toolchain.processor.__wrapped__())
 print(json.dumps(told))
 """
 

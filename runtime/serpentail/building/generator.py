@@ -45,19 +45,14 @@ def generated(scene: Mapping[str, Any], name: str, given: Mapping[str, object]) 
         raise ModelError(
             f"no model can be generated without the package {error.name}: {REMEDY}"
         ) from error
-    stored = _stored(cache, key)
+    stored = in_cache(read_note(cache, BUILDS, key), cache)
     if stored:
         return stored
     loaded = {**scene, "parameters": merged(scene.get("parameters", {}), given)} if given else scene
     loaded_text = scene_text(loaded)
     with alone(cache, key):
-        return _stored(cache, key) or _made(cache, key, name, text, loaded_text)
-
-
-def _stored(cache: Path, key: str) -> CheckedFolder | None:
-    """Return the model stored under a key; None if the cache does not have it whole."""
-    manifest_hash = read_note(cache, BUILDS, key)
-    return None if manifest_hash is None else in_cache(manifest_hash, cache)
+        stored = in_cache(read_note(cache, BUILDS, key), cache)
+        return stored or _made(cache, key, name, text, loaded_text)
 
 
 def _made(cache: Path, key: str, name: str, text: str, loaded: str) -> CheckedFolder:

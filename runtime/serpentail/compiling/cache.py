@@ -66,14 +66,14 @@ def regular_bytes(path: Path) -> bytes:
 # Owner. Libraries in the cache are executed, so nobody else may be able to put them there.
 
 
-def refuse_others(cache: Path, *inside: Path) -> None:
+def refuse_others(*paths: Path) -> None:
     """Raise SerpentailError if others than the user and root may exchange any of these.
 
     Windows has no such owners and rights: there a cache is as safe as its folder.
     """
     if not hasattr(os, "geteuid"):
         return
-    for path in (cache, *inside):
+    for path in paths:
         with contextlib.suppress(OSError):
             status = os.stat(path)
             if status.st_uid not in (os.geteuid(), ROOT):
@@ -82,7 +82,11 @@ def refuse_others(cache: Path, *inside: Path) -> None:
                 for_all = status.st_mode & stat.S_ISVTX  # such as /tmp, which must stay open
                 remedy = f"`chmod -R go-w {path}` if all in it is yours, or "
                 raise _unsafe(path, "is writable by others", "" if for_all else remedy)
-    for path in cache.resolve().parents:
+
+
+def refuse_open(cache: Path) -> None:
+    """Raise SerpentailError if everybody may exchange a folder above the cache, as not in /tmp."""
+    for path in cache.resolve().parents if hasattr(os, "geteuid") else ():
         with contextlib.suppress(OSError):
             if os.stat(path).st_mode & (stat.S_IWOTH | stat.S_ISVTX) == stat.S_IWOTH:
                 raise _unsafe(path, "is writable by others", f"`chmod o-w {path}`, or ")

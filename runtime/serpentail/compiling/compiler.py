@@ -21,6 +21,7 @@ from .cache import (
     cache_folder,
     digest,
     find,
+    refuse_open,
     regular_bytes,
     store,
     workshop,
@@ -112,6 +113,7 @@ def library_in_cache(
 ) -> Path | None:
     """Return the library of texts with these SHA-256 if it is there; no process is started."""
     one_of("profile", profile, PROFILES, SerpentailError)
+    refuse_open(cache)
     toolchain = noted_toolchain(profile, cache)
     found = toolchain and find(cache, LIBRARIES, toolchain.key(digests, flags))
     return found[0] if found else None

@@ -10,6 +10,7 @@ import shutil
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import cache as memoised
 from pathlib import Path
 
 from ..basics.errors import CompilerNotFound, SerpentailError
@@ -113,20 +114,17 @@ def examine(profile: str, cache: Path) -> Toolchain:
 
 
 def _note_key(profile: str) -> str:
-    """Return the name of a note: programs, flags to choose from, machine."""
-    commands = [(command, [*map(_file_identity, command)]) for command in candidates()]
+    """Return the name of a note: the first command to try, flags to choose from, machine.
+
+    What worked in place of a broken command is noted under that one.
+    """
+    command, programs = next(candidates(), ()), []
+    for path in filter(None, map(shutil.which, command)):
+        with contextlib.suppress(OSError):
+            status = os.stat(path)  # which changes if the program is replaced
+            programs.append([os.path.realpath(path), status.st_mtime_ns, status.st_size])
     flags = (PROFILES[profile], CPU_FLAGS[profile])
-    return digest([commands, flags, processor(), compiler_variables()])
-
-
-def _file_identity(word: str) -> tuple[object, ...]:
-    """Return values that change if the program of that name is replaced."""
-    path = shutil.which(word)
-    with contextlib.suppress(OSError):
-        if path:
-            status = os.stat(path)
-            return os.path.realpath(path), status.st_mtime_ns, status.st_size
-    return ()
+    return digest([command, programs, flags, processor(), compiler_variables()])
 
 
 def _not_found(refusals: list[str]) -> str:
@@ -188,6 +186,7 @@ def compiler_variables() -> dict[str, str]:
     }
 
 
+@memoised
 def processor() -> str:
     """Return the processor's model and features, else the machine's name; starts no process."""
     with contextlib.suppress(OSError):

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from numpy import ndarray
 
@@ -18,21 +18,18 @@ LINKING = ("-Wl,-undefined,dynamic_lookup",) if sys.platform == "darwin" else ()
 Call = Callable[..., Any]  # takes arguments, returns outputs, or None where it does not serve
 
 
-class CallMemory(Protocol):
-    """What a function works on, and the address of a record that points to it."""
+def fast_call(
+    function: Any, record: int, inputs: list[ndarray], outputs: list[ndarray], owner: object
+) -> Call:
+    """Return a fast call of a generated C function on one state; without the extension, none.
 
-    inputs: list[ndarray]
-    outputs: list[ndarray]
-    address: int
-
-
-def fast_call(function: Any, memory: CallMemory) -> Call:
-    """Return a fast call of a generated C function on one state; without the extension, none."""
+    record: the address of one that points to the arrays. The call keeps its owner alive.
+    """
     library = extension()
     if library is None:
         return no_call
-    code, arrays = ctypes.cast(function, ctypes.c_void_p), (*memory.inputs, *memory.outputs)
-    return library.serpentail_call(code, memory.address, arrays, len(memory.inputs), memory)
+    code, arrays = ctypes.cast(function, ctypes.c_void_p), (*inputs, *outputs)
+    return library.serpentail_call(code, record, arrays, len(inputs), owner)
 
 
 def no_call(*_: Any) -> None:

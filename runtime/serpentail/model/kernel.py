@@ -153,7 +153,12 @@ class Kernel:
         """Return a fast call of the function; it returns None for arguments that it declines."""
         buffers = self._buffers()
         size = self.work + sum(array.size for array in (*buffers.inputs, *buffers.outputs))
-        self.fast = no_call if size > MOST_UNDER_LOCK else fast_call(self.function, buffers)
+        if size > MOST_UNDER_LOCK:
+            self.fast = no_call
+        else:
+            self.fast = fast_call(
+                self.function, buffers.address, buffers.inputs, buffers.outputs, buffers
+            )
         return self.fast
 
     def _buffers(self) -> Buffers:

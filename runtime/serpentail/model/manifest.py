@@ -179,8 +179,10 @@ def snapshot(checked: CheckedFolder, cache: Path) -> Path:
     return place
 
 
-def in_cache(manifest_hash: str, cache: Path) -> CheckedFolder | None:
+def in_cache(manifest_hash: str | None, cache: Path) -> CheckedFolder | None:
     """Return the snapshot of a manifest; None if the cache does not have it whole."""
+    if manifest_hash is None:
+        return None
     place = cache / MODELS / manifest_hash
     refuse_others(cache, place.parent, place)
     with suppress(ModelError):
