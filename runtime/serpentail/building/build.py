@@ -22,14 +22,8 @@ PIECES = {
 PASSIVE = {"tail_stiffness", "tail_rest", "tail_damping"} | {
     f"tail_stop_{name}" for name in ("lower", "upper", "stiffness", "width")
 }
-LEFT_OUT = (
-    "plan",
-    "simulate",
-    "identify",
-    "phase",
-    "sweep",
-    "description",
-)  # no generated code depends on them
+# keys on which no generated code depends
+LEFT_OUT = ("plan", "simulate", "identify", "phase", "sweep", "description")
 ANY = "contacts"  # any group of points that touch the ground
 # parameters that a scene file may have of a group, or of any group
 NEEDED = {

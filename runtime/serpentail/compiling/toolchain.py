@@ -20,12 +20,8 @@ from .commands import Finished, run_all
 # -std=c99 alone turns contraction off, so the fast profile asks for it by name.
 PROFILES = {
     "fast": (
-        "-std=c99",
-        "-O2",
-        "-ffp-contract=fast",
-        "-fno-tree-vectorize",
-        "-fno-math-errno",
-        "-fno-trapping-math",
+        *("-std=c99", "-O2", "-ffp-contract=fast"),
+        *("-fno-tree-vectorize", "-fno-math-errno", "-fno-trapping-math"),
     ),
     "reproducible": ("-std=c99", "-O2", "-ffp-contract=off"),
 }

@@ -26,16 +26,8 @@ from ..compiling.cache import (
 from .lazy import kept
 
 FORMAT = 2
-KEYS = [
-    "prefix",
-    "real",
-    "scene",
-    "dimensions",
-    "parameters",
-    "functions",
-    "files",
-    "manifest_hash",
-]
+KEYS = ["prefix", "real", "scene", "dimensions", "parameters", "functions"]
+KEYS += ["files", "manifest_hash"]
 C_KEYS = ["abi_hash", "work", "batch"]  # of models with C
 MOST_READS = 100  # of a folder that is exchanged again and again while it is read
 
