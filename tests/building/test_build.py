@@ -18,7 +18,7 @@ from hypothesis import strategies as some
 import serpentail as st
 from serpentail.building import generator
 from serpentail.building.build import NEEDED, with_contacts
-from serpentail.building.options import Parameters, SceneKeys
+from serpentail.building.options import ParameterOptions, SceneKeys
 from serpentail.building.scene_text import scene_text
 from serpentail.cli import cli
 from serpentail_codegen.scene.parameters import PARAMETERS
@@ -217,7 +217,7 @@ def test_options_are_what_the_generator_knows():
     left = {"description", "parameters", "plan", "simulate", "phase", "identify", "sweep"}
     assert set(SceneKeys.__annotations__) == keys - left
     names = [parameter.name for parameter in (*PARAMETERS, *PASSIVE)]
-    assert list(Parameters.__annotations__) == names
+    assert list(ParameterOptions.__annotations__) == names
     wanted = {group: [p.name for p in PARAMETERS if p.needs == group] for group in NEEDED}
     assert {group: [*names] for group, names in NEEDED.items()} == wanted
     assert {p.needs for p in PARAMETERS} == {"", *NEEDED}

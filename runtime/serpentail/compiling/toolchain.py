@@ -54,6 +54,7 @@ class Toolchain:
     command: tuple[str, ...]
     flags: tuple[str, ...]
     version: str
+    target: str  # digest of what the flags stand for on this machine: processor, instruction set
 
     def key(self, texts: Mapping[str, str], more: tuple[str, ...]) -> str:
         """Return the digest of all that machine code depends on; no folder is named.
@@ -62,7 +63,7 @@ class Toolchain:
         """
         program = os.path.basename(os.path.realpath(self.command[0]))
         command = (program, *self.command[1:], *self.flags, *more, *SHARED_FLAGS)
-        machine: list[object] = [processor(), compiler_variables()]
+        machine: list[object] = [self.target, compiler_variables()]
         with contextlib.suppress(AttributeError, ValueError, OSError):
             # a library that is linked to a newer C library may not load
             machine.append(os.confstr("CS_GNU_LIBC_VERSION") or "")
@@ -91,7 +92,8 @@ def noted_toolchain(profile: str, cache: Path) -> Toolchain | None:
     note = read_note(cache, COMPILERS, _note_key(profile))
     if note is None:
         return None
-    return Toolchain(tuple(note["command"]), tuple(note["flags"]), note["version"])
+    command, flags = tuple(note["command"]), tuple(note["flags"])
+    return Toolchain(command, flags, note["version"], note["target"])
 
 
 def examine(profile: str, cache: Path) -> Toolchain:
@@ -150,7 +152,14 @@ def _ask(command: tuple[str, ...], profile: str) -> Toolchain:
         if silent.returncode == 0 and silent.stderr == usual:
             flags += (flag,)
             break
-    return Toolchain(command, flags, answer.stdout.strip())
+    # what the flags resolve to: gcc's list, else the predefined macros
+    target = processor()
+    for question in (("-Q", "--help=target"), ("-dM", *nothing)):
+        listing = run_command((*command, *flags, *question))
+        if listing.returncode == 0 and listing.stdout:
+            target = listing.stdout
+            break
+    return Toolchain(command, flags, answer.stdout.strip(), digest(target))
 
 
 def run_command(command: Sequence[str]) -> Finished:

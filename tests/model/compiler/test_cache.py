@@ -69,20 +69,23 @@ def test_all_that_matters_reaches_the_key_and_nothing_else(model, cache, monkeyp
 
 
 def test_c_library_processor_and_version_reach_the_key(model, monkeypatch, script, tmp_path):
-    script(f'case "$*" in *version*) cat {tmp_path}/version; exit 0;; esac')
+    told = {"version": "mycc 1", "target": "-march= zen"}
+    asks = [f"*{word}*) cat {tmp_path}/{word}; exit 0;;" for word in told]
+    script(f'case "$*" in {" ".join(asks)} esac')
     asked, places = [], []
 
-    def build(version="mycc 1"):
-        (tmp_path / "version").write_text(version)
+    def build(**changes):
+        for word, text in (told | changes).items():
+            (tmp_path / word).write_text(text)
         places.append(compiler.compile_library(*model).parent)
 
     build()
     monkeypatch.setattr(os, "confstr", lambda name: asked.append(name) or "glibc 2.99")
     build()
     monkeypatch.setattr("serpentail.compiling.toolchain.processor", lambda: "lake")
-    build()
+    build(target="-march= lake")
     shutil.rmtree(places[2])  # or the note of the old version would do
-    build(version="mycc 2")
+    build(target="-march= lake", version="mycc 2")
     assert len({*places}) == 4 and {*asked} == {"CS_GNU_LIBC_VERSION"}
     assert compiler.describe_compiler()["version"] == "mycc 2"
     forbid_processes(monkeypatch)

@@ -11,7 +11,7 @@ from ... import __version__
 from ...basics.checks import Refusals, did_you_mean, numbers_in, shown
 from ...basics.errors import IdentificationError, PlanningError, SimulationError, SweepError
 from ...building.build import built
-from ...building.options import Parameters
+from ...building.options import ParameterOptions
 from ...model.model import Model
 from ...model.parameters import independent
 from ...scenes.file import MADE_OF, read_scene, subtable
@@ -240,7 +240,7 @@ def _refuse_shapes(model: Model, axes: Axes) -> None:
 
 def _refuse_misspelt(names: list[str], run: Any) -> None:
     """SweepError for a name that no model has as a parameter, before a model is made."""
-    known = Parameters.__annotations__
+    known = ParameterOptions.__annotations__
     if isinstance(run, str):
         _refuse_unknown([name for name in names if name not in known], run, known)
 
