@@ -13,8 +13,8 @@ import numpy as np
 import serpentail as st
 from benchmarks.models import DFD, FD, HESSIAN, built, label
 from benchmarks.timing import best, best_of
-from serpentail.model.batch import MIN_BATCH
 from serpentail.model.kernel import aligned, argument_record
+from serpentail.model.library import MIN_BATCH
 
 PER_PROCESSOR = True
 STATES, ROUNDS = 512, 100  # a batch that stays in the cache

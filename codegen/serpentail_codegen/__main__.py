@@ -2,12 +2,15 @@
 
 import argparse
 import gc
+import hashlib
 import json
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from serpentail_scene.digest import generator_digest
 from serpentail_scene.signatures.table import ALL
 
 from .scene.naming import suffix
@@ -15,7 +18,6 @@ from .scene.parse import load_scene, parse_scene, scene_for, scene_to_dict
 from .scene.problems import Problem, SceneError
 from .scene.scene import KINDS, Scene
 from .scene.schema import scene_schema
-from .stamp import is_made, key_of, note
 
 
 def parser() -> argparse.ArgumentParser:
@@ -58,55 +60,45 @@ def scene_of(arguments: argparse.Namespace) -> Scene:
         chosen["functions"] = names if names == "all" else names.split(",")
     if arguments.baked:
         chosen["baked"] = True
-    scene, own = _with_options(arguments, chosen)
-    if arguments.name:
-        return scene
-    return _renamed(scene, own.name + suffix(scene, own, arguments.functions))
-
-
-def _with_options(arguments: argparse.Namespace, chosen: dict[str, Any]) -> tuple[Scene, Scene]:
-    """Return a scene with the options applied, and the same scene without them."""
     if arguments.scene:
         own = load_scene(arguments.scene)
-        return parse_scene(scene_to_dict(own) | chosen, own.name), own
-    size = (arguments.tail, arguments.segments, arguments.links)
-    if None in size[:2]:
-        missing = "give a scene file, or --tail and --segments (and --links): see --help"
-        raise SceneError([Problem("scene", None, missing)])
-    return scene_for(*size, **chosen), scene_for(*size)
-
-
-def _renamed(scene: Scene, name: str) -> Scene:
-    """Return the scene under another name; SceneError if the name is not allowed."""
+        scene = parse_scene(scene_to_dict(own) | chosen, own.name)
+    else:
+        size = (arguments.tail, arguments.segments, arguments.links)
+        if None in size[:2]:
+            missing = "give a scene file, or --tail and --segments (and --links): see --help"
+            raise SceneError([Problem("scene", None, missing)])
+        own, scene = scene_for(*size), scene_for(*size, **chosen)
+    if arguments.name:
+        return scene
+    name = own.name + suffix(scene, own, arguments.functions)
     return parse_scene(scene_to_dict(scene) | {"name": name}, name)
 
 
 def main(argv: list[str] | None = None) -> int:
     """Generate the model if its folder is not up to date; return the exit status."""
     try:
-        arguments = parser().parse_args(argv)
-        if arguments.schema:
-            print(json.dumps(scene_schema()))
-            return 0
-        scene = scene_of(arguments)
-        if arguments.given:
-            load_scene(arguments.given)
-    except SceneError as error:
+        print(_answer(parser().parse_args(argv)))
+    except SceneError as error:  # of the scene, or a folder that cannot be written
         print(error, file=sys.stderr)
         return 2
+    return 0
+
+
+def _answer(arguments: argparse.Namespace) -> str:
+    """Do what the arguments ask for, and return what to print."""
+    if arguments.schema:
+        return json.dumps(scene_schema())
+    scene = scene_of(arguments)
+    if arguments.given:
+        load_scene(arguments.given)
     folder = arguments.output / scene.name
     if arguments.print_folder:
-        print(folder)
-        return 0
+        return str(folder)
     start = time.perf_counter()
-    try:
-        changed = made(scene, folder, arguments.progress)
-    except SceneError as error:  # its folder cannot be written
-        print(error, file=sys.stderr)
-        return 2
-    told = f"{len(changed)} files written" if changed else "up to date"
-    print(f"{folder}: {told}, {time.perf_counter() - start:.2f} s")
-    return 0
+    changed = made(scene, folder, arguments.progress)
+    outcome = f"{len(changed)} files written" if changed else "up to date"
+    return f"{folder}: {outcome}, {time.perf_counter() - start:.2f} s"
 
 
 def made(scene: Scene, folder: Path, progress: Path | None = None) -> list[str]:
@@ -114,9 +106,10 @@ def made(scene: Scene, folder: Path, progress: Path | None = None) -> list[str]:
 
     progress: a file into which the progress is written.
     """
-    key = key_of(scene)
-    if is_made(folder, key):
-        return []
+    stamp = folder.parent / ".stamps" / folder.name  # the folder holds only generated files
+    with suppress(OSError, ValueError, KeyError, TypeError):  # none, or a damaged folder
+        if stamp.read_text() == stamp_of(scene, folder):
+            return []
     from .pipeline import generate  # sympy is imported only now
 
     def tell(done: float, function: str) -> None:
@@ -124,8 +117,22 @@ def made(scene: Scene, folder: Path, progress: Path | None = None) -> list[str]:
             progress.write_text(f"{done:.3f} {function}\n")
 
     changed = generate(scene, folder.parent, tell)
-    note(folder, key)
+    stamp.parent.mkdir(exist_ok=True)
+    stamp.write_text(stamp_of(scene, folder))
     return changed
+
+
+def stamp_of(scene: Scene, folder: Path) -> str:
+    """Return the hash of all that a scene's folder depends on, and of all that it holds.
+
+    Times of files would mislead: a scene file that is restored is older than the folder that was
+    made of another version of it.
+    """
+    manifest = (folder / "manifest.json").read_bytes()
+    names = json.loads(manifest)["files"]
+    depends = json.dumps([scene_to_dict(scene), generator_digest()], sort_keys=True).encode()
+    contents = [(folder / name).read_bytes() for name in names]
+    return hashlib.sha256(b"".join([depends, manifest, *contents])).hexdigest()
 
 
 if __name__ == "__main__":

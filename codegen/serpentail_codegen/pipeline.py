@@ -15,8 +15,6 @@ from .targets.target import SEAL, Emission
 from .targets.write import digest, write_folder
 
 TARGETS = {target.name: target for target in (C, CASADI)}
-
-
 Tell = Callable[[float, str], object]  # which part is done, and the function that comes now
 
 
@@ -30,7 +28,7 @@ def generate(scene: Scene, output: Path, tell: Tell | None = None) -> list[str]:
     functions = [function_of(name, tail) for name in needed(scene.functions, bool(scene.contacts))]
     emissions = []
     for k, name in enumerate(scene.targets):
-        one_by_one = told(functions, tell, (k, len(scene.targets)))
+        one_by_one = reported(functions, tell, (k, len(scene.targets)))
         emissions.append(TARGETS[name].emit(scene, tail, one_by_one, __version__))
 
     # the hash is computed from the texts without it, then put into them
@@ -45,7 +43,7 @@ def generate(scene: Scene, output: Path, tell: Tell | None = None) -> list[str]:
     return write_folder(output / scene.name, files, described)
 
 
-def told(
+def reported(
     functions: Collection[Function], tell: Tell | None, place: tuple[int, int]
 ) -> Iterator[Function]:
     """Yield the functions of target number ``place[0]`` of ``place[1]``, and report each one."""

@@ -1,10 +1,9 @@
 """What generated text depends on besides its scene: the generator, and the tools that it uses."""
 
 import hashlib
-import json
+import os
 import sys
 from importlib.util import find_spec
-from pathlib import Path
 
 GENERATOR = "serpentail_codegen"
 TOOLS = ("sympy", "jinja2")  # packages: another version of one may print another text
@@ -12,25 +11,25 @@ TOOLS = ("sympy", "jinja2")  # packages: another version of one may print anothe
 
 def generator_digest() -> str:
     """Return a digest of the generator and its tools; ModuleNotFoundError names what is missing."""
-    homes = (_home(GENERATOR), Path(__file__).parent)
-    sources = [
-        [str(path.relative_to(home)), hashlib.sha256(path.read_bytes()).hexdigest()]
-        for home in homes
-        for path in sorted(home.rglob("*"))
-        if path.suffix in (".py", ".jinja")
-    ]
-    tools = [sys.version, *(name for tool in TOOLS for name in _installed(tool))]
-    return hashlib.sha256(json.dumps([tools, sources]).encode()).hexdigest()
+    digest = hashlib.sha256(sys.version.encode())
+    for tool in TOOLS:
+        # a package's name and version; importlib.metadata would take 30 ms for this
+        names = os.listdir(os.path.dirname(_home(tool)))
+        installed = [n for n in names if n.startswith(f"{tool}-") and n.endswith("-info")]
+        digest.update(repr(sorted(installed)).encode())
+    for home in (_home(GENERATOR), os.path.dirname(__file__)):
+        for folder, folders, names in os.walk(home):
+            folders.sort()
+            for name in sorted(n for n in names if n.endswith((".py", ".jinja"))):
+                with open(os.path.join(folder, name), "rb") as file:
+                    content = file.read()
+                digest.update(repr((folder[len(home) :], name, len(content))).encode() + content)
+    return digest.hexdigest()
 
 
-def _installed(tool: str) -> list[str]:
-    """Return a package's name and version; importlib.metadata would take 30 ms for this."""
-    return sorted(path.name for path in _home(tool).parent.glob(f"{tool}-*-info"))
-
-
-def _home(package: str) -> Path:
+def _home(package: str) -> str:
     """Return the folder of a package."""
     found = find_spec(package)
     if found is None or found.origin is None:
         raise ModuleNotFoundError(f"no package {package}", name=package)
-    return Path(found.origin).parent
+    return os.path.dirname(found.origin)

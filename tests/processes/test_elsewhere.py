@@ -11,7 +11,6 @@ import sys
 import pytest
 
 import serpentail as st
-from serpentail.compiling import cores
 from serpentail.compiling import threads as workers
 from tests.support import zoo
 from tests.support.rows import row
@@ -74,19 +73,19 @@ def test_quotas_of_control_groups_are_found(tmp_path):
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text)
         with row(case):
-            assert cores.quota(tmp_path / case) == expected
-    assert cores.quota(tmp_path) == math.inf
+            assert workers.quota(tmp_path / case) == expected
+    assert workers.quota(tmp_path) == math.inf
 
 
 def test_an_argument_comes_before_the_environment_and_that_before_the_machine(monkeypatch):
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(6)), raising=False)
     monkeypatch.delenv("SERPENTAIL_THREADS", raising=False)
     for quota, expected in ((math.inf, 6), (0.2, 1), (9.0, 6), (2.1, 3)):
-        monkeypatch.setattr(cores, "_own_quota", lambda quota=quota: quota)
-        assert cores.threads() == expected, quota
+        monkeypatch.setattr(workers, "_quota_here", lambda quota=quota: quota)
+        assert workers.threads() == expected, quota
     for chosen, expected in ((" 2 ", 2), ("", 3)):
         monkeypatch.setenv("SERPENTAIL_THREADS", chosen)
-        assert (cores.threads(), cores.threads(4)) == (expected, 4)
+        assert (workers.threads(), workers.threads(4)) == (expected, 4)
 
 
 def test_workers_of_process_pools_use_one_thread(monkeypatch):
@@ -95,8 +94,8 @@ def test_workers_of_process_pools_use_one_thread(monkeypatch):
         monkeypatch.setenv("SERPENTAIL_THREADS", chosen)
         for way in ways:
             with row(way, chosen), POOLS[way](1) as pool:
-                assert pool.submit(cores.threads).result(60) == expected
-        assert cores.threads() == (expected if chosen else cores.cores())
+                assert pool.submit(workers.threads).result(60) == expected
+        assert workers.threads() == (expected if chosen else workers.cores())
 
 
 def test_a_model_and_runs_keep_to_their_threads_and_digits(monkeypatch):
@@ -184,7 +183,7 @@ try:
 except KeyboardInterrupt:
     told["ended"] = time.monotonic() - begun < 30
 Path.read_text = lambda *_, **__: open("/no/such/file")
-told["named"] = bool(toolchain._processor())
+told["named"] = bool(toolchain.processor.__wrapped__())
 print(json.dumps(told))
 """
 

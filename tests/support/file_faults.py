@@ -49,6 +49,8 @@ def before_calls(act: Callable[[], None], *others: tuple[object, str]) -> Iterat
             act()
             return function(*arguments, **options)
 
+        if function in os.supports_follow_symlinks:  # which shutil looks up
+            os.supports_follow_symlinks.add(called)
         return called
 
     def opened(path, mode="r", *arguments, **options):

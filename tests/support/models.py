@@ -9,17 +9,15 @@ import json
 import os
 import shlex
 import shutil
-import sys
 import time
 from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import serpentail_codegen
 from serpentail_codegen.pipeline import generate
 from serpentail_codegen.scene.parse import scene_for
 from serpentail_codegen.scene.scene import Scene
+from serpentail_scene.digest import generator_digest
 
 BUILD = Path(__file__).parents[2] / ".build"
 QUICK = shlex.quote(str(Path(__file__).with_name("cc_quick")))
@@ -63,14 +61,7 @@ def folder_of(scene: Scene) -> Path:
 @cache
 def shelf() -> Path:
     """Return the folder of all models of this generator, and delete those of earlier ones."""
-    sources = Path(serpentail_codegen.__file__).parent
-    texts = [
-        (str(path.relative_to(sources)), digest(path.read_text()))
-        for path in sorted(sources.rglob("*"))
-        if path.suffix in (".py", ".jinja")
-    ]
-    tools = [sys.version, *(version(name) for name in ("sympy", "jinja2"))]
-    own = BUILD / "models" / digest(json.dumps([texts, tools]))
+    own = BUILD / "models" / generator_digest()[:32]
     own.mkdir(parents=True, exist_ok=True)
     os.utime(own)
     for other in own.parent.iterdir():

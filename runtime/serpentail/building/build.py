@@ -2,35 +2,16 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import replace
 from os import PathLike
-from pathlib import Path
 from typing import Any, Unpack
 
-from ..basics.errors import ModelError
-from ..compiling.cache import (
-    BUILDS,
-    MODELS,
-    cache_folder,
-    digest,
-    mark_used,
-    publish,
-    refuse_others,
-    unwritable,
-    workshop,
-)
-from ..compiling.locks import alone
-from ..compiling.safe_files import regular_bytes
 from ..model.load import model_from
-from ..model.manifest import CheckedFolder, read_folder
+from ..model.manifest import CheckedFolder
 from ..model.model import Model
 from ..model.parameters import merged
-from ..model.snapshot import restored, snapshot
 from .examples import tables_of_scene
-from .fewer_contacts import with_contacts
-from .generator import generate, identity
+from .generator import generated
 from .options import Options, separated
-from .scene_text import scene_text
 
 # parameters of single links or arcs
 PIECES = {
@@ -41,14 +22,15 @@ PIECES = {
 PASSIVE = {"tail_stiffness", "tail_rest", "tail_damping"} | {
     f"tail_stop_{name}" for name in ("lower", "upper", "stiffness", "width")
 }
-LEFT_OUT = (
-    "plan",
-    "simulate",
-    "identify",
-    "phase",
-    "sweep",
-    "description",
-)  # no generated code depends on them
+# keys on which no generated code depends
+LEFT_OUT = ("plan", "simulate", "identify", "phase", "sweep", "description")
+ANY = "contacts"  # any group of points that touch the ground
+# parameters that a scene file may have of a group, or of any group
+NEEDED = {
+    ANY: ("K_n", "D_n", "K_f", "D_f", "mu"),
+    "feet": ("L_h2d", "L_d2k", "L_k2a", "L_a2m", "L_m2t", "delta_m", "hip"),
+    "torso": ("torso_semi_axes",),
+}
 
 
 def build(
@@ -151,63 +133,28 @@ def _shapes(name: str, scene: Mapping[str, Any], own: Mapping[str, Any]) -> bool
     return "taper" not in scene and all(set(table) <= {"kind", "links"} for table in tables)
 
 
-def generated(scene: Mapping[str, Any], name: str, given: Mapping[str, object]) -> CheckedFolder:
-    """Return the checked files of a scene's model, generated unless the cache has them.
+def with_contacts(tables: Mapping[str, Any], contacts: Any) -> dict[str, Any]:
+    """Return a scene's tables with other contacts, without what belongs to groups that it lacks.
 
-    given: parameters for the load, which are checked before a generation.
+    These are parameters, functions and, without any contacts, the friction.
     """
-    text, cache = scene_text(scene), cache_folder(None)
-    key = digest([identity(), name, text])
-    found = _noted(cache, key)
-    if found:
-        return found
-    own = scene.get("parameters", {})
-    with_given = scene_text({**scene, "parameters": merged(own, given)}) if given else text
-    with alone(cache, key):
-        return _noted(cache, key) or _made(cache, key, text, name, with_given)
+    from serpentail_scene.signatures.table import NEEDS
 
-
-def _made(cache: Path, key: str, text: str, name: str, given: str) -> CheckedFolder:
-    """Generate a model, put its files into the cache, and store their hash under a key.
-
-    given: the scene's text with the parameters for the load.
-    """
-    refuse_others(cache)
-    try:
-        with workshop(cache) as part:
-            scene, note = part / f"{name}.toml", part / f"{key}.json"
-            checked = part / "given" / f"{name}.toml"
-            checked.parent.mkdir()
-            scene.write_text(text, encoding="utf-8")
-            checked.write_text(given, encoding="utf-8")
-            found = read_folder(generate(scene, part / "made", checked))
-            place = snapshot(found, cache)
-            note.write_text(found.manifest_hash)
-            publish(note, _note(cache, key), lambda _: False)
-    except OSError as error:
-        raise unwritable(cache, error) from error
-    return replace(found, folder=place)
-
-
-def _noted(cache: Path, key: str) -> CheckedFolder | None:
-    """Return the model stored under a key; None if the cache does not have it whole."""
-    path = _note(cache, key)
-    try:
-        manifest_hash = regular_bytes(path).decode("ascii")
-        refuse_others(cache, path.parent, path)
-        place = cache / MODELS / manifest_hash
-        if not re.fullmatch("[0-9a-f]{64}", manifest_hash):
-            return None
-        found = restored(manifest_hash, place)
-    except (OSError, UnicodeDecodeError, ModelError):
-        return None
-    mark_used(path)
-    return found
-
-
-def _note(cache: Path, key: str) -> Path:
-    """Return the file that holds the hash of the model stored under a key."""
-    return cache / BUILDS / f"{key}.json"
+    scene = dict(tables) | {"contacts": contacts}
+    if not isinstance(contacts, list | tuple):  # which the generator refuses
+        return scene
+    lacking = [
+        group for group in NEEDED if group not in contacts and (group != ANY or not contacts)
+    ]
+    if ANY in lacking:
+        scene.pop("friction", None)
+    without = [name for group in lacking for name in NEEDED[group]]
+    if isinstance(scene.get("parameters"), Mapping):
+        own = scene["parameters"]
+        scene["parameters"] = {name: own[name] for name in own if name not in without}
+    if isinstance(scene.get("functions"), list):
+        scene["functions"] = [n for n in scene["functions"] if NEEDS.get(n) not in lacking]
+    return scene
 
 
 def _name(keys: Mapping[str, Any]) -> str:

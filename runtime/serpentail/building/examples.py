@@ -39,7 +39,8 @@ def examples() -> dict[str, str]:
 
 def example_paths() -> dict[str, Path]:
     """Return the paths of the example scenes by name; no file is read."""
-    return {path.stem: path for path in sorted(_folder().glob("*.toml"))}
+    folder = PACKAGE if PACKAGE.is_dir() else CHECKOUT
+    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
 def scene_path(scene: str | PathLike[str]) -> Path:
@@ -74,8 +75,3 @@ def tables_of_scene(scene: str | PathLike[str]) -> tuple[dict[str, Any], Path]:
         return tables_of(path), path
     except ValueError as reason:
         raise SerpentailError(f"scene file: value {shown(str(path))}: {reason}") from reason
-
-
-def _folder() -> Path:
-    """Return the folder of the examples: in an installed package, else in the checkout."""
-    return PACKAGE if PACKAGE.is_dir() else CHECKOUT

@@ -13,7 +13,7 @@ OneOrEach = float | Sequence[float]  # of all tail coordinates, or of each
 PAPER = {"m": "segments", "n": "links"}  # the sizes' letters in the paper and in the documents
 
 
-class Parameters(TypedDict, total=False):
+class ParameterOptions(TypedDict, total=False):
     """Parameters by name, SI; by default the scene's values, else the paper's kangaroo rat.
 
     docs/theory.md describes them; not every tail has all of them.
@@ -80,7 +80,7 @@ class SceneKeys(TypedDict, total=False):
     name: str
 
 
-class Options(SceneKeys, Parameters, total=False):
+class Options(SceneKeys, ParameterOptions, total=False):
     """All keyword arguments of ``serpentail.build`` for scenes and bodies."""
 
 
@@ -93,7 +93,7 @@ def separated(options: Options) -> tuple[dict[str, Any], dict[str, Any]]:
     for name, value in options.items():
         if name in SceneKeys.__annotations__:
             keys["kind" if name == "tail" else name] = value
-        elif name in Parameters.__annotations__:
+        elif name in ParameterOptions.__annotations__:
             parameters[name] = value
         else:
             raise _unknown(name, value)

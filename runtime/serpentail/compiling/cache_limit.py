@@ -17,18 +17,14 @@ DEFAULT_SIZE = "1G"
 UNITS = {"": 1, "K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
 IN_USE_S = 600.0  # s: recently used entries stay, because a process may be about to open them
 LOST_S = 3600.0  # s: older parts are from builds that were killed
-KINDS = (LIBRARIES, MODELS, BUILDS, COMPILERS)
-# Names of entries and parts: other files in the user's folder do not belong to the cache.
-OURS = {
-    **dict.fromkeys((LIBRARIES, MODELS), re.compile(r"[0-9a-f]{64}")),
-    **dict.fromkeys((BUILDS, COMPILERS), re.compile(r"[0-9a-f]{64}\.json")),
-    LOCKS: re.compile(r"[0-9a-f]{64}\.lock"),
-    PARTS: re.compile(r"[0-9a-f]{24}"),
-}
+ENTRIES = (LIBRARIES, MODELS, BUILDS, COMPILERS)
+LEFTOVERS = (PARTS, LOCKS)
+# Other files in the user's folder do not belong to the cache. Notes of version 0.2 were .json.
+NAME = re.compile(r"[0-9a-f]{24}|[0-9a-f]{64}(\.json|\.lock)?")
 
 
 @dataclass(frozen=True)
-class Entry:
+class CacheEntry:
     """Something in the cache: its kind, size in bytes, and when it was last used, in s."""
 
     kind: str
@@ -49,33 +45,28 @@ def limit() -> int:
     return int(found[1]) * UNITS[found[2].upper()]
 
 
-def entries(cache: Path, *kinds: str) -> Iterator[Entry]:
+def entries(cache: Path, kinds: tuple[str, ...]) -> Iterator[CacheEntry]:
     """Yield all that is of these kinds."""
     for kind in kinds:
-        names: list[str] = []
         with contextlib.suppress(OSError):
-            names = sorted(os.listdir(cache / kind))
-        for name in filter(OURS[kind].fullmatch, names):
-            with contextlib.suppress(OSError):
-                path = cache / kind / name
-                yield Entry(kind, path, _size(path), path.lstat().st_mtime)
+            for path in sorted((cache / kind).iterdir()):
+                if not NAME.fullmatch(path.name):
+                    continue
+                with contextlib.suppress(OSError):  # another process deletes it
+                    files = [path, *(path.rglob("*") if path.is_dir() else ())]
+                    size = sum(file.lstat().st_size for file in files if not file.is_dir())
+                    yield CacheEntry(kind, path, size, path.lstat().st_mtime)
 
 
-def _size(path: Path) -> int:
-    """Return the bytes of the files at or below a path."""
-    files = [path] if not path.is_dir() else [p for p in path.rglob("*") if not p.is_dir()]
-    return sum(file.lstat().st_size for file in files)
-
-
-def bound(cache: Path, most: int) -> None:
+def keep_within(cache: Path, most: int) -> None:
     """Delete leftovers of killed builds, then the oldest entries, down to ``most`` bytes."""
     now = time.time()
-    for lost in entries(cache, PARTS, LOCKS):
-        if now - lost.used > LOST_S:
-            _delete(lost.path, cache)
-    kept = sorted(entries(cache, *KINDS), key=lambda entry: entry.used)
-    size = sum(entry.size for entry in kept)
-    for entry in kept:
+    for leftover in entries(cache, LEFTOVERS):
+        if now - leftover.used > LOST_S:
+            _delete(leftover.path, cache)
+    by_use = sorted(entries(cache, ENTRIES), key=lambda entry: entry.used)
+    size = sum(entry.size for entry in by_use)
+    for entry in by_use:
         if size <= most or now - entry.used < IN_USE_S:
             return
         _delete(entry.path, cache)
@@ -84,19 +75,19 @@ def bound(cache: Path, most: int) -> None:
 
 def contents(cache: Path) -> dict[str, str | int]:
     """Return the folder of the cache, the number of entries of each kind, and their bytes."""
-    found = list(entries(cache, *OURS))
-    counts = {kind: sum(entry.kind == kind for entry in found) for kind in KINDS}
+    found = list(entries(cache, ENTRIES + LEFTOVERS))
+    counts = {kind: sum(entry.kind == kind for entry in found) for kind in ENTRIES}
     size = sum(entry.size for entry in found)
     return {"folder": str(cache), **counts, "bytes": size, "limit": limit()}
 
 
 def empty(cache: Path) -> None:
     """Delete all entries of the cache; processes keep what they have loaded."""
-    for entry in entries(cache, *OURS):
+    for entry in entries(cache, ENTRIES + LEFTOVERS):
         _delete(entry.path, cache)
 
 
 def _delete(path: Path, cache: Path) -> None:
     """Delete an entry; ignore one that cannot be deleted, or that another process deletes."""
-    with contextlib.suppress(OSError):
+    with contextlib.suppress(SerpentailError):
         discard(path, cache)

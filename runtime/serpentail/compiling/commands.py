@@ -9,6 +9,7 @@ from contextlib import ExitStack, contextmanager, suppress
 
 TICK_S = 0.2  # s between checks of a command's progress
 GRACE_S = 0.5  # s that a command has to remove its temporary files
+Finished = subprocess.CompletedProcess[str]
 
 
 def inherited(**more: str) -> dict[str, str]:
@@ -22,27 +23,33 @@ def inherited(**more: str) -> dict[str, str]:
 
 def run_all(
     commands: Sequence[Sequence[str]],
-    surroundings: Mapping[str, str],
+    environment: Mapping[str, str],
     tick: Callable[[], object] = lambda: None,
-) -> list[subprocess.CompletedProcess[str]]:
+) -> list[Finished]:
     """Return the finished commands; OSError if one cannot be started.
 
     tick: called now and then while they run. After Ctrl-C or an error, the commands and their
     children are ended.
     """
+    finished = []
     with ExitStack() as running:
-        started = [running.enter_context(_running(each, surroundings)) for each in commands]
-        return [_finished(each, tick) for each in started]
+        for process in [running.enter_context(_running(each, environment)) for each in commands]:
+            while process.returncode is None:
+                with suppress(subprocess.TimeoutExpired):
+                    output = process.communicate(timeout=TICK_S)
+                tick()
+            finished.append(Finished(process.args, process.returncode, *output))
+    return finished
 
 
 @contextmanager
 def _running(
-    command: Sequence[str], surroundings: Mapping[str, str]
+    command: Sequence[str], environment: Mapping[str, str]
 ) -> Iterator[subprocess.Popen[str]]:
     """Run a command in its own process group; at the end nothing of it is left."""
     with subprocess.Popen(
         command,
-        env=surroundings,
+        env=environment,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -67,15 +74,3 @@ def _end(process: subprocess.Popen[str]) -> None:
         process.wait(GRACE_S)
     with suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
-
-
-def _finished(
-    process: subprocess.Popen[str], tick: Callable[[], object]
-) -> subprocess.CompletedProcess[str]:
-    """Wait for a command, and return what it said."""
-    while True:
-        with suppress(subprocess.TimeoutExpired):
-            said, errors = process.communicate(timeout=TICK_S)
-            break
-        tick()
-    return subprocess.CompletedProcess(process.args, process.returncode, said, errors)

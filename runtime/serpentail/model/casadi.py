@@ -10,7 +10,7 @@ from serpentail_scene.layout import OMEGA, QUATERNION, TAIL_V, VELOCITY
 
 from ..basics.checks import one_of, whole_number
 from ..basics.errors import ModelError
-from ..compiling.cores import threads
+from ..compiling.threads import threads
 from .lazy import kept
 from .nodes.function import MOST_NODES, RESULTS, nodes_function
 from .parameters import flat, flat_names

@@ -16,11 +16,13 @@ from serpentail_scene.layout import PER_SEGMENT, QUATERNION
 from ..basics.checks import real_array, refuse_not_finite
 from ..basics.errors import StateError
 from ..compiling.threads import shared
-from .batch import BatchLibrary, RecordFunction
-from .fast_call import Call, call_of, declined, waiting
-from .library import NOT_POSITIVE_DEFINITE, OUT_OF_RANGE
+from .fast_call import Call, fast_call, no_call
+from .library import NOT_POSITIVE_DEFINITE, OUT_OF_RANGE, BatchLibrary, RecordFunction
 
 MOST_ARRAYS = 10
+# numbers in a function's arrays; above, calls are so long that other threads should run meanwhile
+MOST_UNDER_LOCK = 8192
+CACHE_LINE = 64  # bytes, and the widest vector
 QUATERNIONS = {"q": QUATERNION, "x": slice(0, 4)}  # where they are, by the first argument's name
 Arrays = Sequence[ndarray]
 Shapes = Sequence[tuple[int, ...]]
@@ -46,26 +48,11 @@ def argument_record(
     return ArgumentRecord(address_of(parameters), count, 0, address_of(work), addresses)
 
 
-# numbers in a function's arrays; above, calls are so long that other threads should run meanwhile
-MOST_HELD = 8192
-
-
 def address_of(array: ndarray) -> int:
     """Return the address of an array's numbers; ``array.ctypes.data`` is three times as slow."""
     if array.flags.carray and array.size:
         return ctypes.addressof(ctypes.c_char.from_buffer(array))  # type: ignore[arg-type]
     return array.ctypes.data
-
-
-CACHE_LINE = 64  # bytes, and the widest vector
-
-
-def aligned(count: int, dtype: DTypeLike) -> ndarray:
-    """Return a workspace that begins at a cache line, so that no vector in it crosses one."""
-    size = (count + 1) * np.dtype(dtype).itemsize
-    memory = np.zeros(size + CACHE_LINE, np.uint8)
-    first = -address_of(memory) % CACHE_LINE
-    return memory[first : first + size].view(dtype)
 
 
 def aligned_rows(shape: tuple[int, ...], dtype: DTypeLike) -> ndarray:
@@ -77,6 +64,13 @@ def aligned_rows(shape: tuple[int, ...], dtype: DTypeLike) -> ndarray:
     memory = np.empty(size + CACHE_LINE, np.uint8)
     first = -address_of(memory) % CACHE_LINE
     return memory[first : first + size].view(dtype).reshape(shape)
+
+
+def aligned(count: int, dtype: DTypeLike) -> ndarray:
+    """Return a workspace of zeros that begins at a cache line; it is never empty."""
+    workspace = aligned_rows((count + 1,), dtype)
+    workspace.fill(0)
+    return workspace
 
 
 class Buffers:
@@ -129,12 +123,13 @@ class Kernel:
 
     def __init__(
         self,
-        libraries: tuple[ctypes.CDLL, BatchLibrary],
+        library: ctypes.CDLL,
+        batch_library: BatchLibrary,
         manifest: dict,
         name: str,
         parameters: ndarray,
     ):
-        library, self.batch_library = libraries
+        self.batch_library = batch_library
         entry = manifest["functions"][name]
         self.name, self.dtype = name, parameters.dtype
         self.names = [a["name"] for a in entry["inputs"]]
@@ -146,21 +141,25 @@ class Kernel:
         self.bend_range = manifest["scene"].get("bend_range")
         self.polar = manifest["scene"]["coordinates"] == "polar"
         self.kinds = manifest["dimensions"].get("kinds") or ("continuum",)  # of all: arcs alone
-        self.own = threading.local()  # buffers of each thread
+        self.thread = threading.local()  # buffers of each thread
         self.fast: Call | None = None  # made at the first call
 
     def __call__(self, *arrays: ArrayLike) -> Any:
         """Return the output, or a tuple of outputs; StateError names an argument that is wrong."""
-        found = (self.fast or self._prepared())(*arrays)
-        return self._by_ctypes(arrays) if found is None else found
+        outputs = (self.fast or self._prepared())(*arrays)
+        return self._by_ctypes(arrays) if outputs is None else outputs
 
     def _prepared(self) -> Call:
         """Return a fast call of the function; it returns None for arguments that it declines."""
-        own = self._buffers()
-        size = self.work + sum(array.size for array in (*own.inputs, *own.outputs))
-        fast = declined if waiting() or size > MOST_HELD else call_of(self.function, own)
-        self.fast = None if waiting() else fast
-        return fast
+        buffers = self._buffers()
+        size = self.work + sum(array.size for array in (*buffers.inputs, *buffers.outputs))
+        if size > MOST_UNDER_LOCK:
+            self.fast = no_call
+        else:
+            self.fast = fast_call(
+                self.function, buffers.address, buffers.inputs, buffers.outputs, buffers
+            )
+        return self.fast
 
     def _buffers(self) -> Buffers:
         """Return buffers of our own."""
@@ -179,9 +178,9 @@ class Kernel:
     def _one(self, arrays: Sequence[Any]) -> Any:
         """Return outputs for arrays of one state; other threads run while C does."""
         try:
-            buffers = self.own.buffers
+            buffers = self.thread.buffers
         except AttributeError:  # this thread's first call
-            buffers = self.own.buffers = self._buffers()
+            buffers = self.thread.buffers = self._buffers()
         for array, buffer in zip(arrays, buffers.inputs):  # noqa: B905  as above
             buffer[:] = array
         if status := self.function(buffers.address):

@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from ..basics.errors import ModelError
-from ..compiling.cores import checked_threads
-from .batch import BatchLibrary
+from ..compiling.threads import checked_threads
 from .even_arcs import warn_of_even_arcs
-from .library import open_library
+from .library import BatchLibrary, open_library
 from .manifest import CheckedFolder, read_folder
 from .methods.evaluated import without_c
 from .model import Model

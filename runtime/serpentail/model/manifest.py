@@ -1,29 +1,33 @@
-"""Reads a generated folder whole, and checks its files against the manifest among them."""
+"""Reads a generated folder whole, and checks its files against the manifest among them.
+
+The cache has snapshots of such folders, in which pickled models and saved motions find theirs.
+"""
 
 import hashlib
 import json
+import os
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 from types import ModuleType
 
 from .. import __version__
-from ..basics.errors import ModelError
-from ..compiling.safe_files import Held, held
+from ..basics.errors import ModelError, SerpentailError
+from ..compiling.cache import (
+    MODELS,
+    cache_folder,
+    mark_used,
+    publish,
+    refuse_others,
+    regular_bytes,
+    workshop,
+)
 from .lazy import kept
 
 FORMAT = 2
-KEYS = [
-    "prefix",
-    "real",
-    "scene",
-    "dimensions",
-    "parameters",
-    "functions",
-    "files",
-    "manifest_hash",
-]
+KEYS = ["prefix", "real", "scene", "dimensions", "parameters", "functions"]
+KEYS += ["files", "manifest_hash"]
 C_KEYS = ["abi_hash", "work", "batch"]  # of models with C
 MOST_READS = 100  # of a folder that is exchanged again and again while it is read
 
@@ -52,22 +56,31 @@ class CheckedFolder:
         exec(compile(self.files[f"{name}.py"], f"<{name}.py>", "exec"), module.__dict__)
         return module
 
-
-class Exchanged(ModelError):
-    """Another folder came in a folder's place while it was read."""
+    def contents(self) -> dict[str, bytes]:
+        """Return the files of a copy; equal manifests, however laid out, give the same text."""
+        manifest = json.dumps(self.manifest, sort_keys=True).encode()
+        return {**self.files, "manifest.json": manifest}
 
 
 def read_folder(folder: Path) -> CheckedFolder:
     """Return a folder's manifest and files; ModelError if one is missing, stale or changed."""
-    for _ in range(MOST_READS - 1):
-        with suppress(Exchanged):
-            return _read(folder)
-    return _read(folder)
+    for _ in range(MOST_READS):
+        before = _identity(folder)
+        try:
+            return _checked(folder)
+        except ModelError:
+            if _identity(folder) == before:
+                raise  # else another folder came in its place meanwhile
+    raise ModelError(f"{folder} keeps changing while it is read: load it later")
 
 
-def read_manifest(folder: Path) -> dict:
-    """Return a folder's manifest, checked as ``read_folder`` does."""
-    return read_folder(folder).manifest
+def _identity(folder: Path) -> tuple[int, ...]:
+    """Return what tells whether a path leads to another folder than before."""
+    try:
+        status = os.stat(folder)
+    except (OSError, ValueError):
+        return ()
+    return status.st_dev, status.st_ino, status.st_mtime_ns, status.st_ctime_ns
 
 
 def remedy(folder: Path) -> str:
@@ -78,74 +91,42 @@ def remedy(folder: Path) -> str:
     )
 
 
-def _read(folder: Path) -> CheckedFolder:
-    """Return the content of a held folder; Exchanged if it was replaced meanwhile."""
-    try:
-        with held(folder) as opened:
-            try:
-                return _checked(folder, opened)
-            except ModelError as error:
-                if opened.is_there():
-                    raise
-                raise Exchanged(
-                    f"{folder} keeps changing while it is read: load it later"
-                ) from error
-    except (FileNotFoundError, NotADirectoryError, ValueError) as error:
-        raise _no_folder(folder) from error
-    except OSError as error:
-        raise ModelError(
-            f"{folder!s:.200} cannot be read ({error.strerror}): give the path of a generated "
-            "folder"
-        ) from error
-
-
-def _no_folder(folder: Path) -> ModelError:
-    return ModelError(
-        f"{folder} is not a generated folder (it has no manifest.json): make one by "
-        "`serpentail generate SCENE.toml`, or `make model TAIL=articulated M=3 N=4`"
-    )
-
-
-def _unreadable(folder: Path, path: Path, error: OSError) -> ModelError:
-    return ModelError(f"{path} cannot be read ({error.strerror}): {remedy(folder)}")
-
-
-def _checked(folder: Path, opened: Held) -> CheckedFolder:
+def _checked(folder: Path) -> CheckedFolder:
     """Return the manifest and the files that it names, each read once."""
     path = folder / "manifest.json"
     try:
-        text = opened.read(path.name)
-    except FileNotFoundError as error:
-        raise _no_folder(folder) from error
+        text = regular_bytes(path)
+    except (FileNotFoundError, NotADirectoryError, ValueError) as error:
+        raise ModelError(
+            f"{folder} is not a generated folder (it has no manifest.json): make one by "
+            "`serpentail generate SCENE.toml`, or `make model TAIL=articulated M=3 N=4`"
+        ) from error
     except OSError as error:
         raise _unreadable(folder, path, error) from error
     try:
         manifest = json.loads(text.decode())
         _check(folder, manifest)
-        names = {name: digest for name, digest in manifest["files"].items() if _inside(name)}
+        digests = dict(manifest["files"])
+        for name in digests:
+            if os.path.isabs(name) or ".." in PurePosixPath(name).parts or "\0" in name:
+                raise ValueError(f"the file name {name!r} leads out of the folder")
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise ModelError(f"{path} is damaged ({error}): {remedy(folder)}") from error
-    return CheckedFolder(folder, manifest, {n: _file(folder, opened, n, names[n]) for n in names})
+    files = {}
+    for name, digest in digests.items():
+        try:
+            files[name] = regular_bytes(folder / name)
+        except OSError as error:
+            raise _unreadable(folder, folder / name, error) from error
+        if hashlib.sha256(files[name]).hexdigest() != digest:
+            raise ModelError(
+                f"{folder / name} was changed after it was generated: {remedy(folder)}"
+            )
+    return CheckedFolder(folder, manifest, files)
 
 
-def _inside(name: str) -> bool:
-    """Refuse a name of a file that leads out of its folder."""
-    path = PurePosixPath(name)
-    if path.is_absolute() or ".." in path.parts or "\0" in name:
-        raise ValueError(f"the file name {name!r} leads out of the folder")
-    return True
-
-
-def _file(folder: Path, opened: Held, name: str, digest: str) -> bytes:
-    """Return a file's content, which must have this digest."""
-    path = folder / name
-    try:
-        content = opened.read(name)
-    except OSError as error:
-        raise _unreadable(folder, path, error) from error
-    if _sha256(content) != digest:
-        raise ModelError(f"{path} was changed after it was generated: {remedy(folder)}")
-    return content
+def _unreadable(folder: Path, path: Path, error: OSError) -> ModelError:
+    return ModelError(f"{path!s:.200} cannot be read ({error.strerror}): {remedy(folder)}")
 
 
 def _check(folder: Path, manifest: dict) -> None:
@@ -161,7 +142,8 @@ def _check(folder: Path, manifest: dict) -> None:
     if absent:
         raise ValueError(f"it lacks {', '.join(absent)}")
     entries = {key: value for key, value in manifest.items() if key != "manifest_hash"}
-    if _sha256(json.dumps(entries, sort_keys=True).encode()) != manifest["manifest_hash"]:
+    content = json.dumps(entries, sort_keys=True).encode()
+    if hashlib.sha256(content).hexdigest() != manifest["manifest_hash"]:
         raise ModelError(
             f"{folder / 'manifest.json'} was changed after it was generated: {remedy(folder)}; "
             "parameters are changed "
@@ -169,5 +151,54 @@ def _check(folder: Path, manifest: dict) -> None:
         )
 
 
-def _sha256(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()
+# Snapshots.
+
+
+def snapshot(checked: CheckedFolder, cache: Path) -> Path:
+    """Return the folder in the cache with a model's files; make it if it is missing or damaged.
+
+    SerpentailError if it cannot be written.
+    """
+    place = cache / MODELS / checked.manifest_hash
+    if in_cache(checked.manifest_hash, cache) is None:
+        with workshop(cache) as part:
+            model = part / "model"
+            model.mkdir(0o700)
+            for name, text in checked.contents().items():
+                (model / name).parent.mkdir(parents=True, exist_ok=True)
+                (model / name).write_bytes(text)
+            publish(model, place, lambda: in_cache(checked.manifest_hash, cache) is not None)
+    return place
+
+
+def in_cache(manifest_hash: str | None, cache: Path) -> CheckedFolder | None:
+    """Return the snapshot of a manifest; None if the cache does not have it whole."""
+    if manifest_hash is None:
+        return None
+    place = cache / MODELS / manifest_hash
+    refuse_others(cache, place.parent, place)
+    with suppress(ModelError):
+        checked = read_folder(place)
+        if checked.manifest_hash == manifest_hash:
+            mark_used(place)
+            return checked
+    return None
+
+
+def restored(manifest_hash: str, folder: Path) -> CheckedFolder:
+    """Return the model with a manifest's hash, from the cache or else from its folder.
+
+    ModelError if neither has it.
+    """
+    with suppress(SerpentailError):
+        checked = in_cache(manifest_hash, cache_folder())
+        if checked:
+            return replace(checked, folder=folder)
+    checked = read_folder(folder)
+    if checked.manifest_hash != manifest_hash:
+        raise ModelError(
+            f"{folder} was generated again since the model was pickled (its manifest was "
+            f"{manifest_hash:.12}, now {checked.manifest_hash:.12}), and the cache no longer has "
+            "the pickled one: generate it again as it was, or load and pickle the model anew"
+        )
+    return checked

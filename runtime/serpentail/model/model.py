@@ -16,11 +16,11 @@ from serpentail_scene.layout import Layout
 from ..basics.errors import SerpentailError
 from ..basics.extras import needed
 from ..compiling.cache import cache_folder
-from .batch import BatchLibrary
 from .functions import Functions
 from .kernel import Kernel
 from .lazy import kept
-from .manifest import CheckedFolder
+from .library import BatchLibrary
+from .manifest import CheckedFolder, restored, snapshot
 from .methods.steps import StepMethods
 from .parameters import (
     RunParameters,
@@ -32,7 +32,6 @@ from .parameters import (
     resolve,
 )
 from .plausible_sizes import warn_of_sizes
-from .snapshot import restored, snapshot
 from .tail import links_of, words_of
 
 if TYPE_CHECKING:
@@ -163,9 +162,10 @@ class Model(Functions, StepMethods):
         self.batch_library = batch_library or BatchLibrary(checked, profile)
         self.kernels: dict[str, Kernel] = {}
         if library is not None:
-            libraries = library, self.batch_library
             for name in manifest["functions"]:
-                self.kernels[name] = Kernel(libraries, manifest, name, self.parameter_vector)
+                self.kernels[name] = Kernel(
+                    library, self.batch_library, manifest, name, self.parameter_vector
+                )
 
     def __repr__(self) -> str:
         return f"<serpentail.Model {self.name}: {self.tail_words()}, nv = {self.nv}>"

@@ -12,7 +12,7 @@ from ..basics.errors import ModelError, SerpentailError
 from ..building.build import built
 from ..building.examples import tables_of_scene
 from ..model.load import load, model_from
-from ..model.manifest import read_manifest
+from ..model.manifest import read_folder
 from ..model.model import Model
 from ..model.parameters import merged
 from .keys import Key, read, sized
@@ -62,7 +62,7 @@ def model_of(scene: Mapping, path: Path, folder: str | Path | None, parameters: 
     """
     if folder is None:
         return model_from(*built(scene, path.stem, parameters))
-    made = read_manifest(Path(folder))["scene"]
+    made = read_folder(Path(folder)).manifest["scene"]
     for key in MADE_OF:
         if key in scene and not _same(_in_radians(key, scene[key]), made.get(key, UNSAID.get(key))):
             raise ModelError(

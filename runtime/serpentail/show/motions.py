@@ -6,10 +6,9 @@ from typing import Any
 
 from ..basics.errors import ModelError, ViewError
 from ..model.load import model_from
-from ..model.manifest import read_folder
+from ..model.manifest import read_folder, restored
 from ..model.model import Model
 from ..model.parameters import independent
-from ..model.snapshot import restored
 from ..motion.trajectory import Trajectory
 
 GENERATED = Path("generated")

@@ -9,7 +9,7 @@ import numpy as np
 
 from serpentail_scene.layout import TAIL_V
 
-from ..compiling.cores import threads as allowed
+from ..compiling.threads import threads as allowed
 from ..model.kernel import aligned
 from ..model.model import Model
 from ..model.structures import structure

@@ -10,8 +10,8 @@ import numpy as np
 
 from ..basics.errors import SimulationError
 from ..basics.progress import Stage
-from ..compiling.cores import threads as allowed
 from ..compiling.threads import in_turn
+from ..compiling.threads import threads as allowed
 from ..model.library import PAUSED
 from ..motion.derived import made
 from .acting import Acting

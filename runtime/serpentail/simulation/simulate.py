@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ..basics.errors import SimulationError
 from ..basics.plausible_values import warn_of_degrees
 from ..basics.progress import Stage
-from ..compiling.cores import checked_threads
+from ..compiling.threads import checked_threads
 from ..model.model import Model
 from ..motion.derived import AGAIN
 from ..motion.trajectory import Trajectory

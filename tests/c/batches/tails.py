@@ -13,7 +13,7 @@ TOUCHING = ("all", "some", "none")
 
 def in_lanes(monkeypatch):
     """From here on any batch is large, and it fails if states are evaluated one by one."""
-    monkeypatch.setattr("serpentail.model.batch.MIN_BATCH", 1)
+    monkeypatch.setattr("serpentail.model.library.MIN_BATCH", 1)
     monkeypatch.setattr(Kernel, "_each", lambda *_: pytest.fail("one by one"))
 
 

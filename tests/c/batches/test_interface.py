@@ -9,8 +9,7 @@ import pytest
 
 import serpentail as st
 from serpentail.model.kernel import argument_record
-from serpentail.model.library import NOT_FINITE
-from serpentail.model.snapshot import model_library
+from serpentail.model.library import NOT_FINITE, model_library
 from tests.support import zoo
 from tests.support.rows import row
 
@@ -21,14 +20,14 @@ model_of = cache(zoo.own)  # once a model has lanes, they are used
 
 @pytest.fixture(autouse=True)
 def any_batch_is_large(monkeypatch):
-    monkeypatch.setattr("serpentail.model.batch.MIN_BATCH", 1)
+    monkeypatch.setattr("serpentail.model.library.MIN_BATCH", 1)
 
 
 def test_a_few_states_compile_nothing_and_many_do_once(monkeypatch):
-    monkeypatch.setattr("serpentail.model.batch.MIN_BATCH", 1000)
-    built, place = [], "serpentail.model.batch.model_library"
-    monkeypatch.setattr(place, lambda *a: built.append(a) or model_library(*a))
+    monkeypatch.setattr("serpentail.model.library.MIN_BATCH", 1000)
+    built, place = [], "serpentail.model.library.model_library"
     found = zoo.own("m1_n1")
+    monkeypatch.setattr(place, lambda *a: built.append(a) or model_library(*a))
     found.mass_matrix(states(found, 999)["q"])
     assert not built
     found.mass_matrix(states(found, 1000)["q"])

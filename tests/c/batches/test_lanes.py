@@ -90,7 +90,7 @@ def test_any_number_of_states_gives_what_each_gives_alone(name, monkeypatch):
 
 def test_states_whose_lanes_fail_are_evaluated_again_one_by_one(monkeypatch):
     """As if the lanes of the second group of states failed, and none of them alone."""
-    monkeypatch.setattr("serpentail.model.batch.MIN_BATCH", 1)
+    monkeypatch.setattr("serpentail.model.library.MIN_BATCH", 1)
     model, failures = serpentail.load(zoo.folder("m1_n1")), []
     q, lanes = states(model, 37)["q"], model.batch_library.states
     function = model.batch_library.entry("mass_matrix", 37)

@@ -82,7 +82,7 @@ def test_c_library_processor_and_version_reach_the_key(model, monkeypatch, scrip
     build()
     monkeypatch.setattr(os, "confstr", lambda name: asked.append(name) or "glibc 2.99")
     build()
-    monkeypatch.setattr("serpentail.compiling.toolchain._processor", lambda: "lake")
+    monkeypatch.setattr("serpentail.compiling.toolchain.processor", lambda: "lake")
     build(target="-march= lake")
     shutil.rmtree(places[2])  # or the note of the old version would do
     build(target="-march= lake", version="mycc 2")
@@ -118,7 +118,6 @@ def test_compilers_are_asked_for_flags_and_get_little_of_the_environment(
 
 
 NO_NOTES = ("", "{", "[]", "{}", "[" * 100_000)
-WRONG = [("works", "yes"), ("flags", 3), ("flags", [1]), ("version", None), ("target", {})]
 OTHERS = {  # what may be in the place of a file
     "less": lambda path: path.write_bytes(b"\x7fELF"),
     "no text": lambda path: path.write_bytes(b"\xff\xfe\x00"),
@@ -130,9 +129,9 @@ OTHERS = {  # what may be in the place of a file
 
 def test_damaged_notes_and_libraries_are_made_again(model, cache, tmp_path):
     library = compiler.compile_library(*model)
-    (note,) = (cache / "compilers").iterdir()
+    (note,) = (cache / "compilers").glob("*/*")
     sound = json.loads(note.read_text())
-    texts = [*NO_NOTES, *(json.dumps(sound | {key: value}) for key, value in WRONG)]
+    texts = [*NO_NOTES, *(json.dumps(sound | {key: 3}) for key in sound)]
     puts = [lambda path, text=text: path.write_text(text) for text in texts]
     for path in (note, library):
         whole = path.read_bytes()
@@ -149,7 +148,7 @@ def test_damaged_notes_and_libraries_are_made_again(model, cache, tmp_path):
             assert compiler.compile_library(*model).read_bytes() == whole
     place, part = library.parent, tmp_path / "part"  # what another process made meanwhile stays
     part.mkdir()
-    publish(part, place, lambda place: place == library.parent)
+    publish(part, place, lambda: True)
     assert place.exists() and part.exists()
 
 

@@ -9,7 +9,6 @@ import sysconfig
 import tracemalloc
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -29,7 +28,7 @@ HEADERS = Path(sysconfig.get_path("include"))
 def by_ctypes(model):
     plain = copy.copy(model)
     for each in plain.kernels.values():
-        each.fast = calls.declined
+        each.fast = calls.no_call
     return plain
 
 
@@ -158,10 +157,8 @@ def test_where_it_cannot_be_had_or_calls_are_long_ctypes_serves(model, monkeypat
     ):
         with monkeypatch.context() as changed:
             change(changed)
-            changed.setattr(calls, "_compiled", calls._compiled.__wrapped__)
-            changed.setattr(calls, "_tries", calls.Tries())
-            assert calls.extension() is None
-    for owner, name, lack in ((calls, "extension", lambda: None), (kernel, "MOST_HELD", 0)):
+            assert calls.extension.__wrapped__() is None
+    for owner, name, lack in ((calls, "extension", lambda: None), (kernel, "MOST_UNDER_LOCK", 0)):
         monkeypatch.setattr(owner, name, lack)
         other = copy.copy(model)
         for function in CALLS:
@@ -169,7 +166,7 @@ def test_where_it_cannot_be_had_or_calls_are_long_ctypes_serves(model, monkeypat
                 found = call(other, function, state())
                 call(other, function, state(2))
                 assert_same(found, call(model, function, state()))
-                assert other.kernels[function].fast in (calls.declined, None)
+                assert other.kernels[function].fast is calls.no_call
         monkeypatch.undo()
     # it compiles without warnings
     flags = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror", "-c")
@@ -177,35 +174,3 @@ def test_where_it_cannot_be_had_or_calls_are_long_ctypes_serves(model, monkeypat
     command = [*next(iter(candidates())), *flags, *places]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
-
-
-FULL = """#!/bin/sh
-case "$*" in *" -c "*) echo x >> "$0.tries"; [ -e "$0.full" ] && exit 1;; esac
-exec cc "$@"
-"""
-
-
-@pytest.mark.skipif(not (HEADERS / "Python.h").is_file(), reason="needs the headers of Python")
-def test_after_a_failure_it_is_compiled_later_but_not_tried_for_ever(model, monkeypatch, tmp_path):
-    """By a compiler that fails as on a full disk; ctypes serves meanwhile."""
-    cc, now, s = tmp_path / "cc", [0.0], state()
-    cc.write_text(FULL)
-    cc.chmod(0o755)
-    full, tries = tmp_path / "cc.full", tmp_path / "cc.tries"
-    for name, value in (("CC", cc), ("SERPENTAIL_CACHE", tmp_path / "cache")):
-        monkeypatch.setenv(name, str(value))
-    monkeypatch.setattr(calls, "time", SimpleNamespace(monotonic=lambda: now[0]))
-    monkeypatch.setattr(calls, "_compiled", calls._compiled.__wrapped__)
-    for times, room, expected in (((0, 2, 20, 200, 1e9), 2e9, 4), ((0, 0.5, 2, 3), 12, 3)):
-        monkeypatch.setattr(calls, "_tries", calls.Tries())
-        other = copy.copy(model)
-        full.touch()
-        tries.write_text("")
-        for now[0] in times:
-            assert other.energy(s["q"], s["v"]) == model.energy(s["q"], s["v"])
-            assert other.kernels["energy"].fast in (calls.declined, None)
-        full.unlink()
-        now[0] = room
-        other.energy(s["q"], s["v"])
-        assert len(tries.read_text().split()) == expected
-        assert (other.kernels["energy"].fast is calls.declined) == (expected == 4)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.model.snapshot import model_library
+from serpentail.model.library import model_library
 from serpentail.simulation import batched_runs, parallel_runs
 from serpentail.simulation.adaptive_runs import AdaptiveRuns
 from tests.support import zoo
@@ -164,10 +164,13 @@ def priced(monkeypatch):
 def built(monkeypatch):
     """What is compiled beside models, where the cache has nothing of it."""
     found = []
-    monkeypatch.setattr(
-        "serpentail.model.batch.model_library", lambda *a: found.append(a) or model_library(*a)
-    )
-    monkeypatch.setattr("serpentail.model.batch.library_in_cache", lambda *_: None)
+
+    def noted(checked, sources, profile):
+        found.extend([sources] if len(sources) == 1 else [])
+        return model_library(checked, sources, profile)
+
+    monkeypatch.setattr("serpentail.model.library.model_library", noted)
+    monkeypatch.setattr("serpentail.model.library.library_in_cache", lambda *_: None)
     return found
 
 
@@ -202,7 +205,7 @@ def test_other_laws_fly_alone(built):
 
 @pytest.mark.parametrize(("price", "lanes"), [(1e-9, 8), (1.0, 1)])
 def test_pilots_tell_whether_compiling_pays(priced, monkeypatch, price, lanes):
-    monkeypatch.setattr("serpentail.model.batch.library_in_cache", lambda *_: None)
+    monkeypatch.setattr("serpentail.model.library.library_in_cache", lambda *_: None)
     monkeypatch.setattr(batched_runs, "COMPILE_S_PER_BYTE", price)
     monkeypatch.setattr(parallel_runs, "PILOTS", 5)
     model, how = st.load(tail().folder), {"t_span": 0.3, "method": "tsit5", "output_step": 0.0123}

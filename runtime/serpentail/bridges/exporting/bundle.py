@@ -7,7 +7,6 @@ from ...basics.checks import shown
 from ...basics.errors import ExportError
 from ...model.model import Model
 from ...model.parameters import resolve
-from ...model.snapshot import contents
 
 BEGINNING = (1980, 1, 1, 0, 0, 0)  # earliest time of a zip: no real date is stored
 RIGHTS = 0o100644 << 16  # a plain file that all may read
@@ -28,7 +27,7 @@ def bundle(model: Model) -> bytes:
                 f"{shown(defaults.get(name))}: export the model as st.load(folder) returns it, and "
                 "give the change to st.load where the bundle is unpacked"
             )
-    return zipped({f"{name_of(model)}/{n}": x for n, x in contents(model.checked).items()})
+    return zipped({f"{name_of(model)}/{n}": x for n, x in model.checked.contents().items()})
 
 
 def name_of(model: Model) -> str:

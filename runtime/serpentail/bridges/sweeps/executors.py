@@ -11,7 +11,7 @@ from typing import Any
 from ...basics.checks import refusal
 from ...basics.errors import SweepError
 from ...basics.extras import needed
-from ...compiling.cores import checked_threads, threads
+from ...compiling.threads import checked_threads, threads
 from .supervision import ending
 
 CHOICES = (

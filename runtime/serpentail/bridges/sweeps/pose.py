@@ -11,7 +11,7 @@ from ... import __version__
 from ...basics.checks import Refusals, did_you_mean, numbers_in, shown
 from ...basics.errors import IdentificationError, PlanningError, SimulationError, SweepError
 from ...building.build import built
-from ...building.options import Parameters
+from ...building.options import ParameterOptions
 from ...model.model import Model
 from ...model.parameters import independent
 from ...scenes.file import MADE_OF, read_scene, subtable
@@ -189,7 +189,7 @@ def _of_scene(scene: Any, axes: Axes, job: Job) -> Subject:
     # which other names are parameters, and which of these need other code
     others = [name for name in axes.names if name not in {*keys, *shape}]
     if isinstance(job.run, str):
-        _refuse_unknown(others, job.run, Parameters.__annotations__)  # before a model is made
+        _refuse_unknown(others, job.run, ParameterOptions.__annotations__)  # before a model is made
     first_scene = tables | {name: first[name] for name in shape}
     checked, left = built(first_scene, path.stem, {name: first[name] for name in others})
     known = _parameter_units(checked.manifest)

@@ -24,7 +24,7 @@ import numpy as np
 
 from ...basics.errors import SweepError
 from ...compiling.commands import inherited
-from ...compiling.cores import VARIABLE
+from ...compiling.threads import VARIABLE
 from .points import Axes, Point
 from .shards import Row, Shard, ShardFolder
 from .worker import Bundle

@@ -17,9 +17,8 @@ from typing import NamedTuple
 from ...basics.errors import SerpentailError
 from ...compiling.cache import cache_folder
 from ...model.load import model_from
-from ...model.manifest import CheckedFolder
+from ...model.manifest import CheckedFolder, snapshot
 from ...model.model import Model
-from ...model.snapshot import snapshot
 from .job import Job
 from .runs import run_points
 

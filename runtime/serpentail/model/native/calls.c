@@ -35,7 +35,7 @@ static int alike(const Py_buffer *given, const Py_buffer *own)
 }
 
 /* Copy an argument into the array that the function reads; 0 if it needs Python's conversion. */
-static int taken(PyObject *argument, const Py_buffer *own)
+static int copy_in(PyObject *argument, const Py_buffer *own)
 {
     Py_buffer given;
     int plain;
@@ -52,7 +52,7 @@ static int taken(PyObject *argument, const Py_buffer *own)
 }
 
 /* Return a new copy of output k. */
-static PyObject *copied(const Call *call, Py_ssize_t k)
+static PyObject *copy_of(const Call *call, Py_ssize_t k)
 {
     if (call->copies[k] != NULL) {
         return PyObject_CallNoArgs(call->copies[k]);
@@ -66,11 +66,11 @@ static PyObject *results(const Call *call)
     Py_ssize_t k;
     PyObject *all, *one;
     if (call->outputs == 1) {
-        return copied(call, 0);
+        return copy_of(call, 0);
     }
     all = PyTuple_New(call->outputs);
     for (k = 0; all != NULL && k < call->outputs; k++) {
-        one = copied(call, k);
+        one = copy_of(call, k);
         if (one == NULL || PyTuple_SetItem(all, k, one) < 0) {
             Py_DECREF(all);
             return NULL;
@@ -95,7 +95,7 @@ static PyObject *evaluate(PyObject *self, PyObject *const *arguments, Py_ssize_t
         Py_RETURN_NONE;
     }
     for (k = 0; k < count; k++) {
-        if (!taken(arguments[k], &call->arrays[k])) {
+        if (!copy_in(arguments[k], &call->arrays[k])) {
             Py_RETURN_NONE;
         }
     }
@@ -122,7 +122,7 @@ static void release(PyObject *capsule)
 }
 
 /* Hold the arrays and the methods that copy the outputs; return -1 and set an error on failure. */
-static int held(Call *call, PyObject *arrays)
+static int hold(Call *call, PyObject *arrays)
 {
     Py_ssize_t k;
     PyObject *array;
@@ -166,7 +166,7 @@ PyObject *serpentail_call(
         PyMem_Free(call);
         return NULL;
     }
-    made = held(call, arrays) < 0 ? NULL : PyCFunction_New(&METHOD, capsule);
+    made = hold(call, arrays) < 0 ? NULL : PyCFunction_New(&METHOD, capsule);
     Py_DECREF(capsule);
     return made;
 }

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...compiling.cache import cache_folder, workshop
 from ...compiling.compiler import compile_library
-from ...compiling.cores import threads
+from ...compiling.threads import threads
 from .record import BATCHES, INPUTS, KINDS, PARTS, Nodes, Ports
 
 if TYPE_CHECKING:

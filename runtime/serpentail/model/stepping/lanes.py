@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from ..batch import LazyLibrary
 from ..kernel import address_of, aligned
+from ..library import LazyLibrary
 from ..structures import REALS, structure
 from .held import Held
 from .singly import SingleSteps

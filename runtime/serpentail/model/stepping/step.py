@@ -21,8 +21,7 @@ from ...basics.checks import (
     whole_number,
 )
 from ...basics.errors import SimulationError, StateError
-from ...compiling.cores import checked_threads
-from ...compiling.threads import MIN_STATES_PER_THREAD, shared
+from ...compiling.threads import MIN_STATES_PER_THREAD, checked_threads, shared
 from ..library import WHY
 from ..parameters import RunParameters
 from .held import Held

@@ -8,8 +8,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from ...compiling.cores import threads
-from ...compiling.threads import after_fork
+from ...compiling.threads import after_fork, threads
 from .stages import Stages
 
 # intervals, each times the square of its unknowns, that are worth a thread: about 0.1 ms of work
