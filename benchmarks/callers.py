@@ -19,7 +19,7 @@ from benchmarks.derivatives import multiplied
 from benchmarks.fixtures import built, fixture, label
 from benchmarks.peers import timing
 from benchmarks.simulations import ERROR, FLYING, fly, impact
-from serpentail.simulation.compiled_run import CompiledRun
+from serpentail.simulation.runs.single import CompiledRun
 
 SIZES = ((1, 3), (3, 4))
 ROUNDS, CALLS = 100, 64

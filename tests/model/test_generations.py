@@ -14,7 +14,7 @@ import pytest
 import serpentail as st
 from serpentail.compiling.safe_files import Held
 from serpentail.model import manifest
-from serpentail.simulation import parallel_runs
+from serpentail.simulation.runs import batch as parallel_runs
 from serpentail_codegen.targets.write import write_folder
 from tests.support import zoo
 from tests.support.models import model_folder

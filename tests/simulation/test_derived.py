@@ -13,7 +13,8 @@ import pytest
 import serpentail as st
 from serpentail.motion.derived import LATER
 from serpentail.motion.trajectory import DERIVED
-from serpentail.simulation import compiled_run, watched
+from serpentail.simulation.runs import single as compiled_run
+from serpentail.simulation import callback as watched
 from tests.support import zoo
 from tests.support.rows import row
 

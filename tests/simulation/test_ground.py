@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.simulation import compiled_run
+from serpentail.simulation.runs import single as compiled_run
 from tests.support import zoo
 from tests.support.rows import row
 

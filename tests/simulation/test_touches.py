@@ -9,7 +9,7 @@ import pytest
 
 import serpentail as st
 from serpentail.simulation.ground import Ground
-from serpentail.simulation.piecewise import Piecewise
+from serpentail.simulation.controllers.controller.piecewise import Piecewise
 from tests.support import zoo
 from tests.support.rows import row
 

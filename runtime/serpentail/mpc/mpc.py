@@ -14,8 +14,8 @@ from ..basics.errors import SimulationError
 from ..model.kernel import aligned
 from ..model.model import Model
 from ..planning.result.plan import Plan
-from ..simulation.controllers import NativeTorque
-from ..simulation.parts import OwnState, Parts
+from ..simulation.controllers.controller import NativeTorque
+from ..simulation.controllers.parts import OwnState, Parts
 from .emission import write_c
 from .kernel import Simulation, kernel
 from .settings import checked_settings, refuse_unable

@@ -16,10 +16,10 @@ from ..motion.trajectory import Trajectory
 from ..sequence.phase import Phase
 from ..sequence.run import SequenceRun
 from ..sequence.sequence import Sequence
-from ..simulation.controllers import Controller
+from ..simulation.controllers.controller import Controller
 from ..simulation.methods import SETTINGS
 from ..simulation.rollouts import Rollouts
-from ..simulation.schedules import Legs, Reference
+from ..simulation.controllers.schedules import Legs, Reference
 from ..simulation.settle import settle
 from ..simulation.simulate import simulate
 from .acting import controller_of, legs_of, reference_of

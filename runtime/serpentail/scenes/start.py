@@ -10,7 +10,7 @@ from serpentail_scene.layout import OMEGA, VELOCITY
 from ..basics.checks import finite_array, number, refusal
 from ..basics.errors import SimulationError
 from ..model.model import Model
-from ..simulation.schedules import shared_among_links
+from ..simulation.controllers.schedules import shared_among_links
 from ..simulation.settle import check_settling
 from .simulate_keys import ANGLES
 

@@ -5,7 +5,7 @@ from typing import Any
 from ..basics.checks import number, refusal
 from ..basics.errors import SimulationError
 from ..model.model import Model
-from ..simulation.controllers import parts_of
+from ..simulation.controllers.controller import parts_of
 from .phase import Phase
 
 

@@ -18,9 +18,9 @@ from ..mpc.mpc import Mpc
 from ..planning.planner import plan as planned
 from ..planning.problem import checked_goal
 from ..planning.result.plan import Plan
-from ..simulation.controllers import Controller, Phases
-from ..simulation.pfl import Pfl
-from ..simulation.schedules import Legs
+from ..simulation.controllers.controller import Controller, Phases
+from ..simulation.controllers.pfl import Pfl
+from ..simulation.controllers.schedules import Legs
 from ..simulation.simulate import simulate
 from .ballistic import landing_time
 from .checks import check_legs, check_phase

@@ -6,9 +6,9 @@ import numpy as np
 
 from ..basics.errors import SimulationError
 from ..model.model import Model
-from .actuation import Actuation
-from .controllers import Controller, controllers_of
-from .piecewise import Piecewise
+from .controllers.actuation import Actuation
+from .controllers.controller import Controller, controllers_of
+from .controllers.piecewise import Piecewise
 from .records import Records
 from .start import Start
 

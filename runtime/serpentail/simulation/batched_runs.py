@@ -14,10 +14,10 @@ from ..model.kernel import aligned
 from ..model.model import Model
 from ..model.structures import structure
 from .acting import Acting
-from .actuation import Actuation
-from .compiled_run import PAUSE, Memory, called
+from .controllers.actuation import Actuation
+from .runs.single import PAUSE, Memory, called
 from .methods import IntegrationMethod, step_counts
-from .piecewise import Piecewise, constant
+from .controllers.piecewise import Piecewise, constant
 from .start import Start
 
 MAX_SHARED_STEPS = 1_000_000  # steps of one run: with more, shared arrays would fill the memory

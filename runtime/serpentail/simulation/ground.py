@@ -13,7 +13,7 @@ from ..model.kernel import RunKernel
 from ..model.model import Model
 from ..model.parameters import RunParameters, total_mass
 from ..motion.contact import Contact
-from .schedules import Legs
+from .controllers.schedules import Legs
 from .start import Start
 
 KINDS = ("touch_down", "take_off")

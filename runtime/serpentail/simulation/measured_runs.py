@@ -12,8 +12,8 @@ from ..model.kernel import RunKernel
 from ..model.passive import stored_energy
 from ..motion.trajectory import Trajectory
 from .audit import BALANCED, Audit, Between, allowance, audited, warnings_of
-from .compiled_run import Memory
-from .measured import MEASURES, certain_runs
+from .runs.single import Memory
+from .energies import MEASURES, certain_runs
 from .methods import IntegrationMethod
 from .rollouts import Source
 

@@ -16,10 +16,10 @@ from ..motion.derived import Derived, settled
 from ..motion.exports import Exports
 from ..motion.trajectory import MONOTONE, Trajectory
 from .audit import Audit
-from .compiled_run import Samples, sampled
+from .runs.single import Samples, sampled
 from .ground import Ground
-from .measured import trajectory_or_error
-from .outcomes import Outcomes
+from .energies import trajectory_or_error
+from .runs.outcomes import Outcomes
 
 LATER = (*MONOTONE, "audit", "warnings")  # fields that are derived when they are first used
 SHOWN = 3  # runs that a notebook shows over each other

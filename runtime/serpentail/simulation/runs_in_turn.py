@@ -9,7 +9,7 @@ import numpy as np
 
 from ..model.kernel import address_of
 from .acting import Acting
-from .compiled_run import PAUSE, PAUSE_S, CompiledRun, Memory
+from .runs.single import PAUSE, PAUSE_S, CompiledRun, Memory
 from .methods import IntegrationMethod
 
 MOST_AT_ONCE = 512  # runs of one call: more would not make the rest of a call cheaper

@@ -18,18 +18,18 @@ from ..model.model import Model
 from ..motion.derived import AGAIN
 from ..motion.trajectory import Trajectory
 from .acting import Acting
-from .choice import prepared, still_chosen
-from .compiled_run import CompiledRun, Memory, Samples
-from .controllers import Controller, remembers
+from .prepare import prepared, still_chosen
+from .runs.single import CompiledRun, Memory, Samples
+from .controllers.controller import Controller, remembers
 from .ground import Ground
-from .measured import trajectory_or_error
+from .energies import trajectory_or_error
 from .methods import SCIPY, IntegrationMethod
-from .parallel_runs import run_parallel
+from .runs.batch import run_parallel
 from .records import Records
 from .rollouts import Rollouts
 from .start import Start
 from .waiting import asked_for, let_wait, taken
-from .watched import Watch, Watched, checked_watch
+from .callback import Watch, Watched, checked_watch
 
 
 def simulate(
@@ -265,7 +265,7 @@ def integrate(run: CompiledRun, watch: Watch | None = None) -> Samples:
     watched = None if watch is None else Watched(watch, run.model, run.ground)
     with Stage("simulate", run.model.name) as stage:
         if method.name in SCIPY:
-            from .scipy_methods import integrate_by_scipy
+            from .runs.scipy_methods import integrate_by_scipy
 
             samples = integrate_by_scipy(run, method, watched)
         else:

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..model.model import Model
-from .compiled_run import CompiledRun
-from .controllers import Controller, Damping
+from .runs.single import CompiledRun
+from .controllers.controller import Controller, Damping
 from .methods import SCIPY
-from .schedules import Legs
+from .controllers.schedules import Legs
 from .start import checked_starts
 
 MOST_RUNS = 4  # that wait, of a model

@@ -7,8 +7,9 @@ import pytest
 
 import serpentail as st
 from serpentail.model.snapshot import model_library
-from serpentail.simulation import batched_runs, parallel_runs
-from serpentail.simulation.adaptive_runs import AdaptiveRuns
+from serpentail.simulation import batched_runs
+from serpentail.simulation.runs import batch as parallel_runs
+from serpentail.simulation.runs.lanes import AdaptiveRuns
 from tests.support import zoo
 from tests.support.rows import row
 

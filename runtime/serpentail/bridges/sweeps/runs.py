@@ -15,7 +15,7 @@ from ...motion.numbers import NUMBERS
 from ...motion.trajectory import Trajectory
 from ...scenes.overrides import changed
 from ...scenes.simulate import Scenario, scenario_of
-from ...simulation.controllers import Damping, TorqueCurve, TorqueTable
+from ...simulation.controllers.controller import Damping, TorqueCurve, TorqueTable
 from ...simulation.rollouts import Rollouts
 from ...simulation.simulate import simulate
 from .axes import Point

@@ -11,9 +11,9 @@ from ..basics.checks import refusal
 from ..basics.errors import SimulationError, StateError
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
-from .compiled_run import Samples
+from .runs.single import Samples
 from .ground import Ground
-from .measured import measured
+from .energies import measured
 
 EVERY = 0.1  # s from the end of one call to the next, at least
 

@@ -11,8 +11,8 @@ from ..basics.errors import ModelError, SimulationError
 from ..model.model import Model
 from ..model.parameters import RunParameters
 from .acting import Acting
-from .compiled_run import CompiledRun, Memory
-from .controllers import Controller
+from .runs.single import CompiledRun, Memory
+from .controllers.controller import Controller
 from .decay import FastestDecay
 from .ground import Ground
 from .limits import MOST_STEPS, refuse_endless

@@ -13,7 +13,7 @@ from ..model.passive import behind_stops, stored_energy
 from ..motion.origin import origin
 from ..motion.trajectory import Trajectory
 from .audit import BALANCED, Between, allowance, audited, warnings_of
-from .compiled_run import Samples
+from .runs.single import Samples
 from .ground import Ground
 from .methods import ADAPTIVE, FIXED
 

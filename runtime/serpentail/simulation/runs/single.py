@@ -9,19 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from ..basics.errors import SimulationError
-from ..basics.plausible_values import LARGEST
-from ..model.kernel import address_of, aligned
-from ..model.lazy import kept
-from ..model.library import PAUSED, STEP_TOO_SMALL, STOPPED_AT_EVENT, TOO_MANY_STEPS, WHY
-from ..model.model import Model
-from ..model.parameters import RunParameters
-from .acting import Acting
-from .decay import FastestDecay
-from .ground import MOST_EVENTS, Ground
-from .methods import IntegrationMethod
-from .records import Records
-from .start import Start
+from ...basics.errors import SimulationError
+from ...basics.plausible_values import LARGEST
+from ...model.kernel import address_of, aligned
+from ...model.lazy import kept
+from ...model.library import PAUSED, STEP_TOO_SMALL, STOPPED_AT_EVENT, TOO_MANY_STEPS, WHY
+from ...model.model import Model
+from ...model.parameters import RunParameters
+from ..acting import Acting
+from ..decay import FastestDecay
+from ..ground import MOST_EVENTS, Ground
+from ..methods import IntegrationMethod
+from ..records import Records
+from ..start import Start
 
 MOST_STEPS = 2**31 - 1  # that the C interface counts
 PAUSE = 100  # steps before the first check for signals, such as Ctrl-C

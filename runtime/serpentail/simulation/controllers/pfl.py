@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 
 from serpentail_scene.layout import TORSO_V
 
-from ..basics.checks import measured, number, numbers, refusal
-from ..basics.errors import SimulationError
-from ..model.model import Model
+from ...basics.checks import measured, number, numbers, refusal
+from ...basics.errors import SimulationError
+from ...model.model import Model
 from .piecewise import Piecewise, checked_nodes, spline
 from .schedules import Reference
 

@@ -5,14 +5,14 @@ from typing import Any
 
 import numpy as np
 
-from ..basics.checks import numbers_in, refusal
-from ..basics.errors import SimulationError
-from ..model.model import Model
-from .controllers import Controller, NativeTorque, parts_of, phases_of
-from .ctrl_c import CtrlC
+from ...basics.checks import numbers_in, refusal
+from ...basics.errors import SimulationError
+from ...model.model import Model
+from .controller import Controller, NativeTorque, parts_of, phases_of
+from ..ctrl_c import CtrlC
 from .parts import Parts, TorqueFunction
 from .piecewise import Piecewise
-from .records import CFunction, Records
+from ..records import CFunction, Records
 
 
 class Actuation:

@@ -8,21 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from ..basics.errors import SimulationError
-from ..basics.progress import Stage
-from ..compiling.cores import threads as allowed
-from ..compiling.threads import in_turn
-from ..model.library import PAUSED
-from ..motion.derived import made
-from .acting import Acting
-from .adaptive_runs import AdaptiveRuns, adaptive_in_lanes
-from .batched_runs import BatchedRuns, shared_steps, worth_batching
-from .compiled_run import CompiledRun, Memory, Outcome, failed
-from .measured_runs import MeasuredRuns, read_only
-from .methods import SCIPY, IntegrationMethod
+from ...basics.errors import SimulationError
+from ...basics.progress import Stage
+from ...compiling.cores import threads as allowed
+from ...compiling.threads import in_turn
+from ...model.library import PAUSED
+from ...motion.derived import made
+from ..acting import Acting
+from .lanes import AdaptiveRuns, adaptive_in_lanes
+from ..batched_runs import BatchedRuns, shared_steps, worth_batching
+from .single import CompiledRun, Memory, Outcome, failed
+from ..measured_runs import MeasuredRuns, read_only
+from ..methods import SCIPY, IntegrationMethod
 from .outcomes import Outcomes, told_by
-from .rollouts import Rollouts, Source
-from .runs_in_turn import RunsInTurn
+from ..rollouts import Rollouts, Source
+from ..runs_in_turn import RunsInTurn
 
 PILOTS = 64  # runs that are timed before code is compiled for the others
 

@@ -7,11 +7,11 @@ import numpy as np
 
 from serpentail_scene.layout import QUATERNION
 
-from ..basics.errors import SimulationError
-from ..model.library import NOT_FINITE
-from .compiled_run import CompiledRun, Samples, failed
-from .methods import IntegrationMethod
-from .watched import Watched, rest
+from ...basics.errors import SimulationError
+from ...model.library import NOT_FINITE
+from .single import CompiledRun, Samples, failed
+from ..methods import IntegrationMethod
+from ..callback import Watched, rest
 
 Part = tuple[float, np.ndarray, float]  # start (s), state there, end (s)
 

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from ..model.kernel import address_of, aligned
-from ..model.library import PAUSED
-from ..model.structures import structure
-from .acting import Acting
-from .batched_runs import shared_out
-from .compiled_run import PAUSE, CompiledRun, Memory, called
-from .methods import IntegrationMethod
+from ...model.kernel import address_of, aligned
+from ...model.library import PAUSED
+from ...model.structures import structure
+from ..acting import Acting
+from ..batched_runs import shared_out
+from .single import PAUSE, CompiledRun, Memory, called
+from ..methods import IntegrationMethod
 from .outcomes import told_by
 
 

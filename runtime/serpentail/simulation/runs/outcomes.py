@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from ..basics.errors import SimulationError
-from .compiled_run import COUNTS, Memory, Outcome
+from ...basics.errors import SimulationError
+from .single import COUNTS, Memory, Outcome
 
 
 def told_by(records: np.ndarray, memory: Memory, runs: np.ndarray) -> dict[str, Any]:

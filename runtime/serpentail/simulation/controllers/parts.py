@@ -11,7 +11,7 @@ from .pfl import Pfl
 from .piecewise import Piecewise
 
 if TYPE_CHECKING:
-    from .controllers import NativeTorque
+    from .controller import NativeTorque
 
 TorqueFunction = Callable[[float, np.ndarray, np.ndarray], ArrayLike]  # (t, q, v) -> tau
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..basics.checks import finite_array, numbers, numbers_in, refusal
-from ..basics.errors import SimulationError
-from ..basics.short_repr import brief
+from ...basics.checks import finite_array, numbers, numbers_in, refusal
+from ...basics.errors import SimulationError
+from ...basics.short_repr import brief
 from .parts import Parts, TorqueFunction
 from .pfl import Pfl
 from .piecewise import Piecewise, checked_nodes, linear

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..basics.checks import number, numbers_in, refusal
-from ..basics.errors import SimulationError
-from ..basics.short_repr import brief
+from ...basics.checks import number, numbers_in, refusal
+from ...basics.errors import SimulationError
+from ...basics.short_repr import brief
 from .parts import OwnState, Parts
 
 SAME = 1e-6  # of the time between ticks: closer times count as equal
