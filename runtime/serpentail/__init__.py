@@ -15,9 +15,10 @@ _HOME = {
     "settle": "simulation.settle",
     **dict.fromkeys(["scenario", "Scenario"], "scenes.simulate"),
     **dict.fromkeys(
-        ["Damping", "TorqueTable", "TorqueCurve", "NativeTorque", "Phases"],
+        ["Damping", "TorqueTable", "TorqueCurve", "Phases"],
         "simulation.controllers.controller",
     ),
+    "NativeTorque": "simulation.controllers.parts",
     "Sampled": "simulation.controllers.sampled",
     "Piecewise": "simulation.controllers.piecewise",
     **dict.fromkeys(["Legs", "Reference"], "simulation.controllers.schedules"),

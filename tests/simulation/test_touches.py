@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import serpentail as st
+from serpentail.simulation.controllers.piecewise import Piecewise
 from serpentail.simulation.ground import Ground
-from serpentail.simulation.controllers.controller.piecewise import Piecewise
 from tests.support import zoo
 from tests.support.rows import row
 

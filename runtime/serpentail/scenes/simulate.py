@@ -17,9 +17,9 @@ from ..sequence.phase import Phase
 from ..sequence.run import SequenceRun
 from ..sequence.sequence import Sequence
 from ..simulation.controllers.controller import Controller
+from ..simulation.controllers.schedules import Legs, Reference
 from ..simulation.methods import SETTINGS
 from ..simulation.rollouts import Rollouts
-from ..simulation.controllers.schedules import Legs, Reference
 from ..simulation.settle import settle
 from ..simulation.simulate import simulate
 from .acting import controller_of, legs_of, reference_of

@@ -9,9 +9,9 @@ from ..basics.errors import SimulationError
 from ..basics.short_repr import brief
 from ..model.model import Model
 from ..simulation.controllers.controller import CHOICES, Controller, Phases
-from ..simulation.ground import KINDS
 from ..simulation.controllers.pfl import KD, KP
 from ..simulation.controllers.schedules import MOVE
+from ..simulation.ground import KINDS
 
 AIRBORNE, LANDING = "airborne", "landing"
 BEFORE = "before_landing"  # of a move: s, in place of `at`

@@ -11,9 +11,9 @@ from ..basics.checks import refusal
 from ..basics.errors import SimulationError, StateError
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
-from .runs.single import Samples
-from .ground import Ground
 from .energies import measured
+from .ground import Ground
+from .runs.outcomes import Samples
 
 EVERY = 0.1  # s from the end of one call to the next, at least
 

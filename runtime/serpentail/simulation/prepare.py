@@ -7,15 +7,13 @@ from typing import Any
 import numpy as np
 
 from ..basics.checks import number, shown
-from ..basics.errors import ModelError, SimulationError
+from ..basics.errors import ModelError, SimulationError, StateError
+from ..model.kernel import RunKernel
 from ..model.model import Model
-from ..model.parameters import RunParameters
-from .acting import Acting
-from .runs.single import CompiledRun, Memory
+from ..model.parameters import RunParameters, Values
+from .controllers.actuation import Acting
 from .controllers.controller import Controller
-from .decay import FastestDecay
 from .ground import Ground
-from .limits import MOST_STEPS, refuse_endless
 from .methods import (
     ADAPTIVE,
     SCIPY,
@@ -27,7 +25,8 @@ from .methods import (
     usual_most_steps,
 )
 from .records import Records
-from .start import EPS, Start
+from .runs.single import Memory
+from .start import EPS, MOST_STEPS, Start, refuse_endless
 
 DURATIONS = ("duration", "t_end", "tf", "span", "T", "time")  # what others call t_span
 
@@ -104,17 +103,6 @@ def refuse_misplaced(model: Model, settings: dict[str, Any]) -> None:
             raise SimulationError(f"{key}: is no setting: the duration is t_span={shown(value)}")
 
 
-def still_chosen(run: CompiledRun, name: str) -> bool:
-    """Tell whether "auto" chooses a run's method again for a new start; store the reason."""
-    if name != "auto" or "step" in run.method.settings:
-        return True
-    method, available = run.method, run.model.manifest["simulation"]["methods"]
-    decay = run.decay(run.memory.state["q"])
-    name, reason = chosen(method.settings, available, decay, place_of(run.model))
-    run.method = replace(method, reason=reason)
-    return name == method.name
-
-
 def refuse_vanishing(start: Start, name: str, step: float) -> None:
     """SimulationError if steps of this length (s) are too short to advance the time."""
     least = EPS * max(abs(start.start), abs(start.end))
@@ -122,3 +110,76 @@ def refuse_vanishing(start: Start, name: str, step: float) -> None:
         raise SimulationError(
             f"{name} {step:.3g}: too short to move the time: give {least:.2g} s or more"
         )
+
+
+class FastestDecay:
+    """The fastest decay (1/s) of tails at starts q0 (runs, nq).
+
+    It is the largest eigenvalue of K (H^-1)_tt with the joint damping K; with springs, that of both
+    together whose real part is least. Oscillations do not count, however fast: whoever wants their
+    motion needs steps that resolve them. For one thread.
+    """
+
+    def __init__(self, acting: Acting, runs: int, parameters: RunParameters):
+        model, nt = acting.model, acting.model.layout.nt
+        parts = [parts for each in acting.distinct for parts in each.parts]
+        laws = [each.damping for each in parts if each.damping is not None]
+        acted = np.max(laws, axis=0) if laws else np.zeros(nt)
+        # tracking compensates the passive tail's own torques
+        tracked = bool(parts) and all(each.pfl is not None for each in parts)
+        values = {} if tracked else parameters.values
+        self.damping = acted + own(values, "tail_damping", (runs, nt))
+        self.stiffness = own(values, "tail_stiffness", (runs, nt))
+        self.sprung = bool(self.stiffness.any())
+        self.damped = bool(self.damping.any()) and "forward_dynamics" in model.generated
+        if not self.damped:
+            return
+        # without torque and with unit torques: the differences are columns of H^-1
+        kernel, self.tail = model.kernel("forward_dynamics"), model.layout.tail_v
+        self.runs, self.columns = runs, nt + 1
+        torques = np.eye(self.columns, nt, -1, kernel.dtype)
+        tau = np.tile(torques, (runs, 1, 1))
+        sizes = model.nq, model.nv, model.nv
+        self.q, v, self.v_dot = (
+            np.zeros((runs, self.columns, size), kernel.dtype) for size in sizes
+        )
+        self.evaluate = RunKernel(kernel, parameters.vectors, (self.q, v, tau), (self.v_dot,))
+
+    def __call__(self, q0: np.ndarray) -> float:
+        """Return it; 0 without damping, or if no start has accelerations."""
+        if not self.damped:
+            return 0.0
+        self.q[...] = q0[:, None]
+        sound = [k for k in range(self.runs) if self._evaluated(k)]
+        tail = self.v_dot[sound, :, self.tail].astype(float)
+        mobility = tail[:, 1:] - tail[:, :1]
+        if self.sprung:
+            return fastest(mobility, self.stiffness[sound], self.damping[sound])
+        root = np.sqrt(self.damping[sound])
+        columns = mobility * root[:, :, None] * root[:, None, :]
+        return float(np.linalg.eigvalsh(columns).max(initial=0.0))
+
+    def _evaluated(self, k: int) -> bool:
+        """Evaluate the rows of run k; tell whether that succeeded."""
+        try:
+            self.evaluate(k, self.columns)
+        except StateError:
+            return False
+        return True
+
+
+def own(values: Values, name: str, shape: tuple[int, int]) -> np.ndarray:
+    """Return a parameter of the passive tail in each run (runs, 2m); zeros without one."""
+    return np.broadcast_to(np.asarray(values.get(name, 0.0), float), shape)
+
+
+def fastest(mobility: np.ndarray, stiffness: np.ndarray, damping: np.ndarray) -> float:
+    """Return the fastest decay (1/s) of q_ddot = -mobility (stiffness q + damping q_dot), mobility
+    (runs, n, n).
+    """
+    n = mobility.shape[-1]
+    rates = np.zeros((len(mobility), 2 * n, 2 * n))
+    rates[:, :n, n:] = np.eye(n)
+    rates[:, n:, :n] = -mobility * stiffness[:, None, :]
+    rates[:, n:, n:] = -mobility * damping[:, None, :]
+    return float(-np.linalg.eigvals(rates).real.min(initial=0.0))

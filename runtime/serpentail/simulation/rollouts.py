@@ -16,10 +16,9 @@ from ..motion.derived import Derived, settled
 from ..motion.exports import Exports
 from ..motion.trajectory import MONOTONE, Trajectory
 from .audit import Audit
-from .runs.single import Samples, sampled
-from .ground import Ground
 from .energies import trajectory_or_error
-from .runs.outcomes import Outcomes
+from .ground import Ground
+from .runs.outcomes import Outcomes, Samples, sampled
 
 LATER = (*MONOTONE, "audit", "warnings")  # fields that are derived when they are first used
 SHOWN = 3  # runs that a notebook shows over each other

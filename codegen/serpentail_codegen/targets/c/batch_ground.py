@@ -14,24 +14,9 @@ from ...scene.scene import Scene
 from ..templating import render
 from .batch import STATES, LaneFunction, lane_function
 from .form import PrintedFunction
-from .records import fields, member_views
+from .records import layout, member_views, steps_record
 from .views import callee_view, step_views
 
-RECORD = fields(
-    ("parameters", "const real *", "[count][PARAMETERS]"),
-    ("q", "real *", "[count][NQ] configurations, advanced in place"),
-    ("v", "real *", "[count][NV] velocities, advanced in place"),
-    ("bristles", "real *", "[count][NU] bristle deflections (m), advanced in place"),
-    ("torques", "const real *", "[NT] constant torques (N m) of the first state"),
-    ("torques_apart", "size_t", "reals from one state's torques to the next; 0: the same for all"),
-    ("legs", "const real *", "[4][2] angle (rad) and rate (rad/s) of each hinge, first state"),
-    ("legs_apart", "size_t", "reals from one state's legs to the next; 0: the same for all"),
-    ("count", "size_t", "number of states; STATES are computed at a time"),
-    ("h", "real", "length of a step (s)"),
-    ("steps", "long", "number of steps"),
-    ("work", "real *", "workspace"),
-    ("first", "size_t", "first of the states that are computed now; those before it are done"),
-)
 FUNCTIONS = {"dynamics": "contact_dynamics", "factor": "implicit_factor", "solve": "implicit_solve"}
 ABSENT = ("damping", "gains")  # of implicit_factor: none acts in these steps
 # rows of the workspace that arguments are in, and the number of rows before them there
@@ -143,7 +128,9 @@ def ground_context(scene: Scene, tail: Tail, steps: GroundSteps) -> dict[str, An
     return {
         "states": steps.states,
         "widest": steps.states,
-        "record": member_views(RECORD, scene.name),
+        "record": member_views(steps_record(tail.bristles), scene.name),
+        "way": "ground",
+        "steps_type": "ground",
         "places": steps.places,
         "legs": tail.leg_numbers > 0,
         "bounded": tail.kind != "articulated",
@@ -165,9 +152,9 @@ def _arguments(scene: Scene, program: Program) -> str:
     return ", ".join(ROWS.get(a.name) or places[a.name] for a in arrays)
 
 
-def ground_entry(steps: GroundSteps | None) -> dict[str, Any]:
+def ground_entry(tail: Tail, steps: GroundSteps | None) -> dict[str, Any]:
     """Return what a loader must know of steps on the ground: states, workspace, record."""
     if steps is None:
         return {}
-    members = [[f.name, f.kind] for f in RECORD]
-    return {"ground": {"states": steps.states, "work": steps.work, "record": members}}
+    record = layout(steps_record(tail.bristles))
+    return {"ground": {"states": steps.states, "work": steps.work, "record": record}}

@@ -1,4 +1,4 @@
-"""The C of batch rollouts: many states simulated by the same steps, a lane for each state."""
+"""The C of batch rollouts: many flights by rk4 or tsit5, a lane for each."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,49 +11,12 @@ from ...scene.scene import Scene
 from ..templating import render
 from .batch import STATES, lane_function
 from .form import PrintedFunction
-from .records import fields, member_views
+from .records import ROLLOUTS, layout, member_views, steps_record
 from .routine import CFunction
 from .simulation import own_damping
 from .views import callee_view, step_views
 
-RECORD = fields(
-    ("parameters", "const real *", "[count][PARAMETERS]"),
-    ("q", "const real *", "[count][NQ] start"),
-    ("v", "const real *", "[count][NV] start"),
-    ("q_out", "real *", "[count][samples][NQ] configurations, the start first"),
-    ("v_out", "real *", "[count][samples][NV] velocities"),
-    ("ledger", "real *", "[count][2] work (J) of torques and of damping over the flight"),
-    ("count", "size_t", "number of flights; STATES are computed at a time"),
-    ("samples", "long", "number of samples of each flight"),
-    ("damping", "const real *", "[NT] damping of the first flight (N m s)"),
-    ("damping_apart", "size_t", "reals from one flight's damping to the next; 0: the same for all"),
-    ("lengths", "const real *", "[steps] lengths of the steps (s)"),
-    (
-        "torques",
-        "const real *",
-        "[steps][3][NT] torques (N m) at start, middle, end of each step, first flight; or NULL",
-    ),
-    ("torques_apart", "size_t", "reals from one flight's torques to the next; 0: the same for all"),
-    ("due", "const int *", "[steps] whether a sample follows the step"),
-    ("steps", "long", "number of steps of each flight"),
-    ("pause", "long", "largest number of steps in one call"),
-    ("work", "real *", "workspace; it contains the flights between calls"),
-    ("first", "size_t", "first of the flights that are computed now; those before it have ended"),
-    ("step", "long", "number of steps that they have done"),
-    ("done", "long", "number of samples that they have written"),
-)
-
-
-ROLLOUTS = fields(
-    ("runs", "void *", "[count] run records of the simulation header"),
-    ("count", "long", "number of runs"),
-    ("statuses", "int *", "[count] of ended runs: OK; anything else: compute the run by itself"),
-    ("lanes", "long *", "[STATES] index of the run in each lane; -1: none"),
-    ("next", "long", "index of the next run to start"),
-    ("pause", "long", "largest number of steps in one call"),
-    ("work", "real *", "workspace; it contains the flights between calls"),
-)
-SLOTS = 10  # states in the workspace: start, seven rates, end, error of an adaptive step
+SLOTS = 10  # states in the workspace: see batch/rollout.c.jinja
 LEDGER = 2  # numbers that a flight sums up, stored behind its state
 
 
@@ -132,12 +95,18 @@ def rollout_context(scene: Scene, rollout: BatchRollout) -> dict[str, Any]:
         "widest": rollout.states,
         "lanes_function": callee_view(rollout.program, rollout.body, scene.name),
         "arguments": ", ".join(arguments),
-        "record": member_views(RECORD, scene.name),
+        "runs": f"{scene.name}_side_by_side",  # what explicit methods advance, and lengths of steps
+        "lengths": "const real *",
+        "method": "run->method",
+        "steps_record": member_views(steps_record(0), scene.name),
+        "way": "steps",
+        "steps_type": "flights",
+        "legs": False,
+        "bounded": False,
         "damped_in_lanes": damped_in_lanes(scene, places),
         "parameter_count": rollout.parameters,
         "given": rollout.given,
         "state": rollout.state,
-        "slots": SLOTS,
         "rollouts_record": member_views(ROLLOUTS, scene.name),
         "inner": rollout.inner,
         "steps": step_views([rollout], scene.real, scene.name),
@@ -156,7 +125,5 @@ def batch_rollout_entry(rollout: BatchRollout | None) -> dict[str, Any]:
     """Return what a loader must know of a batch rollout: states, workspace, record."""
     if rollout is None:
         return {}
-    members = [[f.name, f.kind] for f in RECORD]
-    adaptive = [[f.name, f.kind] for f in ROLLOUTS]
-    sizes = {"states": rollout.states, "work": rollout.work}
-    return {"flights": sizes | {"record": members, "rollouts": adaptive}}
+    records = {"record": layout(steps_record(0)), "rollouts": layout(ROLLOUTS)}
+    return {"flights": {"states": rollout.states, "work": rollout.work} | records}

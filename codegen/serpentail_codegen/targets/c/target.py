@@ -32,7 +32,7 @@ def emit(scene: Scene, tail: Tail, functions: Iterable[Function], version: str) 
     files |= ground_file(scene, tail, ground, context)
 
     entries = c_entries(context) | {"batch": batch_entry(scene, batched)}
-    entries |= batch_rollout_entry(rollout) | ground_entry(ground)
+    entries |= batch_rollout_entry(rollout) | ground_entry(tail, ground)
     if scene.emission == "auto":
         entries["forms"] = RULE
     described = {

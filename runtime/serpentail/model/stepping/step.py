@@ -26,14 +26,13 @@ from ...compiling.threads import MIN_STATES_PER_THREAD, shared
 from ..library import WHY
 from ..parameters import RunParameters
 from .held import Held
-from .lanes import GroundLaneSteps, LaneSteps
+from .lanes import ENTRIES, LaneSteps
 from .singly import SingleSteps
 
 if TYPE_CHECKING:
     from ..model import Model
 
-LANES = {"rk4": LaneSteps, "implicit_euler": GroundLaneSteps}
-METHODS = tuple(LANES)
+METHODS = ("rk4", "implicit_euler")
 MOST_STEPS = 10_000  # in one call; for more, `simulate` checks for signals in between
 LEGS = 8  # angles (rad) and rates (rad/s) of both legs
 SINGLY_LEAST = 32  # steps that are worth a thread, made singly
@@ -67,13 +66,12 @@ class Stepping:
 
     def maker(self, model: Model, held: Held) -> tuple[SingleSteps | LaneSteps, int]:
         """Return what makes steps of runs, and the number of runs that is worth a thread."""
-        kind, batches = LANES[held.method], model.batch_library
-        entry = model.manifest.get(kind.entry)
+        entry = model.manifest.get(ENTRIES[held.method])
         if entry is None or held.runs < entry["states"]:
             return self.singly, max(1, SINGLY_LEAST // held.steps)
         if held.method not in self.lanes:
-            source = batches.sources[kind.entry]
-            self.lanes[held.method] = kind(model.manifest, source, self.singly)
+            lanes = LaneSteps(model.manifest, model.batch_library, held.method, self.singly)
+            self.lanes[held.method] = lanes
         return self.lanes[held.method], max(entry["states"], LANES_LEAST // (4 * held.steps))
 
 

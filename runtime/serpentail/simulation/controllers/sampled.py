@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ...basics.checks import number, numbers_in, refusal
 from ...basics.errors import SimulationError
 from ...basics.short_repr import brief
-from .parts import OwnState, Parts
+from .parts import ControllerState, Parts
 
 SAME = 1e-6  # of the time between ticks: closer times count as equal
 MOST_TICKS = 1_000_000  # of a run: steps end at each
@@ -71,8 +71,8 @@ class Sampled:
 
     def parts(self, nt: int) -> Parts:
         """Return its parts in a run, with that run's own memory."""
-        held = Held(self, nt)
-        return Parts(user=held, own=OwnState(held.begin, dict, self.stops))
+        torques = SampledTorques(self, nt)
+        return Parts(user=torques, state=ControllerState(torques.begin, dict, self.stops))
 
     def stops(self, start: float, end: float) -> list[float]:
         """Return the times (s) from start to end at which it measures, or its torques change."""
@@ -86,7 +86,7 @@ class Sampled:
         return [*map(float, both[apart])]
 
 
-class Held:
+class SampledTorques:
     """The torques of one run: those that act now, and those that will act after the delay."""
 
     def __init__(self, law: Sampled, nt: int):

@@ -1,28 +1,79 @@
-"""Outcomes of many runs, as arrays from which that of a single run is made."""
+"""What became of runs: the samples of a single one, and the outcomes of many as arrays."""
 
-from collections.abc import Mapping
-from typing import Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...basics.errors import SimulationError
-from .single import COUNTS, Memory, Outcome
+from ...basics.plausible_values import LARGEST
+from ...model.library import STEP_TOO_SMALL, TOO_MANY_STEPS, WHY
+
+if TYPE_CHECKING:
+    from .single import Memory
+
+SHORT_STEPS = (STEP_TOO_SMALL, TOO_MANY_STEPS)  # statuses: the steps became too short
+COUNTS = ("steps", "rejected", "evaluations", "factorisations")
 
 
-def told_by(records: np.ndarray, memory: Memory, runs: np.ndarray) -> dict[str, Any]:
-    """Return the content of the C records of some runs, as ``keep_all`` takes it."""
-    told = {name: records[name] for name in (*COUNTS, "done")}
-    return told | {"ends": records["t"], "ledger": memory.state["ledger"][runs]}
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Samples of a motion up to its end, its ledger, and the error that ended it, if any."""
+
+    t: np.ndarray
+    q: np.ndarray
+    v: np.ndarray
+    tau: np.ndarray
+    bristles: np.ndarray
+    ledger: np.ndarray
+    info: dict[str, Any]
+    failure: BaseException | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """Outcome of a run: samples written, end (s), ledger, counts and events, failure, stop."""
+
+    done: int
+    end: float
+    ledger: np.ndarray
+    info: dict[str, Any]
+    failure: BaseException | None = None
+    stop: dict[str, Any] | None = None  # between samples: t (s) and a row of every array
+
+
+def sampled(times: np.ndarray, arrays: dict[str, np.ndarray], outcome: Outcome) -> Samples:
+    """Return what a run wrote to q, v, tau, bristles, with the state of its stop as last sample."""
+    t, done, stop = times[: outcome.done].copy(), outcome.done, outcome.stop
+    rows = {name: a[:done].astype(float).reshape(done, a[0].size) for name, a in arrays.items()}
+    if stop is not None:
+        t = np.append(t, stop["t"])
+        rows = {name: np.vstack([a, stop[name]]).astype(float) for name, a in rows.items()}
+    rows["bristles"] = rows["bristles"].reshape(len(t), rows["bristles"].shape[1] // 2, 2)
+    return Samples(t, **rows, ledger=outcome.ledger, info=outcome.info, failure=outcome.failure)
+
+
+def failed(status: int, t: float, extremes: tuple[float, float] = (0, 0)) -> SimulationError:
+    """Return the error that a status of the C interface means.
+
+    extremes: largest torque (N m) and rate of a tail coordinate (rad/s) so far.
+    """
+    torque, rate = extremes
+    words = f"at t = {t:.6g} s {WHY[status]}"
+    if status in SHORT_STEPS and torque and rate > LARGEST["rad/s"][0]:
+        words += f" Torques reach {torque:.3g} N m, and a joint {rate:.3g} rad/s: is a torque far"
+        words += " too large?"
+    return SimulationError(words)
 
 
 class Outcomes:
     """Outcomes of runs: samples written (``done``), ``ends`` (s), ledgers and counts by run.
 
-    failures and stops: of some runs, by their numbers; ``told``: further info of single runs.
-    Several threads may store outcomes at once.
+    failures, stops and infos: of some runs, by their numbers. Several threads may store outcomes at
+    once.
     """
 
-    def __init__(self, memory: Memory):
+    def __init__(self, memory: "Memory"):
         runs = memory.start.runs
         self.ended = np.zeros(runs, bool)
         self.count = 0  # number of runs that ended, for progress
@@ -32,29 +83,23 @@ class Outcomes:
         self.counts = {name: np.zeros(runs, int) for name in COUNTS}
         self.failures: dict[int, BaseException] = {}
         self.stops: dict[int, dict[str, Any]] = {}
-        self.told: dict[int, dict[str, Any]] = {}
+        self.infos: dict[int, dict[str, Any]] = {}
 
     def __len__(self) -> int:
         return len(self.done)
 
     def __getitem__(self, k: int) -> Outcome:
         """Return the outcome of run k."""
-        counts = {name: int(each[k]) for name, each in self.counts.items()}
-        return Outcome(
-            int(self.done[k]),
-            float(self.ends[k]),
-            self.ledger[k],
-            self.told.get(k, counts),
-            self.failures.get(k),
-            self.stops.get(k),
-        )
+        info = self.infos.get(k) or {name: int(each[k]) for name, each in self.counts.items()}
+        failure, stop = self.failures.get(k), self.stops.get(k)
+        return Outcome(int(self.done[k]), float(self.ends[k]), self.ledger[k], info, failure, stop)
 
     def keep(self, k: int, outcome: Outcome) -> None:
         """Store the outcome of run k."""
         self.done[k], self.ends[k], self.ledger[k] = outcome.done, outcome.end, outcome.ledger
         for name, each in self.counts.items():
             each[k] = outcome.info.get(name, 0)
-        self.told[k] = outcome.info
+        self.infos[k] = outcome.info
         if outcome.failure is not None:
             self.failures[k] = outcome.failure
         if outcome.stop is not None:
@@ -62,20 +107,17 @@ class Outcomes:
         self.ended[k] = True
         self.count += 1
 
-    def keep_all(self, runs: np.ndarray | slice, numbers: Mapping[str, Any]) -> None:
-        """Store the outcomes of runs that neither failed nor stopped.
-
-        done, ends, ledger and counts: a number each, or one for each run.
-        """
-        self.done[runs], self.ends[runs] = numbers["done"], numbers["ends"]
-        self.ledger[runs] = numbers["ledger"]
+    def keep_all(self, runs: np.ndarray, records: np.ndarray, ledger: np.ndarray) -> None:
+        """Store the outcomes of runs that the C made by these records, with their ledgers."""
+        self.done[runs], self.ends[runs] = records["done"], records["t"]
+        self.ledger[runs] = ledger
         for name, each in self.counts.items():
-            each[runs] = numbers.get(name, 0)
+            each[runs] = records[name]
         self.ended[runs] = True
-        self.count += np.size(self.done[runs])
+        self.count += len(runs)
 
     def fail_rest(self, words: str) -> None:
         """Give each run that has not ended its own error."""
         for k in np.flatnonzero(~self.ended).tolist():
-            self.failures[k], self.told[k] = SimulationError(words), {}
+            self.failures[k], self.infos[k] = SimulationError(words), {}
         self.ended[:] = True

@@ -9,9 +9,10 @@ from serpentail_scene.layout import QUATERNION
 
 from ...basics.errors import SimulationError
 from ...model.library import NOT_FINITE
-from .single import CompiledRun, Samples, failed
-from ..methods import IntegrationMethod
 from ..callback import Watched, rest
+from ..methods import IntegrationMethod
+from .outcomes import Samples, failed
+from .single import CompiledRun
 
 Part = tuple[float, np.ndarray, float]  # start (s), state there, end (s)
 
@@ -89,10 +90,9 @@ class SampleWriter:
 
 
 @np.errstate(all="ignore")  # a trial step may overflow, and is then taken again, shorter
-def integrate_by_scipy(
-    run: CompiledRun, method: IntegrationMethod, watched: Watched | None = None
-) -> Samples:
+def integrate_by_scipy(run: CompiledRun, watched: Watched | None = None) -> Samples:
     """Return the samples of a run, made from stop to stop, and the error that ended it, if any."""
+    method = run.method
     run.actuation.begin(run.record)
     rate = StateRate(run, method.name == "dop853")  # a step with NaN is repeated, shorter
     samples, counts = SampleWriter(rate, run.start.times, watched), {"steps": 0, "evaluations": 0}
@@ -110,7 +110,7 @@ def integrate_by_scipy(
         if not samples.states:
             raise
         failure = error
-    info = counts | run.actuation.told()
+    info = counts | run.actuation.info()
     return replace(samples.part(0), info=info, failure=failure)
 
 

@@ -1,4 +1,4 @@
-"""Runs of the generated C on arrays of NumPy, and the outcome of each."""
+"""Runs that the generated C makes one after another on arrays of NumPy."""
 
 import ctypes
 import time
@@ -9,51 +9,21 @@ from typing import Any
 
 import numpy as np
 
-from ...basics.errors import SimulationError
-from ...basics.plausible_values import LARGEST
 from ...model.kernel import address_of, aligned
-from ...model.lazy import kept
-from ...model.library import PAUSED, STEP_TOO_SMALL, STOPPED_AT_EVENT, TOO_MANY_STEPS, WHY
+from ...model.library import PAUSED, STOPPED_AT_EVENT
 from ...model.model import Model
 from ...model.parameters import RunParameters
-from ..acting import Acting
-from ..decay import FastestDecay
+from ..controllers.actuation import Acting
 from ..ground import MOST_EVENTS, Ground
 from ..methods import IntegrationMethod
 from ..records import Records
 from ..start import Start
+from .outcomes import COUNTS, Outcome, Samples, failed, sampled
 
 MOST_STEPS = 2**31 - 1  # that the C interface counts
 PAUSE = 100  # steps before the first check for signals, such as Ctrl-C
 PAUSE_S = 0.05  # s between checks: the time between pauses grows to this
-STEPS = (STEP_TOO_SMALL, TOO_MANY_STEPS)  # statuses: the steps became too short
-COUNTS = ("steps", "rejected", "evaluations", "factorisations")
-
-
-@dataclass(frozen=True, eq=False)
-class Samples:
-    """Samples of a motion up to its end, its ledger, and the error that ended it, if any."""
-
-    t: np.ndarray
-    q: np.ndarray
-    v: np.ndarray
-    tau: np.ndarray
-    bristles: np.ndarray
-    ledger: np.ndarray
-    info: dict[str, Any]
-    failure: BaseException | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Outcome:
-    """Outcome of a run: samples written, end (s), ledger, counts and events, failure, stop."""
-
-    done: int
-    end: float
-    ledger: np.ndarray
-    info: dict[str, Any]
-    failure: BaseException | None = None
-    stop: dict[str, Any] | None = None  # between samples: t (s) and a row of every array
+MOST_AT_ONCE = 512  # runs of one call: more would not make the rest of a call cheaper
 
 
 class Memory:
@@ -89,13 +59,6 @@ class Memory:
         for member, array in arrays.items():
             if records.has("run", member):
                 self.places.append((member, address_of(array), array.strides[0]))
-
-    def restart(self, q0: np.ndarray, v0: np.ndarray) -> None:
-        """Take other starts q0 (k, nq), v0 (k, nv)."""
-        self.state["q"][...], self.state["v"][...], self.state["ledger"][...] = q0, v0, 0
-        self.peaks[...] = 0
-        if self.ground.points:
-            self.state["bristles"][...] = self.ground.bristles.reshape(self.start.runs, -1)
 
     def part(self, k: int, first: int, done: int) -> Samples:
         """Return what run k has written so far, from a sample on."""
@@ -155,16 +118,6 @@ class CompiledRun:
         records["drive"] = self.acting.drives[numbers]
         return records
 
-    def again(self, q0: np.ndarray, v0: np.ndarray) -> None:
-        """Prepare the first run again, from another start."""
-        self.memory.restart(q0, v0)
-        self.begin(0)
-
-    @kept
-    def decay(self) -> FastestDecay:
-        """How fast its joint damping is, for other starts."""
-        return FastestDecay(self.acting, self.start.runs, self.memory.parameters)
-
     @property
     def model(self) -> Model:
         """The model that moves."""
@@ -201,7 +154,7 @@ class CompiledRun:
     def outcome(self, status: int) -> Outcome:
         """Return the outcome of the run, with the meaning of a status."""
         record = self.record
-        info = {name: getattr(record, name) for name in COUNTS} | self.actuation.told()
+        info = {name: getattr(record, name) for name in COUNTS} | self.actuation.info()
         if self.ground.points:
             count = min(record.events, MOST_EVENTS)
             times, kinds = self.event_times[:count].tolist(), self.event_kinds[:count].tolist()
@@ -251,26 +204,6 @@ class CompiledRun:
         return row | {"t": self.record.t, "tau": tau}
 
 
-def sampled(times: np.ndarray, arrays: dict[str, np.ndarray], outcome: Outcome) -> Samples:
-    """Return what a run wrote to q, v, tau, bristles, with the state of its stop as last sample."""
-    t, done, stop = times[: outcome.done].copy(), outcome.done, outcome.stop
-    rows = {name: a[:done].astype(float).reshape(done, a[0].size) for name, a in arrays.items()}
-    if stop is not None:
-        t = np.append(t, stop["t"])
-        rows = {name: np.vstack([a, stop[name]]).astype(float) for name, a in rows.items()}
-    bristles = rows["bristles"].reshape(len(t), rows["bristles"].shape[1] // 2, 2)
-    return Samples(
-        t,
-        rows["q"],
-        rows["v"],
-        rows["tau"],
-        bristles,
-        outcome.ledger,
-        outcome.info,
-        outcome.failure,
-    )
-
-
 def start_members(method: IntegrationMethod) -> dict[str, Any]:
     """Return a method's settings as members of the run's record."""
     members: dict[str, Any] = dict(method.settings)
@@ -279,14 +212,33 @@ def start_members(method: IntegrationMethod) -> dict[str, Any]:
     return members
 
 
-def failed(status: int, t: float, extremes: tuple[float, float] = (0, 0)) -> SimulationError:
-    """Return the error that a status of the C interface means.
+@dataclass(frozen=True, eq=False)
+class Ended:
+    """Runs that came to an end in C: their numbers, records and statuses."""
 
-    extremes: largest torque (N m) and rate of a tail coordinate (rad/s) so far.
-    """
-    torque, rate = extremes
-    words = f"at t = {t:.6g} s {WHY[status]}"
-    if status in STEPS and torque and rate > LARGEST["rad/s"][0]:
-        words += f" Torques reach {torque:.3g} N m, and a joint {rate:.3g} rad/s: is a torque far"
-        words += " too large?"
-    return SimulationError(words)
+    runs: np.ndarray
+    records: np.ndarray
+    statuses: np.ndarray
+
+
+class RunsInTurn:
+    """Makes runs without Python between them, a few at a time, so that it can react then."""
+
+    def __init__(self, run: CompiledRun):
+        self.run, self.pause, self.at_once = run, PAUSE, 1
+        self.function = run.function("rollouts", ctypes.c_int, ctypes.c_void_p)
+
+    def make(self, runs: list[int], ended: Event) -> Ended:
+        """Make runs; return those that ended, fewer if ``ended`` is set."""
+        numbers, records = np.array(runs), self.run.records_of(runs)
+        statuses, done = np.zeros(len(runs), np.intc), 0
+        while done < len(runs) and not ended.is_set():
+            records["pause"][done:], begun = self.pause, time.perf_counter()
+            rest = len(runs) - done
+            done += self.function(address_of(records[done:]), rest, address_of(statuses[done:]))
+            quick = time.perf_counter() - begun < PAUSE_S
+            if done == len(runs):
+                self.at_once = min(2 * self.at_once, MOST_AT_ONCE) if quick else 1
+            elif quick:
+                self.pause *= 2
+        return Ended(numbers[:done], records[:done], statuses[:done])
