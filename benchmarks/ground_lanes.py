@@ -15,7 +15,7 @@ import numpy as np
 import serpentail as st
 from benchmarks.fixtures import built, label
 from serpentail.model.batch import MIN_BATCH
-from serpentail.model.stepping.held import Held
+from serpentail.model.stepping.makers import StepCall
 
 SIZES = ((1, 3), (3, 4), (3, None))
 FUNCTIONS = ("contact_dynamics", "contact_points")
@@ -113,7 +113,7 @@ def step_times(model: st.Model, values: dict[str, np.ndarray]) -> tuple[float, f
     def once(way: int) -> None:
         state = [values[name].copy() for name in ("q", "v", "tau", "bristles")]
         statuses = np.zeros(RUNS, np.intc)
-        held = Held(*state, legs, parameters, H, STEPS, "implicit_euler", statuses)
+        held = StepCall(*state, legs, parameters, H, STEPS, "implicit_euler", statuses)
         maker = (stepping.singly, stepping.maker(model, held)[0])[way]
         maker.make(held, 0, RUNS)
         if statuses.any():

@@ -12,7 +12,7 @@ from ..basics.errors import SimulationError, StateError
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
 from .energies import measured
-from .ground import Ground
+from .ground import GroundSettings
 from .runs.outcomes import Samples
 
 EVERY = 0.1  # s from the end of one call to the next, at least
@@ -32,7 +32,7 @@ def checked_watch(watch: Any, many: bool) -> Watch | None:
 class Watched:
     """A run that is watched: the number of samples passed on, and the time of the last call."""
 
-    def __init__(self, watch: Watch, model: Model, ground: Ground):
+    def __init__(self, watch: Watch, model: Model, ground: GroundSettings):
         self.watch, self.model, self.ground = watch, model, ground
         self.seen, self.told = 0, -np.inf
 

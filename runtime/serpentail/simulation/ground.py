@@ -25,7 +25,7 @@ MOST_EVENTS = 10_000  # that are kept
 
 
 @dataclass(frozen=True, eq=False)
-class Ground:
+class GroundSettings:
     """Checked settings of runs on the ground, bristles (k, points, 2); without contacts none."""
 
     groups: dict[str, int] = field(default_factory=dict)
@@ -36,7 +36,7 @@ class Ground:
     @classmethod
     def checked(
         cls, model: Model, start: Start, parameters: RunParameters, settings: dict
-    ) -> "Ground":
+    ) -> "GroundSettings":
         """Take legs, bristles0 and stop_at out of settings; SimulationError if one is wrong."""
         choices = {name: settings.pop(name, None) for name in ("legs", "bristles0", "stop_at")}
         groups = model.contacts

@@ -13,7 +13,7 @@ from ..model.model import Model
 from ..model.parameters import RunParameters, Values
 from .controllers.actuation import Acting
 from .controllers.controller import Controller
-from .ground import Ground
+from .ground import GroundSettings
 from .methods import (
     ADAPTIVE,
     SCIPY,
@@ -25,7 +25,7 @@ from .methods import (
     usual_most_steps,
 )
 from .records import Records
-from .runs.single import Memory
+from .runs.single import RunSet
 from .start import EPS, MOST_STEPS, Start, refuse_endless
 
 DURATIONS = ("duration", "t_end", "tf", "span", "T", "time")  # what others call t_span
@@ -33,8 +33,8 @@ DURATIONS = ("duration", "t_end", "tf", "span", "T", "time")  # what others call
 
 def prepared(
     model: Model, start: Start, controller: Controller, method: str, settings: dict[str, Any]
-) -> tuple[Memory, Acting, IntegrationMethod]:
-    """Return what runs need; SimulationError or ModelError if a setting is wrong."""
+) -> RunSet:
+    """Return the runs to make; SimulationError or ModelError if a setting is wrong."""
     changes = settings.pop("parameters", None)
     if changes is not None and not start.many:
         raise ModelError(
@@ -42,14 +42,14 @@ def prepared(
             "model.with_parameters"
         )
     parameters = model.parameters_of_runs(changes, start.runs)
-    ground = Ground.checked(model, start, parameters, settings)
+    ground = GroundSettings.checked(model, start, parameters, settings)
     acting = Acting(Records(model), controller, start, ground.legs.curve if ground.legs else None)
     choice = choose(acting, start, parameters, method, settings)
     if ground.stop_at and choice.name in SCIPY:
         raise SimulationError(
             f"stop_at: {choice.name} does not detect events: use tsit5 or ros34pw2"
         )
-    return Memory(acting.records, start, ground, parameters), acting, choice
+    return RunSet(acting, start, ground, parameters, choice)
 
 
 def choose(
@@ -128,8 +128,8 @@ class FastestDecay:
         # tracking compensates the passive tail's own torques
         tracked = bool(parts) and all(each.pfl is not None for each in parts)
         values = {} if tracked else parameters.values
-        self.damping = acted + own(values, "tail_damping", (runs, nt))
-        self.stiffness = own(values, "tail_stiffness", (runs, nt))
+        self.damping = acted + of_tail(values, "tail_damping", (runs, nt))
+        self.stiffness = of_tail(values, "tail_stiffness", (runs, nt))
         self.sprung = bool(self.stiffness.any())
         self.damped = bool(self.damping.any()) and "forward_dynamics" in model.generated
         if not self.damped:
@@ -168,9 +168,11 @@ class FastestDecay:
         return True
 
 
-def own(values: Values, name: str, shape: tuple[int, int]) -> np.ndarray:
+def of_tail(values: Values, name: str, shape: tuple[int, int]) -> np.ndarray:
     """Return a parameter of the passive tail in each run (runs, 2m); zeros without one."""
-    return np.broadcast_to(np.asarray(values.get(name, 0.0), float), shape)
+    if name not in values:
+        return np.zeros(shape)
+    return np.broadcast_to(np.asarray(values[name], float), shape)
 
 
 def fastest(mobility: np.ndarray, stiffness: np.ndarray, damping: np.ndarray) -> float:

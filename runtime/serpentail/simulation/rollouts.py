@@ -17,7 +17,7 @@ from ..motion.exports import Exports
 from ..motion.trajectory import MONOTONE, Trajectory
 from .audit import Audit
 from .energies import trajectory_or_error
-from .ground import Ground
+from .ground import GroundSettings
 from .runs.outcomes import Outcomes, Samples, sampled
 
 LATER = (*MONOTONE, "audit", "warnings")  # fields that are derived when they are first used
@@ -30,7 +30,7 @@ class Source:
 
     model: Model
     parameters: RunParameters
-    ground: Ground
+    ground: GroundSettings
     outcomes: Outcomes
     info: dict[str, Any]
 

@@ -21,14 +21,14 @@ from .callback import Watch, Watched, checked_watch
 from .controllers.actuation import Acting
 from .controllers.controller import Controller, remembers
 from .energies import trajectory_or_error
-from .ground import Ground
+from .ground import GroundSettings
 from .methods import SCIPY, IntegrationMethod
 from .prepare import prepared
 from .records import Records
 from .rollouts import Rollouts
 from .runs.batch import run_batch
 from .runs.outcomes import Samples
-from .runs.single import CompiledRun, Memory
+from .runs.single import CompiledRun, RunSet
 from .start import Start
 
 
@@ -133,7 +133,8 @@ def simulate(
 
     Eight or more flights are computed in SIMD lanes, several times as fast, if the method is
     "tsit5" or "rk4", if the torques are none, Damping, a TorqueTable, a TorqueCurve or Phases of
-    these, and if the C for lanes is compiled or its compilation pays off. The last digits then differ.
+    these, and if the C for lanes is compiled or its compilation pays off. The last digits then
+    differ.
 
     With a Python function as controller, or with one of SciPy's methods, the runs are made one
     after another in the calling thread. An exception of the function ends all runs, unless it is
@@ -159,22 +160,22 @@ def simulate(
     start = Start.checked(model, (q0, v0), t_span, settings.pop("output_step", None))
     watch = checked_watch(settings.pop("watch", None), start.many)
     threads = _threads(model, start, settings.pop("threads", None))
-    memory, acting, chosen = prepared(model, start, controller, method, settings)
+    runs = prepared(model, start, controller, method, settings)
     _doubt(start)
     clocks = read_clocks()
     if start.many:
-        return run_batch(memory, acting, chosen, threads).rollouts(spent(clocks))
-    samples = integrate(CompiledRun(memory, acting, chosen), watch)
-    info = samples.info | chosen.info | spent(clocks)
-    motion = trajectory_or_error(model, replace(samples, info=info), memory.ground)
+        return run_batch(runs, threads).rollouts(spent(clocks))
+    samples = integrate(runs, watch)
+    info = samples.info | runs.method.info | spent(clocks)
+    motion = trajectory_or_error(model, replace(samples, info=info), runs.ground)
     if not remembers(controller):
-        vars(motion)[AGAIN] = partial(_again, start, memory.ground, controller, chosen)
+        vars(motion)[AGAIN] = partial(_again, start, runs.ground, controller, runs.method)
     return motion
 
 
 def _again(
     start: Start,
-    ground: Ground,
+    ground: GroundSettings,
     controller: Controller,
     method: IntegrationMethod,
     coarse: int,
@@ -192,9 +193,8 @@ def _again(
         if start.start >= start.end:
             raise SimulationError(f"at t = {start.start:.6g} s a phase ends after the next one")
     acting = Acting(Records(model), controller, start, ground.legs.curve if ground.legs else None)
-    memory = Memory(acting.records, start, ground, model.parameters_of_runs(None, 1))
     method = method.coarser(coarse, start.interval)
-    samples = integrate(CompiledRun(memory, acting, method))
+    samples = integrate(RunSet(acting, start, ground, model.parameters_of_runs(None, 1), method))
     return trajectory_or_error(model, replace(samples, info=samples.info | method.info), ground)
 
 
@@ -240,17 +240,18 @@ def end_state(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return q (nq,) and v (nv,) at the end of a run by "tsit5", without energies and momenta."""
     start = Start.checked(model, (q0, v0), duration, duration)
-    samples = integrate(CompiledRun(*prepared(model, start, controller, "tsit5", {"rtol": rtol})))
+    samples = integrate(prepared(model, start, controller, "tsit5", {"rtol": rtol}))
     if samples.failure is not None:
         raise samples.failure
     return samples.q[-1], samples.v[-1]
 
 
-def integrate(run: CompiledRun, watch: Watch | None = None) -> Samples:
+def integrate(runs: RunSet, watch: Watch | None = None) -> Samples:
     """Return the samples of a single run; a function may watch them."""
-    watched = None if watch is None else Watched(watch, run.model, run.ground)
-    with Stage("simulate", run.model.name) as stage:
-        if run.method.name in SCIPY:
+    run = CompiledRun(runs)
+    watched = None if watch is None else Watched(watch, runs.model, runs.ground)
+    with Stage("simulate", runs.model.name) as stage:
+        if runs.method.name in SCIPY:
             from .runs.scipy_methods import integrate_by_scipy
 
             samples = integrate_by_scipy(run, watched)
@@ -264,6 +265,6 @@ def integrate(run: CompiledRun, watch: Watch | None = None) -> Samples:
 def _look(run: CompiledRun, stage: Stage, watched: Watched | None) -> None:
     """Report the progress of a run in C, and its new samples."""
     done = run.record.done
-    stage.tell(done / len(run.start.times))
+    stage.tell(done / len(run.runs.start.times))
     if watched is not None:
-        watched.look(done, lambda first: run.memory.part(run.k, first, done))
+        watched.look(done, lambda first: run.runs.part(run.k, first, done))

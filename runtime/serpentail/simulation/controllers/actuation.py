@@ -205,7 +205,7 @@ class Acting:
         self.distinct = [*dict.fromkeys(self._each)]
         self.alike = len(self.distinct) == 1
         drives = [ctypes.addressof(each.record) for each in self._each]
-        self.drives = np.broadcast_to(np.array(drives, np.uintp), start.runs)
+        self.drives = np.array(drives * (start.runs if len(drives) == 1 else 1), np.uintp)
 
     @property
     def model(self) -> Model:

@@ -14,13 +14,12 @@ from ...compiling.cores import threads as allowed
 from ...compiling.threads import in_turn
 from ...model.library import PAUSED
 from ...motion.derived import made
-from ..controllers.actuation import Acting
-from ..energies import EnergiesOfRuns, read_only
-from ..methods import SCIPY, IntegrationMethod
+from ..methods import SCIPY
 from ..rollouts import Rollouts, Source
+from .energies import EnergiesOfRuns, read_only
 from .lanes import LaneRuns, fit_lanes, worth_lanes
-from .outcomes import Outcome, Outcomes, failed
-from .single import CompiledRun, Memory, RunsInTurn
+from .outcomes import Outcomes, RunOutcome, failed
+from .single import CompiledRun, RunSet, RunsInTurn
 
 PILOTS = 64  # runs that are timed before code is compiled for the others
 
@@ -28,38 +27,35 @@ PILOTS = 64  # runs that are timed before code is compiled for the others
 class BatchRuns:
     """Runs in progress: threads take them in turn, and write samples, measures and outcomes."""
 
-    def __init__(
-        self, memory: Memory, acting: Acting, method: IntegrationMethod, threads: int | None
-    ):
-        self.memory, self.acting, self.method = memory, acting, method
-        self.model, runs = memory.records.model, memory.start.runs
-        self.of_python = method.name in SCIPY or acting.of_python
-        self.threads = 1 if self.of_python else min(allowed(threads), runs)
+    def __init__(self, runs: RunSet, threads: int | None):
+        self.runs, self.model, self.method = runs, runs.model, runs.method
+        self.of_python = runs.method.name in SCIPY or runs.acting.of_python
+        self.threads = 1 if self.of_python else min(allowed(threads), runs.start.runs)
         self.lanes: LaneRuns | None = None
-        self.outcomes = Outcomes(memory)
+        self.outcomes = Outcomes(runs)
         self.source = Source(
-            self.model, memory.parameters, memory.ground, self.outcomes, method.info
+            self.model, runs.parameters, runs.ground, self.outcomes, runs.method.info
         )
-        self.energies = EnergiesOfRuns(memory, method, self.source, self.threads)
+        self.energies = EnergiesOfRuns(runs, self.source, self.threads)
         self.stop: KeyboardInterrupt | None = None  # what ended all runs early
 
     def make(self, stage: Stage) -> None:
         """Make all runs, those in lanes that can be and for which it pays."""
-        runs, singly = range(self.memory.start.runs), 0
-        if fit_lanes(self.model, self.acting, self.method):
+        runs, singly = range(self.runs.start.runs), 0
+        if fit_lanes(self.runs):
             singly = self._pilots(runs, stage)
         rest = runs[singly:]
         if self.lanes is not None:
             parts, lanes = self.lanes.parts(rest, self.threads), self.lanes
             self._share(parts, lambda found, ended: self._run_lanes(lanes, found, ended), stage)
-        elif self.of_python or self.acting.keeps or self.memory.ground.points:
+        elif self.of_python or self.runs.acting.keeps or self.runs.ground.points:
             self._share(rest, self._run_singly, stage)
         else:
             self._share(rest, self._run_in_turn, stage)
 
     def _pilots(self, runs: range, stage: Stage) -> int:
         """Decide whether lanes pay; return the number of runs that were made to find out."""
-        first, span = 0, self.memory.start.end - self.memory.start.start
+        first, span = 0, self.runs.start.end - self.runs.start.start
         steps = ceil(span / self.method.settings["step"]) if self.method.name == "rk4" else 0
         pays = worth_lanes(self.model, len(runs), steps)
         if not pays and not steps:
@@ -69,7 +65,7 @@ class BatchRuns:
             steps = int(self.outcomes.counts["steps"][:first].sum()) // first
             pays = first < len(runs) and worth_lanes(self.model, len(runs) - first, steps)
         if pays:
-            self.lanes = LaneRuns(self.memory, self.acting, self.method)
+            self.lanes = LaneRuns(self.runs)
         return first
 
     def _share(
@@ -90,7 +86,7 @@ class BatchRuns:
 
     def _run_singly(self, runs: Iterator[int], ended: Event) -> None:
         """Make runs in one thread until none is left, or ``ended`` is set."""
-        run = CompiledRun(self.memory, self.acting, self.method)
+        run = CompiledRun(self.runs)
         measure = self.energies.of_thread()
         for k in runs:
             run.begin(k)
@@ -106,8 +102,8 @@ class BatchRuns:
 
     def _run_in_turn(self, runs: Iterator[int], ended: Event) -> None:
         """The same for runs that need no Python until they end."""
-        maker = RunsInTurn(CompiledRun(self.memory, self.acting, self.method))
-        ledger = self.memory.state["ledger"]
+        maker = RunsInTurn(CompiledRun(self.runs))
+        ledger = self.runs.state["ledger"]
         measure, most = self.energies.of_thread(), len(self.outcomes) // (4 * self.threads) + 1
         while numbers := list(islice(runs, min(maker.at_once, most))):
             found = maker.make(numbers, ended)
@@ -126,21 +122,21 @@ class BatchRuns:
                 if records is None:
                     self._run_in_turn(iter(runs.tolist()), ended)
                 else:
-                    self.outcomes.keep_all(runs, records, self.memory.state["ledger"][runs])
+                    self.outcomes.keep_all(runs, records, self.runs.state["ledger"][runs])
                     measure(runs)
 
-    def _by_scipy(self, run: CompiledRun) -> Outcome:
+    def _by_scipy(self, run: CompiledRun) -> RunOutcome:
         """Return the outcome of a run by one of SciPy's methods; store its samples."""
         from .scipy_methods import integrate_by_scipy
 
         try:
             samples = integrate_by_scipy(run)
         except SimulationError as error:
-            return Outcome(0, self.memory.start.start, run.state["ledger"], {}, error)
+            return RunOutcome(0, self.runs.start.start, run.state["ledger"], {}, error)
         done = len(samples.t)
-        for name, array in self.memory.out.items():
+        for name, array in self.runs.out.items():
             array[run.k, :done] = getattr(samples, name).reshape(done, array.shape[2])
-        return Outcome(done, samples.t[-1], samples.ledger, samples.info, samples.failure)
+        return RunOutcome(done, samples.t[-1], samples.ledger, samples.info, samples.failure)
 
     def rollouts(self, info: dict[str, Any]) -> Rollouts:
         """Return the rollouts, with more info; after Ctrl-C raise it with these as ``motion``."""
@@ -149,8 +145,8 @@ class BatchRuns:
         counts = {name: int(each.sum()) for name, each in self.outcomes.counts.items()}
         abreast = 1 if self.lanes is None else self.lanes.states
         shared = {"model": self.model.name, "threads": self.threads, "abreast": abreast}
-        fields = {"errors": errors, "info": counts | self.method.info | shared | info}
-        fields |= self._arrays() | {"source": self.source}
+        fields: dict[str, Any] = {"errors": errors, "source": self.source}
+        fields |= self._arrays() | {"info": counts | self.method.info | shared | info}
         found = made(Rollouts, fields, self.energies)
         if self.stop is not None:
             vars(self.stop)["motion"] = found
@@ -159,30 +155,28 @@ class BatchRuns:
 
     def _arrays(self) -> dict[str, np.ndarray]:
         """Return samples, nan after the end of a run as in the energies, read-only."""
-        done, start = self.outcomes.done, self.memory.start
+        done, start = self.outcomes.done, self.runs.start
         for k in np.flatnonzero(done < len(start.times)).tolist():
-            for array in (*self.memory.out.values(), *self.energies.arrays.values()):
+            for array in (*self.runs.out.values(), *self.energies.arrays.values()):
                 array[k, done[k] :] = np.nan
-        arrays = {name: np.asarray(array, float) for name, array in self.memory.out.items()}
-        shape = (*arrays["q"].shape[:2], self.memory.ground.points, 2)
+        arrays = {name: np.asarray(array, float) for name, array in self.runs.out.items()}
+        shape = (*arrays["q"].shape[:2], self.runs.ground.points, 2)
         arrays["bristles"] = arrays["bristles"].reshape(shape)
         arrays["t"], arrays["ends"] = np.array(start.times), self.outcomes.ends
         return {name: read_only(array) for name, array in arrays.items()}
 
 
-def in_c(run: CompiledRun, ended: Event) -> Outcome | None:
+def in_c(run: CompiledRun, ended: Event) -> RunOutcome | None:
     """Return the outcome of a run; None if it was given up."""
     status = run.go(ended)
     return None if status == PAUSED and run.actuation.error is None else run.outcome(status)
 
 
-def run_batch(
-    memory: Memory, acting: Acting, method: IntegrationMethod, threads: int | None
-) -> BatchRuns:
+def run_batch(set_of_runs: RunSet, threads: int | None) -> BatchRuns:
     """Make all runs, in several threads unless Python acts in them; Ctrl-C ends all."""
-    runs = BatchRuns(memory, acting, method, threads)
+    runs = BatchRuns(set_of_runs, threads)
     try:
-        with Stage("simulate", f"{memory.start.runs} runs of {runs.model.name}") as stage:
+        with Stage("simulate", f"{len(runs.outcomes)} runs of {runs.model.name}") as stage:
             runs.make(stage)
     except KeyboardInterrupt as stop:
         runs.stop = stop

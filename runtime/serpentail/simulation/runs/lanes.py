@@ -12,9 +12,7 @@ from ...model.kernel import address_of, aligned
 from ...model.library import PAUSED
 from ...model.model import Model
 from ...model.structures import structure
-from ..controllers.actuation import Acting
-from ..methods import IntegrationMethod
-from .single import PAUSE, CompiledRun, Memory, called
+from .single import PAUSE, CompiledRun, RunSet, called
 
 METHODS = ("rk4", "tsit5")
 AT_ONCE = 64  # groups of runs that a thread takes up at once
@@ -24,11 +22,11 @@ COMPILE_S_PER_BYTE = 25e-6  # of C
 STEP_SAVES_S, OPERATION_SAVES_S = 4e-7, 2e-10  # each step; each operation of forward dynamics
 
 
-def fit_lanes(model: Model, acting: Acting, method: IntegrationMethod) -> bool:
+def fit_lanes(runs: RunSet) -> bool:
     """Tell whether runs can be made in lanes: flights under damping and torques."""
-    if method.name not in METHODS or "flights" not in model.manifest:
+    if runs.method.name not in METHODS or "flights" not in runs.model.manifest:
         return False
-    parts = [parts for each in acting.distinct for parts in each.parts]
+    parts = [parts for each in runs.acting.distinct for parts in each.parts]
     return all(each.pfl is each.native is each.user is None for each in parts)
 
 
@@ -50,14 +48,14 @@ def worth_lanes(model: Model, runs: int, steps: int) -> bool:
 
 
 class LaneRuns:
-    """Runs of a memory, each with its own clock."""
+    """Runs of a set, each with its own clock."""
 
-    def __init__(self, memory: Memory, acting: Acting, method: IntegrationMethod):
-        self.memory, self.acting, self.method = memory, acting, method
-        model, entry = memory.records.model, memory.records.model.manifest["flights"]
+    def __init__(self, all_runs: RunSet):
+        self.all_runs, model = all_runs, all_runs.model
+        entry = model.manifest["flights"]
         self.states, self.work = entry["states"], entry["work"]
         members = tuple(map(tuple, entry["rollouts"]))
-        self.record = structure("side_by_side", members, memory.records.real)
+        self.record = structure("side_by_side", members, all_runs.records.real)
         name = f"{model.name}_side_by_side_rollouts"
         self.function = model.batch_library.rollouts.function(name)
 
@@ -69,10 +67,10 @@ class LaneRuns:
 
     def go(self, runs: range, ended: Event) -> Iterator[tuple[np.ndarray, np.ndarray | None]]:
         """Make runs; yield their numbers and records, None for those that must be made alone."""
-        records = CompiledRun(self.memory, self.acting, self.method).records_of(runs)
+        records = CompiledRun(self.all_runs).records_of(runs)
         statuses = np.full(len(runs), PAUSED, np.intc)
         lanes = np.full(self.states, -1, np.dtype(ctypes.c_long))
-        work = aligned(self.work, self.memory.records.dtype)
+        work = aligned(self.work, self.all_runs.records.dtype)
         arrays = {"runs": records, "statuses": statuses, "lanes": lanes, "work": work}
         places = {name: address_of(array) for name, array in arrays.items()}
         record: Any = self.record(count=len(runs), pause=PAUSE, **places)

@@ -10,7 +10,7 @@ from ...basics.plausible_values import LARGEST
 from ...model.library import STEP_TOO_SMALL, TOO_MANY_STEPS, WHY
 
 if TYPE_CHECKING:
-    from .single import Memory
+    from .single import RunSet
 
 SHORT_STEPS = (STEP_TOO_SMALL, TOO_MANY_STEPS)  # statuses: the steps became too short
 COUNTS = ("steps", "rejected", "evaluations", "factorisations")
@@ -31,8 +31,8 @@ class Samples:
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
-    """Outcome of a run: samples written, end (s), ledger, counts and events, failure, stop."""
+class RunOutcome:
+    """RunOutcome of a run: samples written, end (s), ledger, counts and events, failure, stop."""
 
     done: int
     end: float
@@ -42,15 +42,17 @@ class Outcome:
     stop: dict[str, Any] | None = None  # between samples: t (s) and a row of every array
 
 
-def sampled(times: np.ndarray, arrays: dict[str, np.ndarray], outcome: Outcome) -> Samples:
+def sampled(times: np.ndarray, arrays: dict[str, np.ndarray], outcome: RunOutcome) -> Samples:
     """Return what a run wrote to q, v, tau, bristles, with the state of its stop as last sample."""
     t, done, stop = times[: outcome.done].copy(), outcome.done, outcome.stop
     rows = {name: a[:done].astype(float).reshape(done, a[0].size) for name, a in arrays.items()}
     if stop is not None:
         t = np.append(t, stop["t"])
         rows = {name: np.vstack([a, stop[name]]).astype(float) for name, a in rows.items()}
-    rows["bristles"] = rows["bristles"].reshape(len(t), rows["bristles"].shape[1] // 2, 2)
-    return Samples(t, **rows, ledger=outcome.ledger, info=outcome.info, failure=outcome.failure)
+    stretch = rows.pop("bristles")
+    bristles = stretch.reshape(len(t), stretch.shape[1] // 2, 2)
+    ledger, info, failure = outcome.ledger, outcome.info, outcome.failure
+    return Samples(t, **rows, bristles=bristles, ledger=ledger, info=info, failure=failure)
 
 
 def failed(status: int, t: float, extremes: tuple[float, float] = (0, 0)) -> SimulationError:
@@ -73,13 +75,13 @@ class Outcomes:
     once.
     """
 
-    def __init__(self, memory: "Memory"):
-        runs = memory.start.runs
+    def __init__(self, made: "RunSet"):
+        runs = made.start.runs
         self.ended = np.zeros(runs, bool)
         self.count = 0  # number of runs that ended, for progress
         self.done = np.zeros(runs, int)
-        self.ends = np.full(runs, memory.start.start)
-        self.ledger = np.zeros_like(memory.state["ledger"])
+        self.ends = np.full(runs, made.start.start)
+        self.ledger = np.zeros_like(made.state["ledger"])
         self.counts = {name: np.zeros(runs, int) for name in COUNTS}
         self.failures: dict[int, BaseException] = {}
         self.stops: dict[int, dict[str, Any]] = {}
@@ -88,13 +90,19 @@ class Outcomes:
     def __len__(self) -> int:
         return len(self.done)
 
-    def __getitem__(self, k: int) -> Outcome:
+    def __getitem__(self, k: int) -> RunOutcome:
         """Return the outcome of run k."""
-        info = self.infos.get(k) or {name: int(each[k]) for name, each in self.counts.items()}
-        failure, stop = self.failures.get(k), self.stops.get(k)
-        return Outcome(int(self.done[k]), float(self.ends[k]), self.ledger[k], info, failure, stop)
+        counts = {name: int(each[k]) for name, each in self.counts.items()}
+        return RunOutcome(
+            int(self.done[k]),
+            float(self.ends[k]),
+            self.ledger[k],
+            self.infos.get(k, counts),
+            self.failures.get(k),
+            self.stops.get(k),
+        )
 
-    def keep(self, k: int, outcome: Outcome) -> None:
+    def keep(self, k: int, outcome: RunOutcome) -> None:
         """Store the outcome of run k."""
         self.done[k], self.ends[k], self.ledger[k] = outcome.done, outcome.end, outcome.ledger
         for name, each in self.counts.items():
