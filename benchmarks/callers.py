@@ -95,11 +95,7 @@ def waited(scene: Callable[[], tuple[Callable, float]], method: str, error: floa
 
 
 def inside_ns(run: Callable[..., st.Trajectory], **how) -> float:
-    """Return the least nanoseconds of a run that are spent in the C that makes it.
-
-    run: of a model that has made no run yet, because the preparations that a model keeps are not
-    timed.
-    """
+    """Return the least nanoseconds of a run that are spent in the C that makes it."""
     spent: list[float] = []
     with mock.patch.object(CompiledRun, "function", timed_function(spent)):
         for _ in range(REPEATS):

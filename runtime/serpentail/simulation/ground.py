@@ -13,6 +13,7 @@ from ..model.kernel import RunKernel
 from ..model.model import Model
 from ..model.parameters import RunParameters, total_mass
 from ..motion.contact import Contact
+from .controllers.piecewise import Piecewise
 from .controllers.schedules import Legs
 from .start import Start
 
@@ -58,6 +59,11 @@ class GroundSettings:
     def points(self) -> int:
         """Number of points that can touch the ground."""
         return sum(self.groups.values())
+
+    @property
+    def leg_curve(self) -> Piecewise | None:
+        """Leg angles as a function of time; None without feet."""
+        return None if self.legs is None else self.legs.curve
 
     def near(self, record: Any) -> dict[str, Any]:
         """The pass above the ground, of a record of C, that is the closest for its error."""

@@ -1,6 +1,8 @@
 """Prepares runs: checks their settings, and chooses the method of "auto"."""
 
 import ctypes
+import math
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -11,7 +13,7 @@ from ..basics.errors import ModelError, SimulationError, StateError
 from ..model.kernel import RunKernel
 from ..model.model import Model
 from ..model.parameters import RunParameters, Values
-from .controllers.actuation import Acting
+from .controllers.actuation import RunActuations
 from .controllers.controller import Controller
 from .ground import GroundSettings
 from .methods import (
@@ -21,7 +23,6 @@ from .methods import (
     checked_method,
     chosen,
     default_rtol,
-    step_counts,
     usual_most_steps,
 )
 from .records import Records
@@ -43,24 +44,24 @@ def prepared(
         )
     parameters = model.parameters_of_runs(changes, start.runs)
     ground = GroundSettings.checked(model, start, parameters, settings)
-    acting = Acting(Records(model), controller, start, ground.legs.curve if ground.legs else None)
-    choice = choose(acting, start, parameters, method, settings)
+    actuations = RunActuations(Records(model), controller, start, ground.leg_curve)
+    choice = choose(actuations, start, parameters, method, settings)
     if ground.stop_at and choice.name in SCIPY:
         raise SimulationError(
             f"stop_at: {choice.name} does not detect events: use tsit5 or ros34pw2"
         )
-    return RunSet(acting, start, ground, parameters, choice)
+    return RunSet(actuations, start, ground, parameters, choice)
 
 
 def choose(
-    acting: Acting,
+    actuations: RunActuations,
     start: Start,
     parameters: RunParameters,
     name: str,
     settings: dict[str, Any],
 ) -> IntegrationMethod:
     """Return the method that was asked for, or the choice of "auto" with its reason."""
-    model, single = acting.model, acting.records.real is ctypes.c_float
+    model, single = actuations.model, actuations.records.real is ctypes.c_float
     available, reason = model.manifest["simulation"]["methods"], "asked for"
     if isinstance(name, str) and name == "auto":
         decay = 0.0
@@ -68,7 +69,7 @@ def choose(
             usual = default_rtol("switching" if "switching" in available else "tsit5", single)
             rtol = number("rtol", settings.get("rtol", usual), SimulationError, above=0)
             settings["rtol"] = rtol
-            decay = FastestDecay(acting, start.runs, parameters)(start.q0)
+            decay = fastest_decay(actuations, start, parameters)
         name, reason = chosen(settings, available, decay, place_of(model))
     refuse_misplaced(model, settings)
     span = start.end - start.start
@@ -82,9 +83,10 @@ def choose(
         refuse_vanishing(start, each, length)
         refuse_endless(each, length, span, most_steps)
     if name == "rk4":  # steps divide the output's
-        interval = np.array([start.interval])
-        steps = step_counts(interval, 1e-12 * interval, method.settings["step"])
-        return replace(method, reason=reason, settings={"step": start.interval / int(steps[0])})
+        steps = max(
+            1, math.ceil((start.interval - 1e-12 * start.interval) / method.settings["step"])
+        )
+        return replace(method, reason=reason, settings={"step": start.interval / steps})
     return replace(method, reason=reason)
 
 
@@ -112,60 +114,41 @@ def refuse_vanishing(start: Start, name: str, step: float) -> None:
         )
 
 
-class FastestDecay:
-    """The fastest decay (1/s) of tails at starts q0 (runs, nq).
+def fastest_decay(actuations: RunActuations, start: Start, parameters: RunParameters) -> float:
+    """Return the fastest decay (1/s) of tails at the starts; 0 without damping.
 
     It is the largest eigenvalue of K (H^-1)_tt with the joint damping K; with springs, that of both
     together whose real part is least. Oscillations do not count, however fast: whoever wants their
-    motion needs steps that resolve them. For one thread.
+    motion needs steps that resolve them. Starts without accelerations do not count, either.
     """
-
-    def __init__(self, acting: Acting, runs: int, parameters: RunParameters):
-        model, nt = acting.model, acting.model.layout.nt
-        parts = [parts for each in acting.distinct for parts in each.parts]
-        laws = [each.damping for each in parts if each.damping is not None]
-        acted = np.max(laws, axis=0) if laws else np.zeros(nt)
-        # tracking compensates the passive tail's own torques
-        tracked = bool(parts) and all(each.pfl is not None for each in parts)
-        values = {} if tracked else parameters.values
-        self.damping = acted + of_tail(values, "tail_damping", (runs, nt))
-        self.stiffness = of_tail(values, "tail_stiffness", (runs, nt))
-        self.sprung = bool(self.stiffness.any())
-        self.damped = bool(self.damping.any()) and "forward_dynamics" in model.generated
-        if not self.damped:
-            return
-        # without torque and with unit torques: the differences are columns of H^-1
-        kernel, self.tail = model.kernel("forward_dynamics"), model.layout.tail_v
-        self.runs, self.columns = runs, nt + 1
-        torques = np.eye(self.columns, nt, -1, kernel.dtype)
-        tau = np.tile(torques, (runs, 1, 1))
-        sizes = model.nq, model.nv, model.nv
-        self.q, v, self.v_dot = (
-            np.zeros((runs, self.columns, size), kernel.dtype) for size in sizes
-        )
-        self.evaluate = RunKernel(kernel, parameters.vectors, (self.q, v, tau), (self.v_dot,))
-
-    def __call__(self, q0: np.ndarray) -> float:
-        """Return it; 0 without damping, or if no start has accelerations."""
-        if not self.damped:
-            return 0.0
-        self.q[...] = q0[:, None]
-        sound = [k for k in range(self.runs) if self._evaluated(k)]
-        tail = self.v_dot[sound, :, self.tail].astype(float)
-        mobility = tail[:, 1:] - tail[:, :1]
-        if self.sprung:
-            return fastest(mobility, self.stiffness[sound], self.damping[sound])
-        root = np.sqrt(self.damping[sound])
-        columns = mobility * root[:, :, None] * root[:, None, :]
-        return float(np.linalg.eigvalsh(columns).max(initial=0.0))
-
-    def _evaluated(self, k: int) -> bool:
-        """Evaluate the rows of run k; tell whether that succeeded."""
-        try:
-            self.evaluate(k, self.columns)
-        except StateError:
-            return False
-        return True
+    model, runs, nt = actuations.model, start.runs, actuations.model.layout.nt
+    parts = [parts for each in actuations.distinct for parts in each.parts]
+    laws = [each.damping for each in parts if each.damping is not None]
+    # tracking compensates the passive tail's own torques
+    tracked = bool(parts) and all(each.pfl is not None for each in parts)
+    values = {} if tracked else parameters.values
+    damping = of_tail(values, "tail_damping", (runs, nt)) + (np.max(laws, axis=0) if laws else 0.0)
+    if not damping.any() or "forward_dynamics" not in model.generated:
+        return 0.0
+    # accelerations without torque and with unit torques: the differences are columns of H^-1
+    kernel, columns = model.kernel("forward_dynamics"), nt + 1
+    tau = np.tile(np.eye(columns, nt, -1, kernel.dtype), (runs, 1, 1))
+    q, v, v_dot = (np.zeros((runs, columns, n), kernel.dtype) for n in (model.nq, *2 * [model.nv]))
+    q[...] = start.q0[:, None]
+    evaluate = RunKernel(kernel, parameters.vectors, (q, v, tau), (v_dot,))
+    sound = []
+    for k in range(runs):
+        with suppress(StateError):
+            evaluate(k, columns)
+            sound.append(k)
+    tail = v_dot[sound, :, model.layout.tail_v].astype(float)
+    mobility, damping = tail[:, 1:] - tail[:, :1], damping[sound]
+    stiffness = of_tail(values, "tail_stiffness", (runs, nt))
+    if stiffness.any():
+        return fastest(mobility, stiffness[sound], damping)
+    root = np.sqrt(damping)
+    symmetric = mobility * root[:, :, None] * root[:, None, :]
+    return float(np.linalg.eigvalsh(symmetric).max(initial=0.0))
 
 
 def of_tail(values: Values, name: str, shape: tuple[int, int]) -> np.ndarray:

@@ -18,7 +18,7 @@ from ..model.model import Model
 from ..motion.derived import AGAIN
 from ..motion.trajectory import Trajectory
 from .callback import Watch, Watched, checked_watch
-from .controllers.actuation import Acting
+from .controllers.actuation import RunActuations
 from .controllers.controller import Controller, remembers
 from .energies import trajectory_or_error
 from .ground import GroundSettings
@@ -192,9 +192,10 @@ def _again(
             ground = replace(ground, bristles=last.contact.bristles[-1:])
         if start.start >= start.end:
             raise SimulationError(f"at t = {start.start:.6g} s a phase ends after the next one")
-    acting = Acting(Records(model), controller, start, ground.legs.curve if ground.legs else None)
+    actuations = RunActuations(Records(model), controller, start, ground.leg_curve)
     method = method.coarser(coarse, start.interval)
-    samples = integrate(RunSet(acting, start, ground, model.parameters_of_runs(None, 1), method))
+    parameters = model.parameters_of_runs(None, 1)
+    samples = integrate(RunSet(actuations, start, ground, parameters, method))
     return trajectory_or_error(model, replace(samples, info=samples.info | method.info), ground)
 
 

@@ -33,9 +33,8 @@ class Actuation:
         # phases, each by its parts
         phases = phases_of(controller)
         begins = [begin for begin, _ in phases]
-        own = [parts_of(each, self.nt).since(begin) for begin, each in phases]
-        self.parts = [*map(self._available, own)]
-        self.legs = legs
+        all_parts = [parts_of(each, self.nt).since(begin) for begin, each in phases]
+        self.parts = [*map(self._available, all_parts)]
         if self.of_python:  # the user's: SciPy's methods work with their own
             self.float_errors = np.geterr()
         # times at which something is not smooth; steps end there
@@ -66,7 +65,7 @@ class Actuation:
         return any(parts.user is not None for parts in self.parts)
 
     @property
-    def keeps(self) -> bool:
+    def has_state(self) -> bool:
         """Whether one of them has a state of its own, so that runs cannot share it."""
         return any(parts.state is not None for parts in self.parts)
 
@@ -181,7 +180,7 @@ def _native(law: NativeTorque) -> dict[str, int | None]:
     return {"function": function, "context": law.context}
 
 
-class Acting:
+class RunActuations:
     """The actuation of each run; ``distinct`` has each once, ``alike``: all runs share one.
 
     drives: addresses of the C records of the runs' actuations.
@@ -192,15 +191,16 @@ class Acting:
     ):
         self.records = records
         self.span = start.start, start.end
-        given = controllers_of(controller, start.runs if start.many else None)
-        if len(given) == 1 and start.runs > 1 and self._of(given[0], legs, None).keeps:
-            given = given * start.runs
-        # of one object that acts in several runs there is one record, unless it keeps something
+        controllers = controllers_of(controller, start.runs if start.many else None)
+        one_for_all = len(controllers) == 1 and start.runs > 1
+        if one_for_all and self._of(controllers[0], legs, None).has_state:
+            controllers = controllers * start.runs
+        # of one object that acts in several runs there is one record, unless it has a state
         made: dict[int, Actuation] = {}
         self._each = []
-        for k, each in enumerate(given):
-            if id(each) not in made or made[id(each)].keeps:
-                made[id(each)] = self._of(each, legs, k if len(given) > 1 else None)
+        for k, each in enumerate(controllers):
+            if id(each) not in made or made[id(each)].has_state:
+                made[id(each)] = self._of(each, legs, k if len(controllers) > 1 else None)
             self._each.append(made[id(each)])
         self.distinct = [*dict.fromkeys(self._each)]
         self.alike = len(self.distinct) == 1
@@ -226,9 +226,9 @@ class Acting:
         return self.distinct[0] if self.alike else self._each[k]
 
     @property
-    def keeps(self) -> bool:
-        """Whether one of them keeps something of a run."""
-        return any(each.keeps for each in self.distinct)
+    def has_state(self) -> bool:
+        """Whether one of them remembers something of a run."""
+        return any(each.has_state for each in self.distinct)
 
     @property
     def of_python(self) -> bool:

@@ -101,7 +101,7 @@ class SampledTorques:
             single = type(record).t.size == np.dtype(np.float32).itemsize
             self.eps = float(np.finfo(np.float32 if single else float).eps)
         self.tick = -np.inf
-        self.acting: Any = np.zeros(self.nt)
+        self.torques: Any = np.zeros(self.nt)
         self.waiting: deque[tuple[float, Any]] = deque()  # when they begin to act (s), torques
 
     def __call__(self, t: float, q: np.ndarray, v: np.ndarray) -> Any:
@@ -116,5 +116,5 @@ class SampledTorques:
             begin = now + self.law.delay
             self.waiting.append((begin, given if found is None else found.copy()))
         while self.waiting and self.waiting[0][0] <= late:
-            self.acting = self.waiting.popleft()[1]
-        return self.acting
+            self.torques = self.waiting.popleft()[1]
+        return self.torques

@@ -29,7 +29,7 @@ class BatchRuns:
 
     def __init__(self, runs: RunSet, threads: int | None):
         self.runs, self.model, self.method = runs, runs.model, runs.method
-        self.of_python = runs.method.name in SCIPY or runs.acting.of_python
+        self.of_python = runs.method.name in SCIPY or runs.actuations.of_python
         self.threads = 1 if self.of_python else min(allowed(threads), runs.start.runs)
         self.lanes: LaneRuns | None = None
         self.outcomes = Outcomes(runs)
@@ -48,7 +48,7 @@ class BatchRuns:
         if self.lanes is not None:
             parts, lanes = self.lanes.parts(rest, self.threads), self.lanes
             self._share(parts, lambda found, ended: self._run_lanes(lanes, found, ended), stage)
-        elif self.of_python or self.runs.acting.keeps or self.runs.ground.points:
+        elif self.of_python or self.runs.actuations.has_state or self.runs.ground.points:
             self._share(rest, self._run_singly, stage)
         else:
             self._share(rest, self._run_in_turn, stage)

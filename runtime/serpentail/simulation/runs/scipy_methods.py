@@ -9,7 +9,7 @@ from serpentail_scene.layout import QUATERNION
 
 from ...basics.errors import SimulationError
 from ...model.library import NOT_FINITE
-from ..callback import Watched, rest
+from ..callback import Watched, samples_from
 from ..methods import IntegrationMethod
 from .outcomes import Samples, failed
 from .single import CompiledRun
@@ -73,7 +73,7 @@ class SampleWriter:
     def look(self) -> None:
         """Report the progress of the run."""
         if self.watched is not None:
-            self.watched.look(len(self.states), lambda first: rest(self.part(first), 0))
+            self.watched.look(len(self.states), lambda first: samples_from(self.part(first), 0))
 
     def part(self, first: int) -> Samples:
         """Return the samples written from a number on."""

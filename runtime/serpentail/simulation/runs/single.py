@@ -12,7 +12,7 @@ import numpy as np
 from ...model.kernel import address_of, aligned
 from ...model.library import PAUSED, STOPPED_AT_EVENT
 from ...model.parameters import RunParameters
-from ..controllers.actuation import Acting
+from ..controllers.actuation import RunActuations
 from ..ground import MOST_EVENTS, GroundSettings
 from ..methods import IntegrationMethod
 from ..start import Start
@@ -32,15 +32,15 @@ class RunSet:
 
     def __init__(
         self,
-        acting: Acting,
+        actuations: RunActuations,
         start: Start,
         ground: GroundSettings,
         parameters: RunParameters,
         method: IntegrationMethod,
     ):
-        self.acting, self.start, self.ground = acting, start, ground
+        self.actuations, self.start, self.ground = actuations, start, ground
         self.parameters, self.method = parameters, method
-        self.records, self.model = acting.records, start.model
+        self.records, self.model = actuations.records, start.model
         records, model, dtype = self.records, self.model, self.records.dtype
         self.state = {
             "q": np.array(start.q0, dtype, order="C"),
@@ -116,8 +116,8 @@ class CompiledRun:
         ctypes.memmove(self.address, self.blank, len(self.blank))
         for member, first, apart in self.runs.places:
             setattr(self.record, member, first + k * apart)
-        self.k, self.actuation = k, self.runs.acting.of(k)
-        self.record.drive, self.actuation.error = int(self.runs.acting.drives[k]), None
+        self.k, self.actuation = k, self.runs.actuations.of(k)
+        self.record.drive, self.actuation.error = int(self.runs.actuations.drives[k]), None
 
     def records_of(self, runs: Sequence[int]) -> np.ndarray:
         """Return records of runs at their starts, which share the workspace."""
@@ -125,7 +125,7 @@ class CompiledRun:
         records = np.repeat(np.frombuffer(self.blank, np.dtype(type(self.record))), len(numbers))
         for member, first, apart in self.runs.places:
             records[member] = first + numbers * apart
-        records["drive"] = self.runs.acting.drives[numbers]
+        records["drive"] = self.runs.actuations.drives[numbers]
         return records
 
     @property
