@@ -15,7 +15,7 @@ import serpentail as st
 from benchmarks.models import built, label
 from benchmarks.scenes import ERROR, FLYING, error_at_end, exact_run, fly, impact
 from benchmarks.timing import best
-from serpentail.simulation.compiled_run import CompiledRun
+from serpentail.simulation.runs.single import CompiledRun
 
 PER_PROCESSOR = True
 FLIGHTS = (((1, 3), 0.6), ((3, 4), 0.6), ((1, 3), 0.03), ((3, 4), 0.03))  # s

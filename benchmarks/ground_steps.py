@@ -11,7 +11,7 @@ import serpentail as st
 from benchmarks.ground_batches import SIZES, dropped, grounded
 from benchmarks.models import label
 from benchmarks.timing import best_of
-from serpentail.model.stepping.held import Held
+from serpentail.model.stepping.makers import StepCall
 
 PER_PROCESSOR = True
 RUNS, ROUNDS = 64, 200
@@ -54,7 +54,7 @@ def step_times(model: st.Model, values: dict[str, np.ndarray]) -> tuple[float, f
     def once(way: int) -> None:
         state = [values[name].copy() for name in ("q", "v", "tau", "bristles")]
         statuses = np.zeros(RUNS, np.intc)
-        held = Held(*state, legs, parameters, H, STEPS, "implicit_euler", statuses)
+        held = StepCall(*state, legs, parameters, H, STEPS, "implicit_euler", statuses)
         maker = (stepping.singly, stepping.maker(model, held)[0])[way]
         maker.make(held, 0, RUNS)
         if statuses.any():

@@ -13,7 +13,7 @@ import pytest
 
 import serpentail as st
 from serpentail.model import manifest
-from serpentail.simulation import parallel_runs
+from serpentail.simulation.runs import batch as batch_runs
 from serpentail_codegen.targets.write import write_folder
 from tests.support import zoo
 from tests.support.models import model_folder
@@ -45,7 +45,7 @@ def folder(tmp_path):
 
 def test_late_code_is_of_the_model_and_needs_nothing_of_the_cache(folder, cache, monkeypatch):
     """Batches, runs side by side and CasADi functions; what was deleted there is written again."""
-    monkeypatch.setattr(parallel_runs, "worth_batching", lambda *_: True)
+    monkeypatch.setattr(batch_runs, "worth_lanes", lambda *_: True)
     rng = np.random.default_rng(4)
     q, v = rng.normal(size=(1000, 9)), rng.normal(size=(1000, 8))
     model = st.load(put(folder, 1))

@@ -13,7 +13,7 @@ import serpentail as st
 from serpentail.cli import cli
 from serpentail.scenes.overrides import changed, parsed
 from serpentail.scenes.plan import plan_arguments
-from serpentail.simulation import limits
+from serpentail.simulation import start
 from tests.support import zoo
 from tests.support.rows import row
 from tests.support.scenes import SCENES
@@ -167,13 +167,13 @@ def test_what_no_plan_can_be_is_one_line_and_none_writes_files_or_runs_code():
 
 
 def test_samples_that_no_memory_holds_are_refused_before_they_are_made(monkeypatch):
-    monkeypatch.setattr(limits, "memory", lambda: 1e6)
+    monkeypatch.setattr(start, "memory", lambda: 1e6)
     model, q = zoo.model("m1_n3"), np.tile(START["q"], (100, 1))
     st.simulate(model, q[0], START["v"], t_span=0.01)
     with pytest.raises(st.SimulationError, match=r"201 samples of each of 100 runs .* GB"):
         st.simulate(model, q, START["v"], t_span=0.01)
     monkeypatch.undo()
-    assert 1e8 < limits.memory() < 1e15
+    assert 1e8 < start.memory() < 1e15
 
 
 def test_a_folder_of_another_scene_is_refused(scene):

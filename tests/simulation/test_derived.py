@@ -13,7 +13,8 @@ import pytest
 import serpentail as st
 from serpentail.motion.derived import LATER
 from serpentail.motion.trajectory import DERIVED
-from serpentail.simulation import compiled_run, watched
+from serpentail.simulation import callback
+from serpentail.simulation.runs import single
 from tests.support import zoo
 from tests.support.rows import row
 
@@ -141,8 +142,8 @@ METHODS = ["tsit5", "ros34pw2", "rk4", "implicit_euler", "dop853", "lsoda"]
 
 @pytest.fixture(autouse=True)
 def at_every_look(monkeypatch):
-    monkeypatch.setattr(watched, "EVERY", 0.0)
-    monkeypatch.setattr(compiled_run, "PAUSE", 10)  # steps to the first
+    monkeypatch.setattr(callback, "EVERY", 0.0)
+    monkeypatch.setattr(single, "PAUSE", 10)  # steps to the first
 
 
 def joined(parts, name):
@@ -210,7 +211,7 @@ def test_a_run_that_ends_early_is_told_up_to_there():
 
 
 def test_it_is_called_after_a_pause_at_the_least(monkeypatch):
-    monkeypatch.setattr(watched, "EVERY", 0.02)
+    monkeypatch.setattr(callback, "EVERY", 0.02)
     calls = []
     how = {"t_span": 1.0, "method": "rk4", "step": 1e-5, "output_step": 0.01}
     fly(watch=lambda part: calls.append(time.perf_counter()), **how)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.simulation import compiled_run
+from serpentail.simulation.runs import single
 from tests.support import zoo
 from tests.support.rows import row
 
@@ -130,7 +130,7 @@ def test_a_run_that_is_paused_after_each_few_steps_gives_the_same_bits(monkeypat
     for settings in (*rows, {"method": "implicit_euler", "step": 1e-3}):
         how = settings | {"t_span": 0.5, "output_step": 0.01}
         whole = kick(**how)
-        monkeypatch.setattr(compiled_run, "PAUSE", 3)
+        monkeypatch.setattr(single, "PAUSE", 3)
         paused = kick(**how)
         monkeypatch.undo()
         with row(settings):

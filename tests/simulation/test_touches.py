@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.simulation.ground import Ground
-from serpentail.simulation.piecewise import Piecewise
+from serpentail.simulation.controllers.piecewise import Piecewise
+from serpentail.simulation.ground import GroundSettings
 from tests.support import zoo
 from tests.support.rows import row
 
@@ -187,7 +187,7 @@ def test_a_tail_that_dips_in_between_stages_is_felt():
 
 def test_a_force_that_comes_again_in_the_ground_is_no_new_touch():
     """A group takes off where its force ceases for the last time before it is out of the ground."""
-    ground = Ground({"feet": 6, "tail": 3})
+    ground = GroundSettings({"feet": 6, "tail": 3})
     down, off, clear = 0, 1, 4  # of the feet, as C numbers them
     times, numbers = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0], [down, off, down, off, clear, down]
     kinds = [(event["time"], event["kind"]) for event in ground.events(times, numbers)]

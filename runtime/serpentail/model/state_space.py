@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, VELOCITY, Layout
 
+from ..basics.attitude import quaternion_rate
 from ..basics.errors import StateError
 
 Array = NDArray[Any]
@@ -31,7 +32,8 @@ def split(layout: Layout, x: Array) -> tuple[Array, Array]:
 def q_dot(q: Array, v: Array) -> Array:
     """Return dq/dt (..., nq)."""
     quaternion = q[..., QUATERNION]
-    turning = (product_matrix(quaternion) @ v[..., OMEGA, None])[..., 0] / 2
+    entries = (np.moveaxis(each, -1, 0) for each in (quaternion, v[..., OMEGA]))
+    turning = np.stack(quaternion_rate(*entries), axis=-1)
     norm = 1 - (quaternion**2).sum(-1, keepdims=True)
     return np.concatenate(
         [v[..., VELOCITY], turning + RATE * norm * quaternion, v[..., TAIL_V]], axis=-1

@@ -14,8 +14,7 @@ from ..basics.errors import SimulationError
 from ..model.kernel import aligned
 from ..model.model import Model
 from ..planning.result.plan import Plan
-from ..simulation.controllers import NativeTorque
-from ..simulation.parts import OwnState, Parts
+from ..simulation.controllers.parts import ControllerState, NativeTorque, Parts
 from .emission import write_c
 from .kernel import Simulation, kernel
 from .settings import checked_settings, refuse_unable
@@ -160,8 +159,10 @@ class Mpc:
             raise refusal("Mpc: tail coordinates", nt, needs, SimulationError)
         memory = ControllerMemory(self.task)
         native = NativeTorque(kernel().mpc_simulated, ctypes.addressof(memory.run))
-        own = OwnState(memory.begin_run, lambda: {"mpc": memory.info()}, lambda *_: self.stops())
-        return Parts(np.full(nt, self.plan.problem.damping), native=native, own=own)
+        state = ControllerState(
+            memory.begin_run, lambda: {"mpc": memory.info()}, lambda *_: self.stops()
+        )
+        return Parts(np.full(nt, self.plan.problem.damping), native=native, state=state)
 
     def write_c(self, folder: str | PathLike[str] = ".") -> list[Path]:
         """Write the controller and its plan as C99.

@@ -11,9 +11,9 @@ from ..basics.errors import SimulationError
 from ..model.model import Model
 from ..model.parameters import total_mass
 from ..motion.trajectory import Trajectory
-from ..simulation.controllers import Controller
+from ..simulation.controllers.controller import Controller
+from ..simulation.controllers.schedules import Legs
 from ..simulation.methods import MIN_ROUNDINGS
-from ..simulation.schedules import Legs
 from ..simulation.simulate import end_state, simulate
 
 State = tuple[np.ndarray, np.ndarray]  # q, v

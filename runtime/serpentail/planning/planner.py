@@ -9,7 +9,7 @@ from ..basics.checks import Refusals, needed, none_of
 from ..basics.errors import PlanningError
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
-from ..simulation.schedules import Legs
+from ..simulation.controllers.schedules import Legs
 from .best import best_plan
 from .goal import Bounds, Goal
 from .problem import SMOOTHING, PathConstraint, checked_problem

@@ -14,7 +14,7 @@ from ..basics.errors import PlanningError
 from ..basics.short_repr import brief
 from ..model.model import Model
 from ..model.passive import behind_stops
-from ..simulation.schedules import Legs
+from ..simulation.controllers.schedules import Legs
 from .design import Design, checked_design
 from .free_start import Range, checked_free_start, moved_inside, within_bounds
 from .goal import GOALS, Bounds, Goal

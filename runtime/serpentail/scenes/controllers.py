@@ -8,9 +8,9 @@ from ..basics.checks import number, one_of, refusal, shown
 from ..basics.errors import SimulationError
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
-from ..simulation.controllers import Controller, Damping, Phases, TorqueTable
-from ..simulation.pfl import KD, KP, Pfl
-from ..simulation.schedules import Legs, Reference
+from ..simulation.controllers.controller import Controller, Damping, Phases, TorqueTable
+from ..simulation.controllers.pfl import KD, KP, Pfl
+from ..simulation.controllers.schedules import Legs, Reference
 from .simulate_keys import LAWS
 
 

@@ -8,7 +8,7 @@ from ..basics.checks import Refusals, needed, refusal
 from ..basics.errors import SimulationError
 from ..model.model import Model
 from ..sequence.phase import Phase, Tracking
-from ..simulation.controllers import Controller
+from ..simulation.controllers.controller import Controller
 from .controllers import controller_of, reference_of
 from .file import size_of, values_of
 from .phase_keys import PHASE

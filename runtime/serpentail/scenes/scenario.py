@@ -13,9 +13,9 @@ from ..motion.trajectory import Trajectory
 from ..sequence.phase import Phase
 from ..sequence.run import SequenceRun
 from ..sequence.sequence import Sequence
-from ..simulation.controllers import Controller
+from ..simulation.controllers.controller import Controller
+from ..simulation.controllers.schedules import Legs
 from ..simulation.rollouts import Rollouts
-from ..simulation.schedules import Legs
 from ..simulation.simulate import simulate
 
 

@@ -20,8 +20,8 @@ from ..basics.checks import (
 )
 from ..basics.errors import SimulationError
 from ..model.model import Model
+from ..simulation.controllers.schedules import Reference, shared_among_links
 from ..simulation.methods import SETTINGS
-from ..simulation.schedules import Reference, shared_among_links
 from ..simulation.settle import check_settling, settle
 from .controllers import controller_of, legs_of, reference_of
 from .file import model_of, read_scene, size_of, subtable, values_of

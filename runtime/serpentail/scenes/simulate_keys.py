@@ -1,7 +1,7 @@
 """The keys of a scene's table [simulate]."""
 
+from ..simulation.controllers.schedules import BLENDS, MOVE
 from ..simulation.methods import SETTINGS
-from ..simulation.schedules import BLENDS, MOVE
 from .keys import Key, one_word
 
 SECONDS, METRES, ANGLE = Key("s"), Key("m"), Key("rad")

@@ -17,8 +17,8 @@ from ..planning.planner import plan
 from ..planning.problem import checked_goal
 from ..planning.result.full_state import com_at_start
 from ..planning.result.plan import Plan
-from ..simulation.controllers import Controller
-from ..simulation.pfl import Pfl
+from ..simulation.controllers.controller import Controller
+from ..simulation.controllers.pfl import Pfl
 from .phase import BEFORE, Phase
 
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])

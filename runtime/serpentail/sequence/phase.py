@@ -8,10 +8,10 @@ from ..basics.checks import number, one_of, refusal
 from ..basics.errors import SimulationError
 from ..basics.short_repr import brief
 from ..model.model import Model
-from ..simulation.controllers import CHOICES, Controller, Phases
+from ..simulation.controllers.controller import CHOICES, Controller, Phases
+from ..simulation.controllers.pfl import KD, KP
+from ..simulation.controllers.schedules import MOVE
 from ..simulation.ground import KINDS
-from ..simulation.pfl import KD, KP
-from ..simulation.schedules import MOVE
 
 AIRBORNE, LANDING = "airborne", "landing"
 BEFORE = "before_landing"  # of a move: s, in place of `at`

@@ -14,8 +14,8 @@ from ..basics.errors import PlanningError, SimulationError
 from ..basics.short_repr import brief
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
-from ..simulation.controllers import Controller, Phases, parts_of
-from ..simulation.schedules import Legs
+from ..simulation.controllers.controller import Controller, Phases, parts_of
+from ..simulation.controllers.schedules import Legs
 from ..simulation.simulate import simulate
 from .flight import planned_flight
 from .phase import AIRBORNE, BEFORE, Event, Phase

@@ -98,11 +98,11 @@ def audited(
     flies = ~np.any([np.any(each != 0, axis=-1) for each in impulses.values()], axis=0)
 
     def share(seen: Arrays) -> np.ndarray:
-        all_of_it = np.abs(energy) / np.fmax(_held(values, seen, weight) + worked, TINY)
+        all_of_it = np.abs(energy) / np.fmax(_most_energy(values, seen, weight) + worked, TINY)
         if model.fixed:
             return all_of_it
         lost = _lost_within(values, ends, work)
-        within = lost / np.fmax(_held_within(values, seen) + worked, TINY)
+        within = lost / np.fmax(_most_energy_within(values, seen) + worked, TINY)
         return np.where(flies, within, all_of_it)
 
     found = share(ends)
@@ -115,12 +115,12 @@ def audited(
     return Audit(work, impulses, energy, moved, relative)
 
 
-def _held(values: Mapping[str, Any], seen: Arrays, weight: np.ndarray) -> np.ndarray:
+def _most_energy(values: Mapping[str, Any], seen: Arrays, weight: np.ndarray) -> np.ndarray:
     """Return the most energy of runs, with what lifts the animal by its tail's length."""
     return _most(seen["kinetic"]) + weight * values["tail_length"] + _most(seen["stored"])
 
 
-def _held_within(values: Mapping[str, Any], seen: Arrays) -> np.ndarray:
+def _most_energy_within(values: Mapping[str, Any], seen: Arrays) -> np.ndarray:
     """Return the most energy of flights about their centre of mass.
 
     The energy of the fall is larger and would hide an imbalance; the balance of momentum checks the

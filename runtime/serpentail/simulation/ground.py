@@ -13,7 +13,8 @@ from ..model.kernel import RunKernel
 from ..model.model import Model
 from ..model.parameters import RunParameters, total_mass
 from ..motion.contact import Contact
-from .schedules import Legs
+from .controllers.piecewise import Piecewise
+from .controllers.schedules import Legs
 from .start import Start
 
 KINDS = ("touch_down", "take_off")
@@ -25,7 +26,7 @@ MOST_EVENTS = 10_000  # that are kept
 
 
 @dataclass(frozen=True, eq=False)
-class Ground:
+class GroundSettings:
     """Checked settings of runs on the ground, bristles (k, points, 2); without contacts none."""
 
     groups: dict[str, int] = field(default_factory=dict)
@@ -36,7 +37,7 @@ class Ground:
     @classmethod
     def checked(
         cls, model: Model, start: Start, parameters: RunParameters, settings: dict
-    ) -> "Ground":
+    ) -> "GroundSettings":
         """Take legs, bristles0 and stop_at out of settings; SimulationError if one is wrong."""
         choices = {name: settings.pop(name, None) for name in ("legs", "bristles0", "stop_at")}
         groups = model.contacts
@@ -58,6 +59,11 @@ class Ground:
     def points(self) -> int:
         """Number of points that can touch the ground."""
         return sum(self.groups.values())
+
+    @property
+    def leg_curve(self) -> Piecewise | None:
+        """Leg angles as a function of time; None without feet."""
+        return None if self.legs is None else self.legs.curve
 
     def near(self, record: Any) -> dict[str, Any]:
         """The pass above the ground, of a record of C, that is the closest for its error."""

@@ -30,11 +30,6 @@ SINGLE_RTOL = {"tsit5": 1e-4, "ros34pw2": 1e-3, "switching": 1e-3}
 DOUBLE_RTOL = {"tsit5": 1e-8, "ros34pw2": 1e-4, "switching": 1e-4}
 
 
-def step_counts(spans: np.ndarray, slack: np.ndarray, step: float) -> np.ndarray:
-    """Return the numbers of steps, of at most a length, that fill spans; slack: their rounding."""
-    return np.maximum(1, np.ceil((spans - slack) / step)).astype(int)
-
-
 @dataclass(frozen=True)
 class IntegrationMethod:
     """A method, why it was chosen, and its settings."""

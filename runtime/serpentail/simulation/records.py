@@ -1,8 +1,8 @@
 """The C structures of simulations, for ctypes, with all that they point to."""
 
 import ctypes
-from typing import Any, cast
-from weakref import WeakKeyDictionary, ref
+from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,16 +24,11 @@ class Records:
     """Makes the C records of a model, and keeps alive all that they point to."""
 
     def __init__(self, model: Model):
-        self._model = ref(model)  # a run that waits to be made again keeps no model alive
+        self.model = model
         self.kept: list[Any] = []
         self.dtype = model.parameter_vector.dtype
         self.real = REALS[self.dtype]
         self.types = _types.get(model) or _types.setdefault(model, self._made())
-
-    @property
-    def model(self) -> Model:
-        """The model, which the caller of a run keeps alive."""
-        return cast(Model, self._model())
 
     def _made(self) -> dict[str, type[ctypes.Structure]]:
         """Structure types by name."""

@@ -16,10 +16,9 @@ from ..motion.methods import Exports
 from ..motion.text import arrays_of, framed, how_made
 from ..motion.trajectory import MONOTONE, Trajectory
 from .audit import Audit
-from .compiled_run import Samples, sampled
-from .ground import Ground
-from .measured import trajectory_or_error
-from .outcomes import Outcomes
+from .energies import trajectory_or_error
+from .ground import GroundSettings
+from .runs.outcomes import Outcomes, Samples, sampled
 
 LATER = (*MONOTONE, "audit", "warnings")  # fields that are derived when they are first used
 SHOWN = 3  # runs that a notebook shows over each other
@@ -31,7 +30,7 @@ class Source:
 
     model: Model
     parameters: RunParameters
-    ground: Ground
+    ground: GroundSettings
     outcomes: Outcomes
     info: dict[str, Any]
 

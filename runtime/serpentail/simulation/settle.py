@@ -11,7 +11,7 @@ from ..basics.checks import number, refusal
 from ..basics.errors import SimulationError, StateError
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
-from .controllers import Controller
+from .controllers.controller import Controller
 from .simulate import simulate
 
 

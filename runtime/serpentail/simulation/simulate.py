@@ -17,19 +17,19 @@ from ..compiling.threads import checked_threads
 from ..model.model import Model
 from ..motion.derived import AGAIN
 from ..motion.trajectory import Trajectory
-from .acting import Acting
-from .choice import prepared, still_chosen
-from .compiled_run import CompiledRun, Memory, Samples
-from .controllers import Controller, remembers
-from .ground import Ground
-from .measured import trajectory_or_error
+from .callback import Watch, Watched, checked_watch
+from .controllers.actuation import RunActuations
+from .controllers.controller import Controller, remembers
+from .energies import trajectory_or_error
+from .ground import GroundSettings
 from .methods import SCIPY, IntegrationMethod
-from .parallel_runs import run_parallel
+from .prepare import prepared
 from .records import Records
 from .rollouts import Rollouts
+from .runs.batch import run_batch
+from .runs.outcomes import Samples
+from .runs.single import CompiledRun, RunSet
 from .start import Start
-from .waiting import asked_for, let_wait, taken
-from .watched import Watch, Watched, checked_watch
 
 
 def simulate(
@@ -132,9 +132,9 @@ def simulate(
     ``Damping`` with (k, 2m). A ``NativeTorque`` must allow calls from several threads at once.
 
     Eight or more flights are computed in SIMD lanes, several times as fast, if the method is
-    "tsit5" or "rk4", if the torques are none, Damping, a TorqueTable or a TorqueCurve (with
-    "tsit5" also Phases of these; with "rk4" all must have their kinks at the same times), and if
-    the C for lanes is compiled or its compilation pays off. The last digits then differ.
+    "tsit5" or "rk4", if the torques are none, Damping, a TorqueTable, a TorqueCurve or Phases of
+    these, and if the C for lanes is compiled or its compilation pays off. The last digits then
+    differ.
 
     With a Python function as controller, or with one of SciPy's methods, the runs are made one
     after another in the calling thread. An exception of the function ends all runs, unless it is
@@ -157,66 +157,54 @@ def simulate(
     missing = [name for name in ("rollout", "energy", "momentum") if name not in model.generated]
     if missing:
         raise model.without(*missing)
-    asked = asked_for(controller, t_span, method, settings)
-    run = taken(model, asked, (q0, v0))
-    watch = None
-    if run is None or not still_chosen(run, method):
-        start = Start.checked(model, (q0, v0), t_span, settings.pop("output_step", None))
-        watch = checked_watch(settings.pop("watch", None), start.many)
-        threads = _threads(model, start, settings.pop("threads", None))
-        parts = prepared(model, start, controller, method, settings)
-        if start.many:
-            _doubt(model, start)
-            clocks = read_clocks()
-            return run_parallel(*parts, threads).rollouts(spent(clocks))
-        run = CompiledRun(*parts)
-    _doubt(model, run.start)
+    start = Start.checked(model, (q0, v0), t_span, settings.pop("output_step", None))
+    watch = checked_watch(settings.pop("watch", None), start.many)
+    threads = _threads(model, start, settings.pop("threads", None))
+    runs = prepared(model, start, controller, method, settings)
+    _doubt(start)
     clocks = read_clocks()
-    samples = integrate(run, watch)
-    info = samples.info | run.method.info | spent(clocks)
-    motion = trajectory_or_error(model, replace(samples, info=info), run.ground)
+    if start.many:
+        return run_batch(runs, threads).rollouts(spent(clocks))
+    samples = integrate(runs, watch)
+    info = samples.info | runs.method.info | spent(clocks)
+    motion = trajectory_or_error(model, replace(samples, info=info), runs.ground)
     if not remembers(controller):
-        made_of = run.start, run.ground, run.method
-        vars(motion)[AGAIN] = partial(
-            _again, model, controller, made_of, (samples.q[0], samples.v[0])
-        )
-    let_wait(model, asked, run)
+        vars(motion)[AGAIN] = partial(_again, start, runs.ground, controller, runs.method)
     return motion
 
 
 def _again(
-    model: Model,
+    start: Start,
+    ground: GroundSettings,
     controller: Controller,
-    made_of: tuple[Start, Ground, IntegrationMethod],
-    state: tuple[np.ndarray, np.ndarray],
+    method: IntegrationMethod,
     coarse: int,
     last: Trajectory | None = None,
 ) -> Trajectory:
-    """Return a run from a state made again, less exactly; of a sequence from the last part's end.
+    """Return a run made again, less exactly; of a sequence from the end of the last part.
 
     SimulationError if it fails, or the last part ends too late.
     """
-    start, ground, method = made_of
-    (q0, v0), begin = state, start.start
+    model = start.model
     if last is not None:
-        q0, v0, begin = last.q[-1], last.v[-1], float(last.t[-1])
+        start = replace(start, q0=last.q[-1:], v0=last.v[-1:], start=float(last.t[-1]))
         if last.contact is not None:
             ground = replace(ground, bristles=last.contact.bristles[-1:])
-        if begin >= start.end:
-            raise SimulationError(f"at t = {begin:.6g} s a phase ends after the next one")
-    start = replace(start, q0=q0[None], v0=v0[None], start=begin)
-    acting = Acting(Records(model), controller, start, ground.legs.curve if ground.legs else None)
-    memory = Memory(acting.records, start, ground, model.parameters_of_runs(None, 1))
+        if start.start >= start.end:
+            raise SimulationError(f"at t = {start.start:.6g} s a phase ends after the next one")
+    actuations = RunActuations(Records(model), controller, start, ground.leg_curve)
     method = method.coarser(coarse, start.interval)
-    samples = integrate(CompiledRun(memory, acting, method))
+    parameters = model.parameters_of_runs(None, 1)
+    samples = integrate(RunSet(actuations, start, ground, parameters, method))
     return trajectory_or_error(model, replace(samples, info=samples.info | method.info), ground)
 
 
-def _doubt(model: Model, start: Start) -> None:
+def _doubt(start: Start) -> None:
     """Warn the caller of ``simulate`` of a tail that starts at degrees."""
-    if model.manifest["scene"]["coordinates"] != "polar":
-        tails = start.q0[:, start.tail]
-        warn_of_degrees("q0", tails if start.many else tails[0], start.tail.start, calls=3)
+    if start.model.manifest["scene"]["coordinates"] != "polar":
+        tail = start.model.layout.tail_q
+        tails = start.q0[:, tail]
+        warn_of_degrees("q0", tails if start.many else tails[0], tail.start, calls=3)
 
 
 def _threads(model: Model, start: Start, asked: int | None) -> int | None:
@@ -253,21 +241,21 @@ def end_state(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return q (nq,) and v (nv,) at the end of a run by "tsit5", without energies and momenta."""
     start = Start.checked(model, (q0, v0), duration, duration)
-    samples = integrate(CompiledRun(*prepared(model, start, controller, "tsit5", {"rtol": rtol})))
+    samples = integrate(prepared(model, start, controller, "tsit5", {"rtol": rtol}))
     if samples.failure is not None:
         raise samples.failure
     return samples.q[-1], samples.v[-1]
 
 
-def integrate(run: CompiledRun, watch: Watch | None = None) -> Samples:
+def integrate(runs: RunSet, watch: Watch | None = None) -> Samples:
     """Return the samples of a single run; a function may watch them."""
-    method = run.method
-    watched = None if watch is None else Watched(watch, run.model, run.ground)
-    with Stage("simulate", run.model.name) as stage:
-        if method.name in SCIPY:
-            from .scipy_methods import integrate_by_scipy
+    run = CompiledRun(runs)
+    watched = None if watch is None else Watched(watch, runs.model, runs.ground)
+    with Stage("simulate", runs.model.name) as stage:
+        if runs.method.name in SCIPY:
+            from .runs.scipy_methods import integrate_by_scipy
 
-            samples = integrate_by_scipy(run, method, watched)
+            samples = integrate_by_scipy(run, watched)
         else:
             samples = run.samples(run.go(look=partial(_look, run, stage, watched)))
     if watched is not None:
@@ -278,6 +266,6 @@ def integrate(run: CompiledRun, watch: Watch | None = None) -> Samples:
 def _look(run: CompiledRun, stage: Stage, watched: Watched | None) -> None:
     """Report the progress of a run in C, and its new samples."""
     done = run.record.done
-    stage.tell(done / len(run.start.times))
+    stage.tell(done / len(run.runs.start.times))
     if watched is not None:
-        watched.look(done, lambda first: run.memory.part(run.k, first, done))
+        watched.look(done, lambda first: run.runs.part(run.k, first, done))

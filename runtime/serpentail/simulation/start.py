@@ -1,6 +1,7 @@
 """Starts, spans and sample times of runs, checked."""
 
 import math
+import os
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,11 +13,12 @@ from ..basics.checks import finite_array, number, real_array, refusal, refuse_no
 from ..basics.errors import SimulationError, StateError
 from ..model.lazy import kept
 from ..model.model import Model
-from .limits import refuse_overfull
 
 MOST_SAMPLES = 10_000_000  # of all runs: more are a mistake, and would fill the memory
 SHORTEST = 1e-100  # s: between samples; methods multiply times
 EPS = float(np.finfo(float).eps)
+MOST_STEPS = 1e9  # of one run: hours
+COPIES = 3  # of every sample: written by the C, stored in a trajectory, and derived
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +34,7 @@ class Start:
     end: float
     intervals: int
     many: bool
-    tail: slice  # of q
+    model: Model
 
     @classmethod
     def checked(
@@ -54,9 +56,7 @@ class Start:
             raise SimulationError(
                 f"output_step {step:.3g}: more than {MOST_SAMPLES} samples{whose}: {remedy}"
             )
-        checked = cls(
-            q0, v0, start, end, max(1, round((end - start) / step)), many, model.layout.tail_q
-        )
+        checked = cls(q0, v0, start, end, max(1, round((end - start) / step)), many, model)
         least = max(SHORTEST, EPS * max(abs(start), abs(end)))
         if checked.interval < least:
             raise SimulationError(
@@ -142,3 +142,32 @@ def _paired(q0: np.ndarray, v0: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     q0 = np.broadcast_to(q0, (runs, q0.shape[-1]))
     v0 = np.broadcast_to(v0, (runs, v0.shape[-1]))
     return np.array(q0, order="C"), np.array(v0, order="C")
+
+
+def refuse_endless(name: str, step: float, span: float, most_steps: float = MOST_STEPS) -> None:
+    """SimulationError if steps of at most this length (s) are too many for a span (s)."""
+    if span > most_steps * step:
+        raise SimulationError(
+            f"{name} {step:.3g}: needs {span / step:.2g} steps, more than {most_steps:g}: give "
+            f"{span / most_steps:.2g} s or more"
+        )
+
+
+def refuse_overfull(model: Model, runs: int, samples: int) -> None:
+    """SimulationError if the samples of runs need more memory than this machine has."""
+    width = model.nq + model.nv + model.layout.nt + 10 * sum(model.contacts.values())
+    need, have = 8.0 * COPIES * width * samples * runs, memory()
+    if need > have:
+        whose = f" of each of {runs} runs" if runs > 1 else ""
+        raise SimulationError(
+            f"output_step: {samples} samples{whose} need {need / 1e9:.3g} GB, this machine has "
+            f"{have / 1e9:.3g} GB: give a longer output_step, or fewer runs at once"
+        )
+
+
+def memory() -> float:
+    """Return the memory (bytes) of this machine; infinite if unknown."""
+    try:
+        return float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):
+        return math.inf

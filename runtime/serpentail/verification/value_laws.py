@@ -11,7 +11,7 @@ from ..model.model import Model
 from ..model.parameters import total_mass
 from ..model.passive import PARTS
 from ..motion.trajectory import Trajectory
-from ..simulation.schedules import Legs
+from ..simulation.controllers.schedules import Legs
 from ..simulation.simulate import simulate
 from .errors import block_error, blocks_of, difference, differing, relative, rounding, worst
 from .law import PIECEWISE, VALUE_LIMIT, Errors, fastest, law, moved, slope

@@ -112,7 +112,7 @@ def assert_own_symbols(model, objects, *merged):
     for part, found in defined.items():
         beside = f"{model.name}_side_by_side_"
         assert found and all(symbol.startswith(beside) for symbol in found), part
-    ways = {f"{model.name}_side_by_side_{way}" for way in ("flights", "rollouts", "steps")}
+    ways = {f"{model.name}_side_by_side_{way}" for way in ("rollouts", "steps")}
     assert defined.get("_flights", ways) == ways
 
 

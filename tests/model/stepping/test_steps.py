@@ -5,7 +5,7 @@ import pytest
 
 import serpentail as st
 from serpentail.model.library import NOT_POSITIVE_DEFINITE, STEP_TOO_LONG
-from serpentail.model.stepping.singly import SingleSteps
+from serpentail.model.stepping.makers import SingleSteps
 from tests.support import zoo
 from tests.support.models import folder_of
 

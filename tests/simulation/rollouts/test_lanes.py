@@ -7,8 +7,8 @@ import pytest
 
 import serpentail as st
 from serpentail.model.library import model_library
-from serpentail.simulation import batched_runs, parallel_runs
-from serpentail.simulation.adaptive_runs import AdaptiveRuns
+from serpentail.simulation.runs import batch, lanes
+from serpentail.simulation.runs.lanes import LaneRuns
 from tests.support import zoo
 from tests.support.rows import row
 
@@ -24,7 +24,7 @@ METHODS = {"rk4": RK4, "tsit5": TSIT5}
 
 @pytest.fixture(autouse=True)
 def any_number_is_many(monkeypatch):
-    monkeypatch.setattr(parallel_runs, "worth_batching", lambda *_: True)
+    monkeypatch.setattr(batch, "worth_lanes", lambda *_: True)
 
 
 def unlike(count, seed=0):
@@ -35,10 +35,9 @@ def unlike(count, seed=0):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_each_lane_steps_as_its_run_does_alone(method):
-    """By rk4 phases are no work for lanes."""
     q, v = unlike(19)
-    for name in LAWS if method == "tsit5" else [*LAWS][:4]:
-        settings = METHODS[method] | {"controller": LAWS[name]}
+    for name, law in LAWS.items():
+        settings = METHODS[method] | {"controller": law}
         flights = alone(tail(), q, v, **settings)
         taken = [flight.info["steps"] for flight in flights]
         assert method == "rk4" or max(taken) > 2 * min(taken)
@@ -58,7 +57,7 @@ def test_each_lane_steps_as_its_run_does_alone(method):
 
 def test_the_reproducible_profile_gives_the_same_bits():
     model, (q, v) = st.load(tail().folder, profile="reproducible"), unlike(11)
-    for method, names in (("rk4", ("none", "damping")), ("tsit5", ("none", "table", "phases"))):
+    for method, names in (("rk4", LAWS), ("tsit5", LAWS)):
         for name in names:
             with row(method, name):
                 found, _ = both(model, q, v, LAWS[name], **METHODS[method])
@@ -95,7 +94,7 @@ def test_every_form_of_a_model_has_lanes(name):
 @pytest.mark.parametrize("method", METHODS)
 def test_controllers_and_parameters_are_those_of_the_run_in_the_lane(method):
     q, v = unlike(13)
-    kinds = [None, DAMPING, EACH] if method == "rk4" else [None, DAMPING, PHASES, TABLE, JUMPS]
+    kinds = [None, DAMPING, PHASES, TABLE, JUMPS]
     given = (kinds * 5)[:13]
     own = {"tail_mass": np.linspace(0.002, 0.02, 13)}
     own["tail_mount"] = 0.02 * np.random.default_rng(1).normal(size=(13, 3))
@@ -141,17 +140,16 @@ def test_a_run_that_fails_loses_no_other(method):
         assert np.isnan(found.q[2, 1:]).all()
 
 
-def test_torques_of_their_own_fly_abreast_but_kinks_at_other_times_one_by_one():
+def test_torques_of_their_own_with_kinks_at_any_times_fly_abreast():
     (q, v), rng = starts(tail(), 19), np.random.default_rng(4)
     constants = [st.TorqueTable([0.0], 1e-5 * rng.normal(size=(1, NT)), 1e-6) for _ in range(19)]
     tables = [st.TorqueTable(TABLE.times, 1e-5 * rng.normal(size=(3, NT))) for _ in range(19)]
-    for given in (constants, tables, [None, DAMPING, *constants[2:]]):
+    kinks = [st.TorqueTable([0.0, 0.01 + 1e-3 * k], 1e-5 * np.eye(2, NT)) for k in range(19)]
+    for given in (constants, tables, kinks, [None, DAMPING, *constants[2:]]):
         found, flights = both(tail(), q, v, given, compare=near, **RK4)
         assert found.info["abreast"] == 8 and found.errors == [None] * 19
         work = [flight.info["work_J"]["torques"] for flight in flights]
         np.testing.assert_allclose(found.audit.work["torques"], work, rtol=1e-9, atol=1e-20)
-    given = [st.TorqueTable([0.0, 0.01 + 1e-3 * k], 1e-5 * np.eye(2, NT)) for k in range(19)]
-    assert both(tail(), q, v, given, **RK4)[0].info["abreast"] == 1
 
 
 @pytest.fixture
@@ -179,7 +177,7 @@ def test_short_work_compiles_nothing_until_all_of_it_would_have_paid(priced, bui
     q, v = starts(model, 9)
     assert st.simulate(model, q, v, **RK4).info["abreast"] == 1 and not built
     source = model.batch_library.rollouts
-    price = batched_runs.COMPILE_S_PER_BYTE * source.bytes
+    price = lanes.COMPILE_S_PER_BYTE * source.bytes
     assert 0 < source.missed < price
     source.missed = price - source.missed / 2  # what many such calls would have come to
     assert st.simulate(model, q[:7], v[:7], **RK4).info["abreast"] == 1  # no full vector
@@ -193,7 +191,7 @@ def test_short_work_compiles_nothing_until_all_of_it_would_have_paid(priced, bui
 def test_other_laws_fly_alone(built):
     model = st.load(tail().folder)
     q, v = starts(model, 9)
-    laws = [st.Phases([(0.0, None), (0.02, DAMPING)]), lambda t, q, v: [0.0] * NT]
+    laws = [lambda t, q, v: [0.0] * NT]
     laws.append(st.Pfl(model, st.Reference([0.0, 0.05], [[0.0] * NT, [0.3] * NT])))
     for law in laws:
         assert st.simulate(model, q, v, **RK4 | {"controller": law}).info["abreast"] == 1
@@ -203,30 +201,30 @@ def test_other_laws_fly_alone(built):
     assert len(built) == 1
 
 
-@pytest.mark.parametrize(("price", "lanes"), [(1e-9, 8), (1.0, 1)])
-def test_pilots_tell_whether_compiling_pays(priced, monkeypatch, price, lanes):
+@pytest.mark.parametrize(("price", "abreast"), [(1e-9, 8), (1.0, 1)])
+def test_pilots_tell_whether_compiling_pays(priced, monkeypatch, price, abreast):
     monkeypatch.setattr("serpentail.model.library.library_in_cache", lambda *_: None)
-    monkeypatch.setattr(batched_runs, "COMPILE_S_PER_BYTE", price)
-    monkeypatch.setattr(parallel_runs, "PILOTS", 5)
+    monkeypatch.setattr(lanes, "COMPILE_S_PER_BYTE", price)
+    monkeypatch.setattr(batch, "PILOTS", 5)
     model, how = st.load(tail().folder), {"t_span": 0.3, "method": "tsit5", "output_step": 0.0123}
     found, flights = both(model, *starts(model, 19), compare=near, **how)
-    assert found.info["abreast"] == lanes and found.errors == [None] * 19
+    assert found.info["abreast"] == abreast and found.errors == [None] * 19
     np.testing.assert_array_equal(found.q[:5], [flight.q for flight in flights[:5]])
 
 
 def test_sound_flights_are_made_abreast_and_no_second_time(monkeypatch):
     """A group that fails is made singly, run by run: none of these may."""
-    go, again = AdaptiveRuns.go, []
+    go, again = LaneRuns.go, []
 
     def told(self, runs, ended):
         for numbers, outcome in go(self, runs, ended):
-            again.extend([] if outcome else numbers)
+            again.extend(numbers if outcome is None else [])
             yield numbers, outcome
 
-    monkeypatch.setattr(AdaptiveRuns, "go", told)
+    monkeypatch.setattr(LaneRuns, "go", told)
     q, v = starts(tail(), 19)
     found = st.simulate(tail(), q, v, t_span=0.3, method="tsit5")
     assert again == [] and found.errors == [None] * 19
-    monkeypatch.setattr(parallel_runs, "RunsInTurn", lambda *_: pytest.fail("in turn"))
+    monkeypatch.setattr(batch, "RunsInTurn", lambda *_: pytest.fail("in turn"))
     for law in (None, DAMPING, TABLE, JUMPS):
         st.simulate(tail(), q, v, controller=law, **RK4)

@@ -147,12 +147,17 @@ def batch_files(
 
 def batch_context(scene: Scene, tail: Tail, batches: Sequence[Batch]) -> dict[str, Any]:
     """Return what the template of one file lays out."""
-    helpers = set().union(*(batch.body.helpers for batch in batches))
+    views = [BatchView(batch, tail, scene.name) for batch in batches]
+    return lanes_context(scene, batches) | {"functions": views}
+
+
+def lanes_context(scene: Scene, parts: Sequence[Batch | LaneFunction]) -> dict[str, Any]:
+    """Return what the template of a file needs for its functions over lanes."""
+    helpers = set().union(*(part.body.helpers for part in parts))
     return {
         "states": STATES[scene.real],
         "widest": STATES[scene.real],
-        "functions": [BatchView(batch, tail, scene.name) for batch in batches],
-        "steps": step_views(batches, scene.real, scene.name),
+        "steps": step_views(parts, scene.real, scene.name),
         "helpers": sorted(helpers | {"lanes", "all_lanes"}),
     }
 

@@ -1,162 +1,200 @@
-"""The C of batch rollouts: many states simulated by the same steps, a lane for each state."""
+"""The C that advances many runs, a lane for each: flights, and implicit steps on the ground."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import accumulate
 from typing import Any
 
+from ...functions.catalogue import function_of
 from ...functions.function import assemble
-from ...functions.tail import Tail
+from ...functions.tail import Tail, struct_parameters
+from ...ir.dataflow import on_arrays
 from ...ir.program import Program, padded
 from ...scene.scene import Scene
 from ..templating import render
-from .batch import STATES, lane_function
+from .batch import STATES, LaneFunction, lane_function, lanes_context
 from .form import PrintedFunction
-from .records import fields, member_views
-from .routine import CFunction
+from .records import ROLLOUTS, layout, member_views, steps_record
 from .simulation import own_damping
-from .views import callee_view, step_views
+from .views import callee_view
 
-RECORD = fields(
-    ("parameters", "const real *", "[count][PARAMETERS]"),
-    ("q", "const real *", "[count][NQ] start"),
-    ("v", "const real *", "[count][NV] start"),
-    ("q_out", "real *", "[count][samples][NQ] configurations, the start first"),
-    ("v_out", "real *", "[count][samples][NV] velocities"),
-    ("ledger", "real *", "[count][2] work (J) of torques and of damping over the flight"),
-    ("count", "size_t", "number of flights; STATES are computed at a time"),
-    ("samples", "long", "number of samples of each flight"),
-    ("damping", "const real *", "[NT] damping of the first flight (N m s)"),
-    ("damping_apart", "size_t", "reals from one flight's damping to the next; 0: the same for all"),
-    ("lengths", "const real *", "[steps] lengths of the steps (s)"),
-    (
-        "torques",
-        "const real *",
-        "[steps][3][NT] torques (N m) at start, middle, end of each step, first flight; or NULL",
-    ),
-    ("torques_apart", "size_t", "reals from one flight's torques to the next; 0: the same for all"),
-    ("due", "const int *", "[steps] whether a sample follows the step"),
-    ("steps", "long", "number of steps of each flight"),
-    ("pause", "long", "largest number of steps in one call"),
-    ("work", "real *", "workspace; it contains the flights between calls"),
-    ("first", "size_t", "first of the flights that are computed now; those before it have ended"),
-    ("step", "long", "number of steps that they have done"),
-    ("done", "long", "number of samples that they have written"),
-)
-
-
-ROLLOUTS = fields(
-    ("runs", "void *", "[count] run records of the simulation header"),
-    ("count", "long", "number of runs"),
-    ("statuses", "int *", "[count] of ended runs: OK; anything else: compute the run by itself"),
-    ("lanes", "long *", "[STATES] index of the run in each lane; -1: none"),
-    ("next", "long", "index of the next run to start"),
-    ("pause", "long", "largest number of steps in one call"),
-    ("work", "real *", "workspace; it contains the flights between calls"),
-)
-SLOTS = 10  # states in the workspace: start, seven rates, end, error of an adaptive step
-LEDGER = 2  # numbers that a flight sums up, stored behind its state
+FUNCTIONS = {"dynamics": "contact_dynamics", "factor": "implicit_factor", "solve": "implicit_solve"}
+ABSENT = ("damping", "gains")  # of implicit_factor: none acts in these steps
+SLOTS = 10  # states in the workspace of flights: see batch/rollout.c.jinja
+# rows of the workspace that arguments are in
+ROWS = {
+    "q": "q",
+    "v": "v",
+    "tau": "TAU(work)",
+    "bristles": "STATE(work) + STATES * (NQ + NV)",
+    "legs": "LEGS(work)",
+    "v_dot": "RATES(work)",
+    "bristle_rates": "RATES(work) + STATES * NV",
+    "forces": "FORCES(work)",
+    "weight": "WEIGHT(work)",
+    "factors": "FACTORS(work)",
+    "r_q": "right",
+    "r_v": "right + STATES * NV",
+    "r_u": "right + STATES * (NV + NV)",
+    "k_q": "found",
+    "k_v": "found + STATES * NV",
+    "k_u": "found + STATES * (NV + NV)",
+}
 
 
 @dataclass(frozen=True)
 class BatchRollout:
-    """Forward dynamics over lanes of states and of their parameters: its program, and its C."""
+    """Steps over lanes of states: their functions by role, and places in the workspace."""
 
     states: int
-    program: Program
-    body: CFunction
+    parts: Mapping[str, LaneFunction]
     parameters: int
-    size: int
-    nt: int
+    rows: tuple[tuple[str, int], ...]  # name and number of rows of each block of the workspace
 
     @property
-    def given(self) -> int:
-        """Return the position of torques in the workspace: behind the parameters."""
-        return self.states * self.parameters
-
-    @property
-    def state(self) -> int:
-        """Return the position of the states: behind given torques, damping and total torques."""
-        return self.given + 3 * self.states * self.nt
-
-    @property
-    def inner(self) -> int:
-        """Return the position of the workspace of forward dynamics."""
-        return padded(self.state + SLOTS * self.states * self.size)
+    def places(self) -> list[tuple[str, int]]:
+        """Return the position of each block, and of the workspace of functions after them."""
+        names = [name for name, _ in self.rows]
+        ends = accumulate((self.states * count for _, count in self.rows), initial=0)
+        *starts, end = ends
+        return [*zip(names, starts, strict=True), ("INNER", padded(end))]
 
     @property
     def work(self) -> int:
         """Reals of workspace in all."""
-        return self.inner + self.body.work
+        return self.places[-1][1] + max(part.body.work for part in self.parts.values())
 
 
 def batch_rollout(
     scene: Scene, tail: Tail, printed: Sequence[PrintedFunction]
 ) -> BatchRollout | None:
-    """Return the batch rollout of a scene with rollout and a free torso, but without contacts."""
-    if "rollout" not in scene.functions or scene.contacts or tail.fixed:
-        return None
-    (dynamics,) = (f.function for f in printed if f.function.name == "forward_dynamics")
+    """Return what advances runs in lanes, of a scene with rollout and a free torso.
 
-    # one state, with parameters of its own; then a lane for each state
-    single = assemble(dynamics, tail)
-    count = 0 if scene.baked else sum(a.length for a in single.of_role("parameters"))
-    lanes = lane_function(scene, single, "forward_dynamics_of_flights")
-    size = tail.nq + tail.nv + LEDGER
-    return BatchRollout(STATES[scene.real], lanes.program, lanes.body, count, size, tail.nt)
+    With contacts it needs implicit methods.
+    """
+    names = {f.function.name for f in printed}
+    if "rollout" not in scene.functions or tail.fixed:
+        return None
+    if scene.contacts and "implicit_factor" not in names:
+        return None
+    count = 0 if scene.baked else sum(p.size for p in struct_parameters(scene))
+    if not scene.contacts:
+        size = tail.nq + tail.nv + 2  # with the works of torques and of damping
+        dynamics = assemble(function_of("forward_dynamics", tail), tail)
+        parts = {"dynamics": lane_function(scene, dynamics, "forward_dynamics_of_flights")}
+        torques = [(name, tail.nt) for name in ("GIVEN", "DAMPING", "TAU")]
+        rows = (("OWN", count), *torques, ("STATE", SLOTS * size))
+        return BatchRollout(STATES[scene.real], parts, count, rows)
+    parts = {role: _part(scene, tail, name) for role, name in FUNCTIONS.items()}
+    size, bristles = tail.nq + tail.nv + tail.bristles, tail.bristles
+    rows = (
+        ("OWN", count),
+        ("STATE", size),
+        ("BEFORE", size),
+        ("TAU", tail.nt),
+        ("POSED", tail.leg_numbers),
+        ("LEGS", tail.leg_numbers),
+        ("WEIGHT", tail.weights),
+        ("RATES", tail.nv + bristles),
+        ("FORCES", 3 * tail.points),
+        ("FACTORS", tail.factors),
+        ("RIGHT", 2 * tail.nv + bristles),
+        ("FOUND", 2 * tail.nv + bristles),
+    )
+    return BatchRollout(STATES[scene.real], parts, count, rows)
+
+
+def _part(scene: Scene, tail: Tail, name: str) -> LaneFunction:
+    """Return a function over lanes."""
+    single = _with_zeros(assemble(function_of(name, tail), tail))
+    return lane_function(scene, single, f"{name}_of_runs")
+
+
+def _with_zeros(program: Program) -> Program:
+    """Return a program whose absent arguments are zeros."""
+    arrays = {
+        a.name: replace(a, role="constant", values=(0,) * a.length) if a.name in ABSENT else a
+        for a in program.arrays
+    }
+    body = on_arrays(program.body, arrays)
+    return replace(program, arrays=tuple(arrays.values()), body=body)
 
 
 def batch_rollout_file(
-    scene: Scene, rollout: BatchRollout | None, context: dict[str, Any]
+    scene: Scene, tail: Tail, runs: BatchRollout | None, context: dict[str, Any]
 ) -> dict[str, str]:
-    """Render the file of a batch rollout, if there is one."""
-    if rollout is None:
+    """Render the file of runs in lanes, if there is one."""
+    if runs is None:
         return {}
-    differing = context | rollout_context(scene, rollout)
-    return {f"src/{scene.name}_flights.c": render("c", "batch/rollout.c.jinja", differing)}
+    name, template, values = "flights", "rollout", _flights_context
+    if scene.contacts:
+        name, template, values = "ground", "ground", _ground_context
+    parts = list(runs.parts.values())
+    own = (
+        context
+        | lanes_context(scene, parts)
+        | {
+            "places": runs.places,
+            "parameter_count": runs.parameters,
+            "lanes_functions": [callee_view(p.program, p.body, scene.name) for p in parts],
+            "steps_record": member_views(steps_record(tail.bristles), scene.name),
+            "steps_type": name,
+            "legs": tail.leg_numbers > 0,
+            "bounded": scene.contacts and tail.kind != "articulated",
+        }
+    )
+    own |= values(scene, runs)
+    return {f"src/{scene.name}_{name}.c": render("c", f"batch/{template}.c.jinja", own)}
 
 
-def rollout_context(scene: Scene, rollout: BatchRollout) -> dict[str, Any]:
-    """Return the values that differ from those of the model's template."""
+def _flights_context(scene: Scene, runs: BatchRollout) -> dict[str, Any]:
+    """Return the values of flights alone."""
     # states and torques have their own names; parameters are at the start of the workspace
     arguments, place, places = [], 0, {}
-    for array in rollout.program.of_role("input"):
+    for array in runs.parts["dynamics"].program.of_role("input"):
         if array.name in ("q", "v", "tau"):
             arguments.append(array.name)
         else:
             arguments.append(f"own + STATES * {place}")
             places[array.name] = place
             place += array.length
-
+    damping = f"LOAD(own + ({places.get('tail_damping')} + k) * STATES + c)"
     return {
-        "states": rollout.states,
-        "widest": rollout.states,
-        "lanes_function": callee_view(rollout.program, rollout.body, scene.name),
+        "way": "steps",
         "arguments": ", ".join(arguments),
-        "record": member_views(RECORD, scene.name),
-        "damped_in_lanes": damped_in_lanes(scene, places),
-        "parameter_count": rollout.parameters,
-        "given": rollout.given,
-        "state": rollout.state,
-        "slots": SLOTS,
+        "damped_in_lanes": f"WIDE({own_damping(scene)}[k])" if scene.baked else damping,
+        "runs": f"{scene.name}_side_by_side",  # what explicit methods advance, and lengths of steps
+        "lengths": "const real *",
+        "method": "run->method",
         "rollouts_record": member_views(ROLLOUTS, scene.name),
-        "inner": rollout.inner,
-        "steps": step_views([rollout], scene.real, scene.name),
-        "helpers": sorted(rollout.body.helpers | {"lanes", "all_lanes"}),
     }
 
 
-def damped_in_lanes(scene: Scene, places: dict[str, int]) -> str:
-    """Print the tail's own damping of coordinate k, where parameters lie in these places."""
-    if scene.baked:
-        return f"WIDE({own_damping(scene)}[k])"
-    return f"LOAD(own + ({places.get('tail_damping')} + k) * STATES + c)"
+def _ground_context(scene: Scene, runs: BatchRollout) -> dict[str, Any]:
+    """Return the values of steps on the ground alone: the calls of their functions."""
+    calls = {}
+    for role, part in runs.parts.items():
+        name = callee_view(part.program, part.body, scene.name)["name"]
+        calls[role] = {"name": name, "arguments": _arguments(scene, part.program)}
+    return {"way": "ground", **calls}
 
 
-def batch_rollout_entry(rollout: BatchRollout | None) -> dict[str, Any]:
-    """Return what a loader must know of a batch rollout: states, workspace, record."""
-    if rollout is None:
+def _arguments(scene: Scene, program: Program) -> str:
+    """Print the arguments of a function: rows of the workspace."""
+    places, place = {}, 0
+    for parameter in struct_parameters(scene):
+        places[parameter.name] = f"OWN(work) + STATES * {place}"
+        place += parameter.size
+    arrays = (*program.of_role("input"), *program.of_role("output"))
+    return ", ".join(ROWS.get(a.name) or places[a.name] for a in arrays)
+
+
+def batch_rollout_entry(tail: Tail, runs: BatchRollout | None) -> dict[str, Any]:
+    """Return what a loader must know of runs in lanes: states, workspace, records."""
+    if runs is None:
         return {}
-    members = [[f.name, f.kind] for f in RECORD]
-    adaptive = [[f.name, f.kind] for f in ROLLOUTS]
-    sizes = {"states": rollout.states, "work": rollout.work}
-    return {"flights": sizes | {"record": members, "rollouts": adaptive}}
+    entry: dict[str, Any] = {"states": runs.states, "work": runs.work}
+    entry["record"] = layout(steps_record(tail.bristles))
+    if tail.bristles:
+        return {"ground": entry}
+    return {"flights": entry | {"rollouts": layout(ROLLOUTS)}}

@@ -66,7 +66,12 @@ DESCRIPTIONS = {
 
 def layouts(has: SimulationFeatures) -> dict[str, list[list[str]]]:
     """Return the members of every record, name and kind, for a caller in another language."""
-    return {record: [[f.name, f.kind] for f in members] for record, members in records(has).items()}
+    return {record: layout(members) for record, members in records(has).items()}
+
+
+def layout(members: Sequence[Field]) -> list[list[str]]:
+    """Return the members of one record, name and kind."""
+    return [[f.name, f.kind] for f in members]
 
 
 PIECEWISE = fields(
@@ -220,3 +225,38 @@ def _typed(text: str, prefix: str) -> str:
     """Return a C type with the model's prefix, ready for a name to follow."""
     full = re.sub(TYPES, lambda name: f"{prefix}_{name.group()}", text)
     return full if full.endswith("*") else full + " "
+
+
+STEPS = fields(
+    ("parameters", "const real *", "[count][PARAMETERS]"),
+    ("q", "real *", "[count][NQ] configurations, advanced in place"),
+    ("v", "real *", "[count][NV] velocities, advanced in place"),
+    ("torques", "const real *", "[NT] constant torques (N m) of the first state"),
+    ("torques_apart", "size_t", "reals from one state's torques to the next; 0: the same for all"),
+    ("count", "size_t", "number of states; STATES are computed at a time"),
+    ("h", "real", "length of a step (s)"),
+    ("steps", "long", "number of steps"),
+    ("work", "real *", "workspace"),
+    ("first", "size_t", "first of the states that are computed now; those before it are done"),
+)
+GROUND_STEPS = fields(
+    ("bristles", "real *", "[count][NU] bristle deflections (m), advanced in place"),
+    ("legs", "const real *", "[4][2] angle (rad) and rate (rad/s) of each hinge, first state"),
+    ("legs_apart", "size_t", "reals from one state's legs to the next; 0: the same for all"),
+)
+
+
+def steps_record(bristles: int) -> list[Field]:
+    """Return the record of steps of many states under constant torques."""
+    return (GROUND_STEPS if bristles else []) + STEPS
+
+
+ROLLOUTS = fields(
+    ("runs", "void *", "[count] run records of the simulation header, all by rk4 or all by tsit5"),
+    ("count", "long", "number of runs"),
+    ("statuses", "int *", "[count] of ended runs: OK; anything else: compute the run by itself"),
+    ("lanes", "long *", "[STATES] index of the run in each lane; -1: none"),
+    ("next", "long", "index of the next run to start"),
+    ("pause", "long", "largest number of steps in one call"),
+    ("work", "real *", "workspace; it contains the flights between calls"),
+)

@@ -27,6 +27,7 @@ MACROS = (
     *("NQ", "NV", "NT", "SIZE", "SLOT", "START", "END", "STAGES", "END_RATE", "TRIAL", "RIGHT"),
     *("TAU", "TABLE", "FORCES", "HEIGHTS", "REACHED", "LOOKS", "BENDS", "OFF", "POINTS", "GROUPS"),
     *("FACTORS", "INNER", "CORE", "LEDGER", "BYTES"),
+    *("STATES", "LANES", "lanes", "WIDE", "LOAD", "STORE"),  # of simulation/simulation.c.jinja
 )
 
 
@@ -71,6 +72,8 @@ def simulation_context(
         "methods": METHODS,
         "method": f"{scene.name}_method(run)" if "switching" in has.methods else "run->method",
         "air": AIR,
+        "runs": f"{scene.name}_run",  # what explicit methods advance, and the length of its steps
+        "lengths": "real ",
         "turns": 1 if tail.kind == "continuum" else tail.links,  # of a tip, for a coordinate
         "macros": MACROS,
         "slots": SLOTS,

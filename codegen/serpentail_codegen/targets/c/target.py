@@ -8,7 +8,6 @@ from ...functions.tail import Tail
 from ...scene.scene import Scene
 from ..target import Emission, Target
 from .batch import batch_entry, batch_files, batches
-from .batch_ground import ground_entry, ground_file, ground_steps
 from .batch_rollout import batch_rollout, batch_rollout_entry, batch_rollout_file
 from .form import RULE, printed_function
 from .loops import LoopPrinter
@@ -25,14 +24,12 @@ def emit(scene: Scene, tail: Tail, functions: Iterable[Function], version: str) 
 
     # what a host uses beside the model
     batched = batches(scene, tail, printed)
-    rollout = batch_rollout(scene, tail, printed)
+    runs = batch_rollout(scene, tail, printed)
     files = model | batch_files(scene, tail, batched, context) | package_files(context)
-    files |= batch_rollout_file(scene, rollout, context)
-    ground = ground_steps(scene, tail, printed)
-    files |= ground_file(scene, tail, ground, context)
+    files |= batch_rollout_file(scene, tail, runs, context)
 
     entries = c_entries(context) | {"batch": batch_entry(scene, batched)}
-    entries |= batch_rollout_entry(rollout) | ground_entry(ground)
+    entries |= batch_rollout_entry(tail, runs)
     if scene.emission == "auto":
         entries["forms"] = RULE
     described = {

@@ -18,7 +18,7 @@ from ...scenes.file import size_of
 from ...scenes.overrides import changed
 from ...scenes.scenario import Scenario
 from ...scenes.simulate import scenario_of
-from ...simulation.controllers import Damping, TorqueCurve, TorqueTable
+from ...simulation.controllers.controller import Damping, TorqueCurve, TorqueTable
 from ...simulation.rollouts import Rollouts
 from ...simulation.simulate import simulate
 from .job import DATA, STARTS, Job

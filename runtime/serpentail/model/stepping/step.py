@@ -24,15 +24,12 @@ from ...basics.errors import SimulationError, StateError
 from ...compiling.threads import MIN_STATES_PER_THREAD, checked_threads, shared
 from ..library import WHY
 from ..parameters import RunParameters
-from .held import Held
-from .lanes import GroundLaneSteps, LaneSteps
-from .singly import SingleSteps
+from .makers import ENTRIES, LaneSteps, SingleSteps, StepCall
 
 if TYPE_CHECKING:
     from ..model import Model
 
-LANES = {"rk4": LaneSteps, "implicit_euler": GroundLaneSteps}
-METHODS = tuple(LANES)
+METHODS = ("rk4", "implicit_euler")
 MOST_STEPS = 10_000  # in one call; for more, `simulate` checks for signals in between
 LEGS = 8  # angles (rad) and rates (rad/s) of both legs
 SINGLY_LEAST = 32  # steps that are worth a thread, made singly
@@ -64,20 +61,19 @@ class Stepping:
             self.alike = alike = np.tile(model.parameter_vector, (runs, 1))
         return alike[:runs]
 
-    def maker(self, model: Model, held: Held) -> tuple[SingleSteps | LaneSteps, int]:
+    def maker(self, model: Model, call: StepCall) -> tuple[SingleSteps | LaneSteps, int]:
         """Return what makes steps of runs, and the number of runs that is worth a thread."""
-        kind, batches = LANES[held.method], model.batch_library
-        entry = model.manifest.get(kind.entry)
-        if entry is None or held.runs < entry["states"]:
-            return self.singly, max(1, SINGLY_LEAST // held.steps)
-        if held.method not in self.lanes:
-            source = batches.sources[kind.entry]
-            self.lanes[held.method] = kind(model.manifest, source, self.singly)
-        return self.lanes[held.method], max(entry["states"], LANES_LEAST // (4 * held.steps))
+        entry = model.manifest.get(ENTRIES[call.method])
+        if entry is None or call.runs < entry["states"]:
+            return self.singly, max(1, SINGLY_LEAST // call.steps)
+        if call.method not in self.lanes:
+            lanes = LaneSteps(model.manifest, model.batch_library, call.method, self.singly)
+            self.lanes[call.method] = lanes
+        return self.lanes[call.method], max(entry["states"], LANES_LEAST // (4 * call.steps))
 
 
 @dataclass(frozen=True)
-class Settings:
+class StepSettings:
     """Settings of a call, as they were given."""
 
     steps: Any = 1
@@ -90,7 +86,7 @@ class Settings:
     threads: Any = None
 
     @classmethod
-    def named(cls, given: Mapping[str, Any]) -> Settings:
+    def named(cls, given: Mapping[str, Any]) -> StepSettings:
         """Return settings by their names; SimulationError for an unknown name."""
         for name in given:
             if line := none_of("step: setting", name, list(cls.__dataclass_fields__)):
@@ -105,7 +101,7 @@ def step(
     settings: Mapping[str, Any],
 ) -> tuple[np.ndarray, ...]:
     """Return the states after the steps: see ``Model.step``."""
-    asked = Settings.named(settings)
+    asked = StepSettings.named(settings)
     method, stepping = _method(model, asked.method), model.stepping
     length = number("step: h", h, SimulationError, above=0)
     steps = whole_number("step: steps", asked.steps, SimulationError, least=1, most=MOST_STEPS)
@@ -117,7 +113,7 @@ def step(
     if asked.statuses is None:
         _refuse_unsound(arrays, many)
     moved = _outputs(stepping.dtype, arrays, asked.out, runs if many else None)
-    held = Held(
+    call = StepCall(
         moved["q"],
         moved["v"],
         _rows(arrays["tau"], runs),
@@ -129,10 +125,10 @@ def step(
         method,
         _statuses(asked.statuses, runs),
     )
-    maker, least = stepping.maker(model, held)
-    shared(runs, threads, lambda first, last: maker.make(held, first, last), least)
-    if asked.statuses is None and held.statuses.any():
-        _fail(held, many)
+    maker, least = stepping.maker(model, call)
+    shared(runs, threads, lambda first, last: maker.make(call, first, last), least)
+    if asked.statuses is None and call.statuses.any():
+        _fail(call, many)
     return tuple(array if many else array[0] for array in moved.values())
 
 
@@ -158,7 +154,7 @@ def _implicit(model: Model) -> bool:
 
 
 def _states(
-    model: Model, given: tuple[ArrayLike, ArrayLike, ArrayLike], asked: Settings
+    model: Model, given: tuple[ArrayLike, ArrayLike, ArrayLike], asked: StepSettings
 ) -> tuple[dict[str, np.ndarray], int, bool]:
     """Return the arrays of a call, how many runs they have, and whether with a batch axis."""
     values: dict[str, Any] = dict(zip(("q", "v", "tau"), given, strict=True))
@@ -253,10 +249,10 @@ def _statuses(given: object, runs: int) -> np.ndarray:
     raise refusal("step: statuses", given, needs, StateError)
 
 
-def _fail(held: Held, many: bool) -> None:
+def _fail(call: StepCall, many: bool) -> None:
     """Raise the error of the first run that failed."""
-    k = int(held.statuses.nonzero()[0][0])
+    k = int(call.statuses.nonzero()[0][0])
     whose = f" of run {k}" if many else ""
-    failed = np.count_nonzero(held.statuses)
-    others = f" ({failed} of {held.runs} runs failed)" if failed > 1 else ""
-    raise SimulationError(f"step{whose}: {WHY[int(held.statuses[k])]}{others}")
+    failed = np.count_nonzero(call.statuses)
+    others = f" ({failed} of {call.runs} runs failed)" if failed > 1 else ""
+    raise SimulationError(f"step{whose}: {WHY[int(call.statuses[k])]}{others}")

@@ -13,7 +13,7 @@ from ...basics.errors import SimulationError
 from ...model.model import Model
 from ...model.parameters import total_mass
 from ...motion.trajectory import Trajectory
-from ...simulation.controllers import TorqueTable
+from ...simulation.controllers.controller import TorqueTable
 from ..flight import State, flight
 from ..free_start import part_of
 from ..problem import PlanningProblem

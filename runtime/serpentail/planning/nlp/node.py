@@ -24,7 +24,7 @@ from .start import Shared, StartRows, shared_of, start_rows
 if TYPE_CHECKING:
     import casadi as ca
 
-    from ...simulation.schedules import Legs
+    from ...simulation.controllers.schedules import Legs
     from ..problem import PlanningProblem
 
 # name -> blocks of the state, which has a rate, and of the algebraic unknowns, which a node's

@@ -15,7 +15,7 @@ from .coordinates import COM_ENTRIES, IDENTITY_POSE, rotated
 if TYPE_CHECKING:
     import casadi as ca
 
-    from ...simulation.schedules import Legs
+    from ...simulation.controllers.schedules import Legs
 
 
 class PathPoint(SimpleNamespace):

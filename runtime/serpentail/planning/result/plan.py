@@ -16,7 +16,7 @@ from ...model.model import Model
 from ...motion.archive import origin
 from ...motion.text import SI, framed
 from ...motion.trajectory import Trajectory
-from ...simulation.controllers import Controller, Damping, TorqueCurve
+from ...simulation.controllers.controller import Controller, Damping, TorqueCurve
 from ..flight import flight
 from ..nlp.coordinates import attitude
 from ..nlp.mesh import Mesh

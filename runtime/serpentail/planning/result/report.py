@@ -10,7 +10,7 @@ from ...basics.attitude import pitch_roll_yaw
 from ...basics.errors import SimulationError
 from ...model.model import Model
 from ...motion.trajectory import Trajectory
-from ...simulation.pfl import Pfl
+from ...simulation.controllers.pfl import Pfl
 from ..flight import flight
 from ..free_variables import chosen, start_found
 from ..problem import PlanningProblem

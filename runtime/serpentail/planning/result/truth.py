@@ -11,8 +11,8 @@ from ...basics.attitude import angle_deg, tilt_deg
 from ...basics.errors import SimulationError
 from ...model.model import Model
 from ...motion.resample import smooth
-from ...simulation.controllers import TorqueCurve
-from ...simulation.piecewise import Piecewise
+from ...simulation.controllers.controller import TorqueCurve
+from ...simulation.controllers.piecewise import Piecewise
 from ..flight import end_of_flight, flight
 from ..problem import PlanningProblem
 from .curve import Curve

@@ -1,4 +1,4 @@
-/* Exact directional derivatives of flights: kinematics by formulas here, accelerations by the model's Jacobians. */
+/* Exact directional derivatives of flights, by the model's kinematics and the Jacobians of its accelerations. */
 
 #include "fmu-unit.h"
 
@@ -30,16 +30,15 @@ static void add_product(const double *A, const double *x, size_t columns, double
 static int rate_along(Instance *unit, const double *along, const double *torques, double *out)
 {
   const double *q = unit->now.x, *v = q + NQ;
-  double dq[NV * NV], dv[NV * NV], dtau[NV * NT], change[NV], of_turn[4], of_omega[4];
+  double dq[NV * NV], dv[NV * NV], dtau[NV * NT], change[NV], of_q[NQ], of_v[NQ];
   const int status = MODEL(forward_dynamics_derivatives)(&unit->now.parameters, q, v, unit->now.u, dq, dv, dtau,
                                                          unit->work);
-  memcpy(out, along + NQ, 3 * sizeof(double));
-  turned(along + 3, v + 3, of_turn);
-  turned(q + 3, along + NQ + 3, of_omega);
-  for (int k = 0; k < 4; ++k) {
-    out[3 + k] = of_turn[k] + of_omega[k];
+  /* q_dot is linear in q, whose quaternion alone counts, and in v */
+  MODEL(configuration_rate)(along, v, of_q);
+  MODEL(configuration_rate)(q, along + NQ, of_v);
+  for (int k = 0; k < NQ; ++k) {
+    out[k] = of_v[k] + (k >= 3 && k < 7 ? of_q[k] : 0);
   }
-  memcpy(out + 7, along + NQ + 6, NT * sizeof(double));
   memset(out + NQ, 0, NV * sizeof(double));
   tangent(q, along, change);
   add_product(dq, change, NV, out + NQ);

@@ -11,14 +11,6 @@
 
 static const long MOST_STEPS = 1000000; /* in one step of co-simulation */
 
-void turned(const double *a, const double *omega, double *out)
-{
-  out[0] = 0.5 * (-a[1] * omega[0] - a[2] * omega[1] - a[3] * omega[2]);
-  out[1] = 0.5 * (a[0] * omega[0] + a[2] * omega[2] - a[3] * omega[1]);
-  out[2] = 0.5 * (a[0] * omega[1] + a[3] * omega[0] - a[1] * omega[2]);
-  out[3] = 0.5 * (a[0] * omega[2] + a[1] * omega[1] - a[2] * omega[0]);
-}
-
 fmi2Status known_rate(Instance *unit)
 {
   const double *q = unit->now.x, *v = q + NQ;
@@ -35,9 +27,7 @@ fmi2Status known_rate(Instance *unit)
   if (status != 0) {
     return told(unit, fmi2Discard, "no accelerations: a state, input or parameter is not finite or not physical");
   }
-  memcpy(unit->rate, v, 3 * sizeof(double));
-  turned(q + 3, v + 3, unit->rate + 3);
-  memcpy(unit->rate + 7, v + 6, NT * sizeof(double));
+  MODEL(configuration_rate)(q, v, unit->rate);
   unit->known = 1;
   return fmi2OK;
 }

@@ -39,8 +39,4 @@ fmi2Status MODEL(fmu_told)(const Instance *unit, fmi2Status status, const char *
 fmi2Status MODEL(fmu_known)(Instance *unit);
 #define known_rate MODEL(fmu_known)
 
-/* The product of quaternions a (0, omega) / 2. */
-void MODEL(fmu_turned)(const double *a, const double *omega, double *out);
-#define turned MODEL(fmu_turned)
-
 #endif

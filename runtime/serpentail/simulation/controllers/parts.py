@@ -7,26 +7,25 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .pfl import Pfl
 from .piecewise import Piecewise
 
 if TYPE_CHECKING:
-    from .controllers import NativeTorque
+    from .pfl import Pfl
 
 TorqueFunction = Callable[[float, np.ndarray, np.ndarray], ArrayLike]  # (t, q, v) -> tau
 
 
 @dataclass(frozen=True, eq=False)
-class OwnState:
-    """State of a C function during a run.
+class ControllerState:
+    """State of a controller during a run.
 
-    begin: called with the record of a run that begins, and the controller's clock (s). told:
+    begin: called with the record of a run that begins, and the controller's clock (s). info:
     returns what the run's info has of it. stops: called with the span of the run on that clock (s);
     returns the times (s) at which steps must end.
     """
 
     begin: Callable[[Any, float], None]
-    told: Callable[[], dict[str, Any]]
+    info: Callable[[], dict[str, Any]]
     stops: Callable[[float, float], list[float]]
 
 
@@ -35,16 +34,16 @@ class Parts:
     """Sum of the torques of one controller.
 
     damping (2m,) in N m s; native and user are functions of C and of Python. clock: time of the run
-    (s) at which the clock of the C function is 0; own: the state of that function.
+    (s) at which the clock of the C function is 0; state: what the controller remembers.
     """
 
     damping: np.ndarray | None = None
     torques: Piecewise | None = None
-    pfl: Pfl | None = None
+    pfl: "Pfl | None" = None
     native: "NativeTorque | None" = None
     user: TorqueFunction | None = None
     clock: float = 0.0
-    own: OwnState | None = None
+    state: ControllerState | None = None
 
     def since(self, begin: float) -> "Parts":
         """Return the parts with a clock that is 0 at the time ``begin`` (s) of the run."""
@@ -69,7 +68,30 @@ class Parts:
         return times
 
     def ticks(self, start: float, end: float) -> list[float]:
-        """Return the times of the run, from start to end, at which steps end for its own state."""
-        if self.own is None:
+        """Return the times (s) from start to end at which the controller needs a step to end."""
+        if self.state is None:
             return []
-        return [self.clock + t for t in self.own.stops(start - self.clock, end - self.clock)]
+        return [self.clock + t for t in self.state.stops(start - self.clock, end - self.clock)]
+
+
+@dataclass(frozen=True)
+class NativeTorque:
+    """A compiled function as controller.
+
+    The function has the C signature ``int f(void *context, real t, const real *q, const real *v,
+    real *tau)`` and returns 0 for success. ``t`` (s) is the clock of its phase.
+
+    Parameters
+    ----------
+    function : ctypes function or int
+        The function, or its address. The caller keeps it alive.
+    context : int, optional
+        Address that is passed to the function. The caller keeps it alive.
+    """
+
+    function: Any
+    context: int | None = None
+
+    def parts(self, nt: int) -> Parts:
+        """Return its parts; they do not depend on the number of tail coordinates."""
+        return Parts(native=self)

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..basics.checks import number, numbers_in, refusal
-from ..basics.errors import SimulationError
-from ..basics.short_repr import brief
-from .parts import OwnState, Parts
+from ...basics.checks import number, numbers_in, refusal
+from ...basics.errors import SimulationError
+from ...basics.short_repr import brief
+from .parts import ControllerState, Parts
 
 SAME = 1e-6  # of the time between ticks: closer times count as equal
 MOST_TICKS = 1_000_000  # of a run: steps end at each
@@ -71,8 +71,8 @@ class Sampled:
 
     def parts(self, nt: int) -> Parts:
         """Return its parts in a run, with that run's own memory."""
-        held = Held(self, nt)
-        return Parts(user=held, own=OwnState(held.begin, dict, self.stops))
+        torques = SampledTorques(self, nt)
+        return Parts(user=torques, state=ControllerState(torques.begin, dict, self.stops))
 
     def stops(self, start: float, end: float) -> list[float]:
         """Return the times (s) from start to end at which it measures, or its torques change."""
@@ -86,7 +86,7 @@ class Sampled:
         return [*map(float, both[apart])]
 
 
-class Held:
+class SampledTorques:
     """The torques of one run: those that act now, and those that will act after the delay."""
 
     def __init__(self, law: Sampled, nt: int):
@@ -101,7 +101,7 @@ class Held:
             single = type(record).t.size == np.dtype(np.float32).itemsize
             self.eps = float(np.finfo(np.float32 if single else float).eps)
         self.tick = -np.inf
-        self.acting: Any = np.zeros(self.nt)
+        self.torques: Any = np.zeros(self.nt)
         self.waiting: deque[tuple[float, Any]] = deque()  # when they begin to act (s), torques
 
     def __call__(self, t: float, q: np.ndarray, v: np.ndarray) -> Any:
@@ -116,5 +116,5 @@ class Held:
             begin = now + self.law.delay
             self.waiting.append((begin, given if found is None else found.copy()))
         while self.waiting and self.waiting[0][0] <= late:
-            self.acting = self.waiting.popleft()[1]
-        return self.acting
+            self.torques = self.waiting.popleft()[1]
+        return self.torques

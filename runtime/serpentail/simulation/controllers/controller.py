@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import repeat
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..basics.checks import finite_array, numbers, numbers_in, refusal
-from ..basics.errors import SimulationError
-from ..basics.short_repr import brief
-from .parts import Parts, TorqueFunction
+from ...basics.checks import finite_array, numbers, numbers_in, refusal
+from ...basics.errors import SimulationError
+from ...basics.short_repr import brief
+from .parts import NativeTorque, Parts, TorqueFunction
 from .pfl import Pfl
 from .piecewise import Piecewise, checked_nodes, linear
 from .sampled import Sampled
@@ -98,29 +98,6 @@ class TorqueCurve:
             needs = f"a Piecewise of {nt} channels"
             raise refusal("TorqueCurve: torques", self.torques, needs, SimulationError)
         return Parts(_damping(self.damping, nt), self.torques)
-
-
-@dataclass(frozen=True)
-class NativeTorque:
-    """A compiled function as controller.
-
-    The function has the C signature ``int f(void *context, real t, const real *q, const real *v,
-    real *tau)`` and returns 0 for success. ``t`` (s) is the clock of its phase.
-
-    Parameters
-    ----------
-    function : ctypes function or int
-        The function, or its address. The caller keeps it alive.
-    context : int, optional
-        Address that is passed to the function. The caller keeps it alive.
-    """
-
-    function: Any
-    context: int | None = None
-
-    def parts(self, nt: int) -> Parts:
-        """Return its parts; they do not depend on the number of tail coordinates."""
-        return Parts(native=self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,12 +207,9 @@ def parts_of(controller: Controller, nt: int) -> Parts:
     """
     if controller is None:
         return Parts()
-    if isinstance(controller, Pfl):
-        return Parts(pfl=controller)
-    own = getattr(controller, "parts", None)
-    if callable(own) and not isinstance(controller, type):
-        parts: Parts = own(nt)
-        return parts
+    parts = getattr(controller, "parts", None)
+    if callable(parts) and not isinstance(controller, type):
+        return cast(Parts, parts(nt))
     if callable(controller):
         return Parts(user=controller)
     raise refusal("controller", controller, CHOICES, SimulationError)

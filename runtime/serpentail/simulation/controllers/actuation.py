@@ -5,14 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from ..basics.checks import numbers_in, refusal
-from ..basics.errors import SimulationError
-from ..model.model import Model
-from .controllers import Controller, NativeTorque, parts_of, phases_of
+from ...basics.checks import numbers_in, refusal
+from ...basics.errors import SimulationError
+from ...model.model import Model
+from ..records import CFunction, Records
+from ..start import Start
+from .controller import Controller, controllers_of, parts_of, phases_of
 from .ctrl_c import CtrlC
-from .parts import Parts, TorqueFunction
+from .parts import NativeTorque, Parts, TorqueFunction
 from .piecewise import Piecewise
-from .records import CFunction, Records
 
 
 class Actuation:
@@ -32,9 +33,8 @@ class Actuation:
         # phases, each by its parts
         phases = phases_of(controller)
         begins = [begin for begin, _ in phases]
-        own = [parts_of(each, self.nt).since(begin) for begin, each in phases]
-        self.parts = [*map(self._available, own)]
-        self.legs = legs
+        all_parts = [parts_of(each, self.nt).since(begin) for begin, each in phases]
+        self.parts = [*map(self._available, all_parts)]
         if self.of_python:  # the user's: SciPy's methods work with their own
             self.float_errors = np.geterr()
         # times at which something is not smooth; steps end there
@@ -65,23 +65,23 @@ class Actuation:
         return any(parts.user is not None for parts in self.parts)
 
     @property
-    def keeps(self) -> bool:
+    def has_state(self) -> bool:
         """Whether one of them has a state of its own, so that runs cannot share it."""
-        return any(parts.own is not None for parts in self.parts)
+        return any(parts.state is not None for parts in self.parts)
 
     def begin(self, run: ctypes.Structure) -> None:
         """Reset controllers with a state for another run, given by its record."""
         for parts in self.parts:
-            if parts.own is not None:
-                parts.own.begin(run, parts.clock)
+            if parts.state is not None:
+                parts.state.begin(run, parts.clock)
 
-    def told(self) -> dict[str, Any]:
+    def info(self) -> dict[str, Any]:
         """Return what controllers add to a run's info."""
-        told: dict[str, Any] = {}
+        info: dict[str, Any] = {}
         for parts in self.parts:
-            if parts.own is not None:
-                told |= parts.own.told()
-        return told
+            if parts.state is not None:
+                info |= parts.state.info()
+        return info
 
     def _available(self, parts: Parts) -> Parts:
         """Return the parts for this model: PFL in Python if its C is missing."""
@@ -178,3 +178,59 @@ def _native(law: NativeTorque) -> dict[str, int | None]:
         needs = "a ctypes function or an address, and an address or None"
         raise refusal("NativeTorque", law, needs, SimulationError)
     return {"function": function, "context": law.context}
+
+
+class RunActuations:
+    """The actuation of each run; ``distinct`` has each once, ``alike``: all runs share one.
+
+    drives: addresses of the C records of the runs' actuations.
+    """
+
+    def __init__(
+        self, records: Records, controller: object, start: Start, legs: Piecewise | None = None
+    ):
+        self.records = records
+        self.span = start.start, start.end
+        controllers = controllers_of(controller, start.runs if start.many else None)
+        one_for_all = len(controllers) == 1 and start.runs > 1
+        if one_for_all and self._of(controllers[0], legs, None).has_state:
+            controllers = controllers * start.runs
+        # of one object that acts in several runs there is one record, unless it has a state
+        made: dict[int, Actuation] = {}
+        self._each = []
+        for k, each in enumerate(controllers):
+            if id(each) not in made or made[id(each)].has_state:
+                made[id(each)] = self._of(each, legs, k if len(controllers) > 1 else None)
+            self._each.append(made[id(each)])
+        self.distinct = [*dict.fromkeys(self._each)]
+        self.alike = len(self.distinct) == 1
+        drives = [ctypes.addressof(each.record) for each in self._each]
+        self.drives = np.array(drives * (start.runs if len(drives) == 1 else 1), np.uintp)
+
+    @property
+    def model(self) -> Model:
+        """The model whose tails are driven."""
+        return self.records.model
+
+    def _of(self, controller: Controller, legs: Piecewise | None, k: int | None) -> Actuation:
+        """Return the actuation of run k, or of all; SimulationError if it is impossible."""
+        try:
+            return Actuation(self.records, controller, self.span, legs)
+        except SimulationError as error:
+            if k is None:
+                raise
+            raise SimulationError(f"controller of run {k}: {error}") from None
+
+    def of(self, k: int) -> Actuation:
+        """Return the actuation of run k."""
+        return self.distinct[0] if self.alike else self._each[k]
+
+    @property
+    def has_state(self) -> bool:
+        """Whether one of them remembers something of a run."""
+        return any(each.has_state for each in self.distinct)
+
+    @property
+    def of_python(self) -> bool:
+        """Whether a function of Python acts in one of them."""
+        return any(each.of_python for each in self.distinct)

@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike
 
 from serpentail_scene.layout import TORSO_V
 
-from ..basics.checks import measured, number, numbers, refusal
-from ..basics.errors import SimulationError
-from ..model.model import Model
+from ...basics.checks import measured, number, numbers, refusal
+from ...basics.errors import SimulationError
+from ...model.model import Model
+from .parts import Parts
 from .piecewise import Piecewise, checked_nodes, spline
 from .schedules import Reference
 
@@ -76,6 +77,10 @@ class Pfl:
         self.curve = _curve(reference, model.layout.nt)
         self.feedforward = bool(feedforward)
         self.torque = None if torque is None else _limit(torque, model.layout.nt)
+
+    def parts(self, nt: int) -> Parts:
+        """Return its parts; it was checked when it was made."""
+        return Parts(pfl=self)
 
     def later(self, delay: float) -> Self:
         """Return the same law for a reference that begins later by ``delay`` (s)."""

@@ -1,4 +1,8 @@
-"""Makes a trajectory from the samples of a run, or raises the error that ended the run."""
+"""The trajectory of a run's samples; its energies, momenta and books when somebody asks.
+
+A run's state is certainly finite, but its energy need not be. Where that is not certain, they are
+computed at once, so that the run fails with an error of its own.
+"""
 
 import json
 from collections.abc import Iterable
@@ -13,9 +17,9 @@ from ..model.passive import behind_stops, stored_energy
 from ..motion.archive import origin
 from ..motion.trajectory import Trajectory
 from .audit import BALANCED, Between, allowance, audited, warnings_of
-from .compiled_run import Samples
-from .ground import Ground
+from .ground import GroundSettings
 from .methods import ADAPTIVE, FIXED
+from .runs.outcomes import Samples
 
 # numbers whose eighth power a real can hold
 MODEST = {np.dtype(real): float(np.finfo(real).max) ** 0.125 for real in (np.float32, np.float64)}
@@ -23,7 +27,7 @@ INTERRUPTED = "interrupted"  # the failure of a run that Ctrl-C ended, whose err
 MEASURES = {"energy": ("kinetic", "potential"), "momentum": ("linear_momentum", "angular_momentum")}
 
 
-def trajectory_or_error(model: Model, samples: Samples, ground: Ground) -> Trajectory:
+def trajectory_or_error(model: Model, samples: Samples, ground: GroundSettings) -> Trajectory:
     """Return the trajectory of samples; raise the error that ended the run, with its motion."""
     t, failure = samples.t, samples.failure
     if failure is not None and not len(t):
@@ -44,13 +48,13 @@ def trajectory_or_error(model: Model, samples: Samples, ground: Ground) -> Traje
     raise failure
 
 
-def measured(model: Model, samples: Samples, ground: Ground) -> Trajectory:
+def measured(model: Model, samples: Samples, ground: GroundSettings) -> Trajectory:
     """Return samples whose energies, momenta, forces and info are derived when asked for.
 
     Where it is not certain that numbers hold them they are derived now; StateError if not.
     """
     arrays = {"t": samples.t, "q": samples.q, "v": samples.v, "tau": samples.tau}
-    motion = Trajectory.of_run(arrays, model, Measures(model, samples, ground))
+    motion = Trajectory.of_run(arrays, model, Energies(model, samples, ground))
     whole = samples.failure is None and samples.ledger.size > 0
     method = samples.info.get("method") if whole else None
     numbers = model.parameter_vector, samples.q, samples.v, samples.bristles
@@ -78,13 +82,13 @@ def certain_runs(model: Model, method: str, numbers: Iterable[np.ndarray]) -> np
     return np.all(sound, axis=0) & certain(model, method, ())
 
 
-class Measures:
+class Energies:
     """Derived fields of a run's samples: called with a name, it returns the field and related ones.
 
     StateError if a result is too large for a number.
     """
 
-    def __init__(self, model: Model, samples: Samples, ground: Ground):
+    def __init__(self, model: Model, samples: Samples, ground: GroundSettings):
         self.model, self.samples, self.ground = model, samples, ground
 
     def __call__(self, name: str) -> dict[str, Any]:

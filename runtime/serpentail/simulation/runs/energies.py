@@ -6,31 +6,28 @@ from typing import Any
 
 import numpy as np
 
-from ..basics.errors import SimulationError, StateError
-from ..compiling.threads import in_turn
-from ..model.kernel import RunKernel
-from ..model.passive import stored_energy
-from ..motion.trajectory import Trajectory
-from .audit import BALANCED, Audit, Between, allowance, audited, warnings_of
-from .compiled_run import Memory
-from .measured import MEASURES, certain_runs
-from .methods import IntegrationMethod
-from .rollouts import Source
+from ...basics.errors import SimulationError, StateError
+from ...compiling.threads import in_turn
+from ...model.kernel import RunKernel
+from ...model.passive import stored_energy
+from ...motion.trajectory import Trajectory
+from ..audit import BALANCED, Audit, Between, allowance, audited, warnings_of
+from ..energies import MEASURES, certain_runs
+from ..rollouts import Source
+from .single import RunSet
 
 
-class MeasuredRuns:
+class EnergiesOfRuns:
     """Derived fields of runs' samples: called with a name, it returns the field and related ones.
 
     arrays: energies and momenta of all runs; ``late``: runs for which they are certainly finite, so
     that they can be derived when they are used.
     """
 
-    def __init__(
-        self, memory: Memory, method: IntegrationMethod, source: Source, threads: int
-    ) -> None:
-        self.memory, self.method, self.source, self.threads = memory, method, source, threads
+    def __init__(self, made: RunSet, source: Source, threads: int) -> None:
+        self.runs, self.method, self.source, self.threads = made, made.method, source, threads
         self.model, self.outcomes = source.model, source.outcomes
-        runs, samples = memory.start.runs, memory.start.intervals + 1
+        runs, samples = made.start.runs, made.start.intervals + 1
         self.arrays: dict[str, np.ndarray] = {}
         for kernel in map(self.model.kernel, MEASURES):
             for name, shape in zip(MEASURES[kernel.name], kernel.out_shapes, strict=True):
@@ -46,8 +43,8 @@ class MeasuredRuns:
         def measure(runs: np.ndarray) -> None:
             if not len(runs):
                 return
-            arrays = [self.memory.out[name][runs] for name in ("q", "v", "bristles")]
-            numbers = (self.memory.parameters.vectors[runs], *arrays)
+            arrays = [self.runs.out[name][runs] for name in ("q", "v", "bristles")]
+            numbers = (self.runs.parameters.vectors[runs], *arrays)
             late = certain_runs(self.model, self.method.name, numbers)
             self.late[runs[late]] = True
             for k in runs[~late].tolist():
@@ -75,7 +72,7 @@ class MeasuredRuns:
         error: SimulationError | None = None
         trajectory: Trajectory | None
         try:
-            trajectory = self.source.trajectory(k, self.memory.samples(k, outcome))
+            trajectory = self.source.trajectory(k, self.runs.samples(k, outcome))
         except SimulationError as caught:
             trajectory, error = caught.trajectory, caught
         for name, array in self.arrays.items():
@@ -106,7 +103,7 @@ class MeasuredRuns:
 
     def _kernels(self) -> list[RunKernel]:
         """Return the functions of the model that measure samples."""
-        vectors, out = self.memory.parameters.vectors, self.memory.out
+        vectors, out = self.runs.parameters.vectors, self.runs.out
         inputs = [out["q"], out["v"]]
         return [
             RunKernel(self.model.kernel(name), vectors, inputs, [self.arrays[each] for each in of])
@@ -121,7 +118,7 @@ class MeasuredRuns:
         for name in BALANCED:
             array = self.arrays[name]
             ends[name] = np.stack([array[:, 0], array[each, last]], axis=1).astype(float)
-        q, values = self.memory.out["q"], self.memory.parameters.values
+        q, values = self.runs.out["q"], self.runs.parameters.values
         tail = self.model.layout.tail_q
         tails = (q[:, 0, tail], q[each, last, tail])
         ends["stored"] = self._stored(tails)
@@ -131,7 +128,7 @@ class MeasuredRuns:
                 model, state = self.source.model_of(k), (stop["q"], stop["v"])
                 ends["kinetic"][k, 1], ends["potential"][k, 1] = model.energy(*state)
                 ends["linear_momentum"][k, 1] = model.momentum(*state)[0]
-        span = self.outcomes.ends - self.memory.start.start
+        span = self.outcomes.ends - self.runs.start.start
         between = Between(allowance(self.method.info, self._eps), self._all)
         return audited(self.model, values, self.outcomes.ledger, span, ends, between)
 
@@ -139,25 +136,25 @@ class MeasuredRuns:
         """Return what an audit needs of all samples of the runs that are marked."""
         done = self.outcomes.done
         self._measure(lambda k: [(int(done[k]), 0)] if of[k] else [])
-        tails = self.memory.out["q"][:, :, self.model.layout.tail_q]
+        tails = self.runs.out["q"][:, :, self.model.layout.tail_q]
         seen = {name: self.arrays[name].astype(float) for name in BALANCED}
         return seen | {"stored": self._stored(tails.swapaxes(0, 1))}
 
     def _stored(self, tails: Iterable[np.ndarray]) -> np.ndarray:
         """Return the energy (runs, samples) that tails store, given as (runs, 2m) by sample."""
-        values = self.memory.parameters.values
+        values = self.runs.parameters.values
         return np.stack([stored_energy(values, tail) for tail in tails], axis=1)
 
     @property
     def _eps(self) -> float:
-        return float(np.finfo(self.memory.records.dtype).eps)
+        return float(np.finfo(self.runs.records.dtype).eps)
 
     def _warnings(self, books: Audit) -> list[list[str]]:
         """Return the warnings of each run that did not fail."""
         eps, failed = self._eps, set(self.failed)
-        told = self.method.info, self.outcomes.told
+        info, infos = self.method.info, self.outcomes.infos
         return [
-            [] if k in failed else warnings_of(books.of(k), told[0] | told[1].get(k, {}), eps)
+            [] if k in failed else warnings_of(books.of(k), info | infos.get(k, {}), eps)
             for k in range(len(self.outcomes))
         ]
 

@@ -11,9 +11,9 @@ from ..basics.checks import refusal
 from ..basics.errors import SimulationError, StateError
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
-from .compiled_run import Samples
-from .ground import Ground
-from .measured import measured
+from .energies import measured
+from .ground import GroundSettings
+from .runs.outcomes import Samples
 
 EVERY = 0.1  # s from the end of one call to the next, at least
 
@@ -32,21 +32,21 @@ def checked_watch(watch: Any, many: bool) -> Watch | None:
 class Watched:
     """A run that is watched: the number of samples passed on, and the time of the last call."""
 
-    def __init__(self, watch: Watch, model: Model, ground: Ground):
+    def __init__(self, watch: Watch, model: Model, ground: GroundSettings):
         self.watch, self.model, self.ground = watch, model, ground
-        self.seen, self.told = 0, -np.inf
+        self.seen, self.last_call = 0, -np.inf
 
     def look(self, done: int, part: Callable[[int], Samples]) -> None:
         """Pass on the new samples, which ``part`` makes, if it is time."""
-        if done > self.seen and time.perf_counter() - self.told >= EVERY:
-            self._tell(part(self.seen))
+        if done > self.seen and time.perf_counter() - self.last_call >= EVERY:
+            self._call(part(self.seen))
 
     def end(self, samples: Samples) -> None:
         """Pass on the remaining samples, unless the user ended the run."""
         if len(samples.t) > self.seen and isinstance(samples.failure, SimulationError | None):
-            self._tell(rest(samples, self.seen))
+            self._call(samples_from(samples, self.seen))
 
-    def _tell(self, samples: Samples) -> None:
+    def _call(self, samples: Samples) -> None:
         """Call the function."""
         self.seen += len(samples.t)
         try:
@@ -54,10 +54,10 @@ class Watched:
         except StateError:  # no number holds its energy: the run will say so itself
             return
         self.watch(motion)
-        self.told = time.perf_counter()
+        self.last_call = time.perf_counter()
 
 
-def rest(samples: Samples, first: int) -> Samples:
+def samples_from(samples: Samples, first: int) -> Samples:
     """Return samples from one on, as a part of a run, without its ledger and its failure."""
     arrays: dict[str, Any] = {
         name: getattr(samples, name)[first:] for name in ("t", "q", "v", "tau", "bristles")

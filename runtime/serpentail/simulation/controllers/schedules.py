@@ -10,11 +10,11 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..basics.checks import finite_array, number, one_of, refusal, shown
-from ..basics.errors import SimulationError
-from ..basics.plausible_values import warn_of_degrees
-from ..basics.short_repr import brief
-from ..model.model import Model
+from ...basics.checks import finite_array, number, one_of, refusal, shown
+from ...basics.errors import SimulationError
+from ...basics.plausible_values import warn_of_degrees
+from ...basics.short_repr import brief
+from ...model.model import Model
 from .piecewise import Piecewise, blends, checked_nodes, linear, spline
 
 BLENDS = {"linear": linear, "quintic": blends, "spline": spline}

@@ -6,9 +6,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..basics.checks import finite_array, refusal
-from ..basics.errors import SimulationError
-from ..basics.short_repr import brief
+from ...basics.checks import finite_array, refusal
+from ...basics.errors import SimulationError
+from ...basics.short_repr import brief
 
 JUMP_TOLERANCE = 1e-9  # a jump that is smaller, over the largest value, is rounding
 

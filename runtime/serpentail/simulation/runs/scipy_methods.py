@@ -7,11 +7,12 @@ import numpy as np
 
 from serpentail_scene.layout import QUATERNION
 
-from ..basics.errors import SimulationError
-from ..model.library import NOT_FINITE
-from .compiled_run import CompiledRun, Samples, failed
-from .methods import IntegrationMethod
-from .watched import Watched, rest
+from ...basics.errors import SimulationError
+from ...model.library import NOT_FINITE
+from ..callback import Watched, samples_from
+from ..methods import IntegrationMethod
+from .outcomes import Samples, failed
+from .single import CompiledRun
 
 Part = tuple[float, np.ndarray, float]  # start (s), state there, end (s)
 
@@ -22,8 +23,8 @@ class StateRate:
     def __init__(self, run: CompiledRun, trials: bool):
         self.trials = trials
         self.refused: SimulationError | None = None
-        self.run, pointer, dtype = run, ctypes.c_void_p, run.records.dtype
-        self.function = run.function("state_rate", run.records.real, pointer, pointer, pointer)
+        self.run, pointer, dtype = run, ctypes.c_void_p, run.runs.records.dtype
+        self.function = run.function("state_rate", run.runs.records.real, pointer, pointer, pointer)
         size = sum(map(len, run.state.values()))
         self.y, self.y_dot = np.zeros(size, dtype), np.zeros(size, dtype)
         self.tau = np.zeros(run.actuation.nt, dtype)
@@ -72,14 +73,14 @@ class SampleWriter:
     def look(self) -> None:
         """Report the progress of the run."""
         if self.watched is not None:
-            self.watched.look(len(self.states), lambda first: rest(self.part(first), 0))
+            self.watched.look(len(self.states), lambda first: samples_from(self.part(first), 0))
 
     def part(self, first: int) -> Samples:
         """Return the samples written from a number on."""
         run, done = self.rate.run, len(self.states)
-        sizes = np.cumsum([run.model.nq, run.model.nv, 2 * run.ground.points])
+        sizes = np.cumsum([run.model.nq, run.model.nv, 2 * run.runs.ground.points])
         q, v, bristles, ledger = np.split(np.array(self.states[first:]), sizes, axis=1)
-        bristles = bristles.reshape(len(q), run.ground.points, 2)
+        bristles = bristles.reshape(len(q), run.runs.ground.points, 2)
         tau, times = np.array(self.torques[first:]), self.times[first:done]
         return Samples(times, q, v, tau, bristles, ledger[-1], {})
 
@@ -89,15 +90,15 @@ class SampleWriter:
 
 
 @np.errstate(all="ignore")  # a trial step may overflow, and is then taken again, shorter
-def integrate_by_scipy(
-    run: CompiledRun, method: IntegrationMethod, watched: Watched | None = None
-) -> Samples:
+def integrate_by_scipy(run: CompiledRun, watched: Watched | None = None) -> Samples:
     """Return the samples of a run, made from stop to stop, and the error that ended it, if any."""
+    method = run.runs.method
     run.actuation.begin(run.record)
     rate = StateRate(run, method.name == "dop853")  # a step with NaN is repeated, shorter
-    samples, counts = SampleWriter(rate, run.start.times, watched), {"steps": 0, "evaluations": 0}
-    ends = [*(t for t in run.actuation.stops if run.start.start < t < run.start.end), run.start.end]
-    y, t = np.concatenate([*run.state.values()]).astype(float), run.start.start
+    start, counts = run.runs.start, {"steps": 0, "evaluations": 0}
+    samples = SampleWriter(rate, start.times, watched)
+    ends = [*(t for t in run.actuation.stops if start.start < t < start.end), start.end]
+    y, t = np.concatenate([*run.state.values()]).astype(float), start.start
     failure: BaseException | None = None
     try:
         with run.actuation.ctrl_c.waits(run.actuation.of_python):
@@ -110,7 +111,7 @@ def integrate_by_scipy(
         if not samples.states:
             raise
         failure = error
-    info = counts | run.actuation.told()
+    info = counts | run.actuation.info()
     return replace(samples.part(0), info=info, failure=failure)
 
 

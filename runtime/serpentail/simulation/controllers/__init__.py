@@ -1,0 +1,1 @@
+"""Torque laws, schedules, and what they become in the C of a run."""

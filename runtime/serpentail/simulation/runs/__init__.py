@@ -1,0 +1,1 @@
+"""The ways to make runs: one after another, several in lanes, and by SciPy."""
