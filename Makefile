@@ -200,7 +200,7 @@ docs: $(READY)
 	@echo "written: output/docs/index.html"
 
 golden: $(READY)
-	$(PY) -m pytest tests/house/test_golden.py tests/docs/test_names.py --update-golden
+	$(PY) -m pytest tests/house/test_golden.py tests/house/test_model_functions.py tests/docs/test_names.py --update-golden
 
 clean:
 	rm -rf output .build docs/api docs/gallery

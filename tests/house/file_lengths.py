@@ -7,6 +7,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("codegen", "runtime", "tests", "benchmarks", "embedded", "examples", "mutants", "stress")
 MOST_LINES = 300
+WRITTEN = {ROOT / "runtime" / "serpentail" / "model" / "functions.py"}  # by `make golden`
 
 
 def main() -> int:
@@ -14,7 +15,7 @@ def main() -> int:
     complaints = []
     for path in sorted(path for name in FOLDERS for path in (ROOT / name).rglob("*.py")):
         lines = len(path.read_text(encoding="utf-8").splitlines())
-        if lines > MOST_LINES:
+        if lines > MOST_LINES and path not in WRITTEN:
             complaints.append(f"{path}: {lines} lines, more than {MOST_LINES}: split it by concept")
     print("\n".join(complaints) or f"all files have {MOST_LINES} lines or less")
     return 1 if complaints else 0

@@ -9,10 +9,10 @@ import numpy as np
 from ..basics.errors import ModelError
 from ..compiling.cores import checked_threads
 from .batch import BatchLibrary
+from .compiled_functions import without_c
 from .even_arcs import warn_of_even_arcs
 from .library import open_library
 from .manifest import CheckedFolder, read_folder
-from .methods.evaluated import without_c
 from .model import Model
 from .parameters import resolve
 from .plausible_sizes import warn_of_sizes

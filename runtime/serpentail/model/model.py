@@ -17,11 +17,11 @@ from ..basics.errors import SerpentailError
 from ..basics.extras import needed
 from ..compiling.cache import cache_folder
 from .batch import BatchLibrary
-from .functions import Functions
+from .compiled_functions import CompiledFunctions
 from .kernel import Kernel
 from .lazy import kept
 from .manifest import CheckedFolder
-from .methods.steps import StepMethods
+from .methods import ModelMethods
 from .parameters import (
     RunParameters,
     Value,
@@ -52,7 +52,7 @@ def _unpickled(
     return model_from(restored(manifest_hash, folder), parameters, profile, *options)
 
 
-class Model(Functions, StepMethods):
+class Model(ModelMethods):
     """Equations of motion of a body with a tail, compiled: H v_dot + C = [0; tau] + J^T f (Eq. 1).
 
     ``load`` and ``build`` make models. All quantities are in SI units and radians. The world's
@@ -108,6 +108,11 @@ class Model(Functions, StepMethods):
     the body frame (rad/s), and the rates of the tail coordinates (rad/s). On a fixed base ``q``
     and ``v`` hold the tail coordinates and their rates only.
 
+    A derivative with respect to ``q`` is taken in its tangent space: column k is the rate of change
+    when ``q`` moves with the velocity e_k. Columns 3 to 5 are rotations of the torso about its body
+    axes. N is the number of joints or samples of the tail; K is the number of points that can touch
+    the ground, in the order of ``contacts``.
+
     Every numeric method also takes arrays with a leading batch axis, and repeats a single state
     over the batch. With the profile "fast" the last digits of a result may depend on the size
     of the batch. Every method raises ``StateError`` if a shape is wrong or a value is not
@@ -161,7 +166,7 @@ class Model(Functions, StepMethods):
         self.parameter_vector = np.array(flat(manifest, parameters), real_type(manifest))
         self.parameter_vector.setflags(write=False)  # with_parameters makes another model
         self.batch_library = batch_library or BatchLibrary(checked, profile)
-        self.kernels: dict[str, Kernel] = {}
+        self.kernels = CompiledFunctions(manifest, library is not None)
         if library is not None:
             libraries = library, self.batch_library
             for name in manifest["functions"]:
