@@ -2,19 +2,18 @@
 
 import argparse
 import gc
-import json
+import hashlib
 import sys
 import time
 from pathlib import Path
 from typing import Any
 
+from serpentail_scene.keys import KINDS
 from serpentail_scene.signatures.table import ALL
 
-from .scene.naming import suffix
 from .scene.parse import load_scene, parse_scene, scene_for, scene_to_dict
 from .scene.problems import Problem, SceneError
-from .scene.scene import KINDS, Scene
-from .scene.schema import scene_schema
+from .scene.scene import Scene
 from .stamp import is_made, key_of, note
 
 
@@ -42,7 +41,6 @@ def parser() -> argparse.ArgumentParser:
     )
     p.add_argument("--progress", type=Path, help="keep in this file how far it is")
     p.add_argument("--print-folder", action="store_true", help="only tell which folder it is")
-    p.add_argument("--schema", action="store_true", help="only print the JSON Schema of scenes")
     return p
 
 
@@ -61,7 +59,22 @@ def scene_of(arguments: argparse.Namespace) -> Scene:
     scene, own = _with_options(arguments, chosen)
     if arguments.name:
         return scene
-    return _renamed(scene, own.name + suffix(scene, own, arguments.functions))
+    return _renamed(scene, own.name + _suffix(scene, own, arguments.functions))
+
+
+def _suffix(scene: Scene, own: Scene, functions: str | None = None) -> str:
+    """Return what options add to the name of a scene.
+
+    functions: as the user gave them; "all" is added as a word, other choices as a short hash.
+    """
+    keys = ("real", "emission", "profile")
+    words = [getattr(scene, key) for key in keys if getattr(scene, key) != getattr(own, key)]
+    if scene.baked != own.baked:
+        words.append("baked")
+    if scene.functions != own.functions:
+        digest = hashlib.sha256(",".join(scene.functions).encode()).hexdigest()
+        words.append("all" if functions == "all" else f"f{digest[:6]}")
+    return "".join(f"_{word}" for word in words)
 
 
 def _with_options(arguments: argparse.Namespace, chosen: dict[str, Any]) -> tuple[Scene, Scene]:
@@ -85,9 +98,6 @@ def main(argv: list[str] | None = None) -> int:
     """Generate the model if its folder is not up to date; return the exit status."""
     try:
         arguments = parser().parse_args(argv)
-        if arguments.schema:
-            print(json.dumps(scene_schema()))
-            return 0
         scene = scene_of(arguments)
         if arguments.given:
             load_scene(arguments.given)

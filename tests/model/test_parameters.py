@@ -9,9 +9,9 @@ import pytest
 
 import serpentail as st
 from serpentail.model.parameters import RunParameters, ellipsoid, resolve
-from serpentail_codegen.scene.parameters import PARAMETERS
 from serpentail_codegen.scene.parse import parse_scene
 from serpentail_codegen.scene.resolve import resolve_parameters
+from serpentail_scene.parameters import PARAMETERS
 from tests.support import zoo
 from tests.support.models import folder_of
 from tests.support.rows import row

@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 
 from serpentail_codegen.pipeline import tail_of
-from serpentail_codegen.scene.parameters import PARAMETERS
 from serpentail_codegen.scene.parse import parse_scene
-from serpentail_codegen.scene.passive import PASSIVE, PASSIVE_NAMES
 from serpentail_codegen.scene.resolve import resolve_parameters
-from serpentail_codegen.scene.scene import GROUPS
 from serpentail_codegen.scene.variant import EQUAL
+from serpentail_scene.keys import GROUPS
+from serpentail_scene.parameters import PARAMETERS, PASSIVE, PASSIVE_NAMES
 from tests.support.rows import row
 from tests.support.scenes import VALID
 

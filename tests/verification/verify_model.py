@@ -26,8 +26,8 @@ from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.pipeline import generate, tail_of
 from serpentail_codegen.scene.parse import parse_scene
-from serpentail_codegen.scene.passive import PASSIVE_NAMES
 from serpentail_scene.layout import TAIL_Q, TAIL_V, TORSO_NQ
+from serpentail_scene.parameters import PASSIVE_NAMES
 from serpentail_scene.signatures.signature import CONTACT, IMPLICIT, SIMULATION
 from serpentail_scene.signatures.table import in_group
 

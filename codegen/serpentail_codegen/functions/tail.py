@@ -4,9 +4,9 @@ from dataclasses import dataclass, replace
 from math import pi
 
 from serpentail_scene.layout import TORSO_NQ, TORSO_NV, Sizes
+from serpentail_scene.parameters import Parameter
 
 from ..ir.program import Array, Ref, padded
-from ..scene.parameters import Parameter
 from ..scene.resolve import parameters_of
 from ..scene.scene import Scene
 from ..scene.variant import EQUAL, Run, Shape, Stretch, runs_of, stretches_of

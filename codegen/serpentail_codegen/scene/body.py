@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from math import pi, prod
 from typing import Any
 
+from serpentail_scene.parameters import PARAMETERS, PASSIVE, Value
+from serpentail_scene.rules import POSITIVE, is_finite
 from serpentail_scene.units import dimensions, in_unit
 
-from .checks import is_finite
-from .parameters import PARAMETERS, Parameters, Value
-from .passive import PASSIVE
 from .problems import Problem, suggest
+from .scene import Parameters
 
 # Exponents of the body mass: bone lengths of legs, Alexander, Jayes, Maloiy & Wathuta, J. Zool. 189
 # (1979) 305-314; times of a stride at equivalent speeds, Heglund & Taylor, J. Exp. Biol. 138 (1988)
@@ -153,8 +153,8 @@ def _lengths(field: str, value: Any, problems: list[Problem]) -> tuple[float, ..
     except ValueError as error:
         problems.append(Problem(field, value, str(error)))
         return ()
-    sound = isinstance(lengths, list | tuple) and len(lengths) == 3
-    if not sound or not all(is_finite(x) and x > 0 for x in lengths):
+    three = isinstance(lengths, list | tuple) and len(lengths) == 3
+    if not three or not POSITIVE.holds(lengths):
         problems.append(Problem(field, value, "needs three lengths above 0, in m"))
         return ()
     return tuple(map(float, lengths))

@@ -8,6 +8,8 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from serpentail_scene.keys import CONTACTS, GROUPS, KEYS, ONLY, TARGETS, Only, foreign_to
+from serpentail_scene.parameters import PARAMETERS, parts_of
 from serpentail_scene.signatures.table import (
     ALL,
     DEFAULT,
@@ -21,6 +23,7 @@ from serpentail_scene.units import in_unit
 
 from .body import OF_TORSO, body_of, scaled
 from .checks import (
+    MOST_LINKS,
     contact_problems,
     fixed_problems,
     function_problems,
@@ -34,21 +37,9 @@ from .checks import (
     tail_pieces,
     unknown_keys,
 )
-from .parameters import PARAMETERS
-from .passive import parts_of
 from .problems import Problem, SceneError
 from .resolve import resolve_parameters
-from .scene import (
-    CONTACTS,
-    GROUPS,
-    KEYS,
-    MOST_LINKS,
-    ONLY,
-    TARGETS,
-    Only,
-    Scene,
-    foreign_to,
-)
+from .scene import Scene
 from .segments import are_tables, tell_values
 from .tail_tables import tail_described
 from .variant import EQUAL
@@ -125,7 +116,7 @@ def _kind(table: Mapping[str, Any]) -> str:
 
 def _with_defaults(table: Mapping[str, Any], name: str, rules: Only) -> dict[str, Any]:
     """Return a table with defaults for missing keys, None for a missing key that is required."""
-    values = {key: default for key, (default, _) in KEYS.items()}
+    values = {name: key.default for name, key in KEYS.items()}
     values |= {"name": name, "coordinates": rules.coordinates[0]}
     values |= dict.fromkeys(rules.required) | {"shape": EQUAL, "tables": ""}
     values |= {"unscaled": None, "size": Scene.size}
@@ -161,7 +152,8 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
     foreign = {*foreign_to(scene.kind)[0]}
     foreign |= set() if scene.contacts else {"contacts", "friction"}
     foreign |= {"shape", "tables", "body", "unscaled", "size"}  # these follow from other keys
-    foreign |= {name for name in ("base", "weightless") if getattr(scene, name) == KEYS[name][0]}
+    usual = {name: KEYS[name].default for name in ("base", "weightless")}
+    foreign |= {name for name, value in usual.items() if getattr(scene, name) == value}
     names = [field.name for field in fields(Scene) if field.name not in foreign]
     table = {name: getattr(scene, name) for name in names}
     written = json.loads(scene.tables or "{}")
@@ -173,7 +165,7 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
     # an inertia that follows from link_radius is computed again, as are values from tables
     computed = {"link_inertia"} if "link_radius" in scene.parameters else set()
     if written and tell_values(written):
-        computed |= {p.name for p in PARAMETERS if p.tail in ("link", "arc")}
+        computed |= {p.name for p in PARAMETERS if p.of_pieces}
     if "torso" in table.get("body", {}):
         computed |= set(OF_TORSO)
     described = scene.unscaled or scene.parameters

@@ -5,20 +5,14 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import Any
 
+from serpentail_scene.keys import foreign_to
+from serpentail_scene.parameters import NAMES, PARAMETERS, PASSIVE, Parameter, Value, parts_of
 from serpentail_scene.units import in_unit
 
 from .checks import fits, number_problem, plain, unknown_keys
 from .cone import ellipsoid, single
-from .parameters import PARAMETERS, Parameter, Parameters, Value
-from .passive import (
-    for_all,
-    lacking_passive,
-    parts_of,
-    passive_parameters,
-    stop_problems,
-)
 from .problems import Problem, SceneError
-from .scene import NAMES, foreign_to
+from .scene import Parameters
 from .segment_tables import flattened
 from .segments import RADIUS
 from .variant import EQUAL, Shape
@@ -117,7 +111,7 @@ def _ellipsoid_inertia(parameters: Mapping[str, Any], tail_links: int) -> tuple[
 
 def of_pieces(parameter: Parameter, value: Any) -> Any:
     """Return a value of single links or arcs as one array; each may have its own three moments."""
-    if parameter.tail not in ("link", "arc") or not isinstance(value, list | tuple):
+    if not parameter.of_pieces or not isinstance(value, list | tuple):
         return value
     numbers = list(flattened(value))
     return numbers[0] if parameter.size == len(numbers) == 1 else numbers
@@ -154,3 +148,47 @@ def _floats(value: Any) -> Value:
     if isinstance(value, list | tuple):
         return tuple(float(x) + 0.0 for x in value)
     return float(value) + 0.0
+
+
+# ---- the passive tail ---------------------------------------------------------------------------
+
+
+def passive_parameters(passive: Collection[str], segments: int) -> tuple[Parameter, ...]:
+    """Return the parameters of a tail's passive parts, with one number for each coordinate."""
+    size = 2 * segments
+    return tuple(
+        replace(p, size=size, default=(p.default,) * size if isinstance(p.default, float) else None)
+        for p in PASSIVE
+        if p.needs in passive
+    )
+
+
+def for_all(parameter: Parameter, value: Any) -> Any:
+    """Return one number for each coordinate, also if a single number stands for all."""
+    alone = isinstance(value, int | float) and not isinstance(value, bool)
+    return [value] * parameter.size if alone else value
+
+
+def lacking_passive(named: Mapping[str, Any], passive: Collection[str]) -> list[Problem]:
+    """Return a problem for each parameter that a part needs and the scene does not name."""
+    problems = []
+    for p in PASSIVE:
+        if p.needs in passive and p.default is None and p.name not in named:
+            first = next(q.name for q in PASSIVE if q.needs == p.needs and q.name in named)
+            remedy = f"has no default, and {first} needs it: give it in {p.unit}, or remove {first}"
+            problems.append(Problem(f"parameters.{p.name}", None, remedy))
+    return problems
+
+
+def stop_problems(given: Mapping[str, Any]) -> list[Problem]:
+    """Return a problem for each coordinate whose stops leave no room between them."""
+    pairs = zip(given["tail_stop_lower"], given["tail_stop_upper"], strict=True)
+    return [
+        Problem(
+            f"parameters.tail_stop_lower[{k}]",
+            lower,
+            f"needs to be below tail_stop_upper[{k}] = {upper}: stops exclude each other",
+        )
+        for k, (lower, upper) in enumerate(pairs)
+        if not lower < upper
+    ]

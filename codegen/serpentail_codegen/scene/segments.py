@@ -6,26 +6,13 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from serpentail_scene.keys import INERTIAS, LENGTHS, MASSES, OF_ARCS, OF_LINKS, SEGMENT, TAPER
+
+from .checks import MOST_LINKS
 from .cone import Links, cut, single, volume
 from .problems import Problem
-from .scene import MOST_LINKS
-from .segment_tables import (
-    INERTIAS,
-    LENGTHS,
-    MASSES,
-    TAPER,
-    VALUES,
-    Numbers,
-    count_of,
-    kind_of,
-    numbers_of,
-    table_of,
-)
+from .segment_tables import Numbers, count_of, kind_of, numbers_of, table_of
 
-OWN = {
-    *("link_masses", "link_lengths", "link_centers", "link_inertias"),
-    *("arc_masses", "arc_lengths"),
-}
 RADIUS = 0.0029  # m, of links whose inertia no key gives: the radius of the tail in Table 1
 
 
@@ -82,11 +69,11 @@ def described(
         return Described(counts, kinds, problems=tuple(problems))
 
     # pieces are equal unless a key describes them; those of a mixed tail never are
-    if taper is None and not any(read) and (kind != "mixed" or OWN & set(named)):
+    if taper is None and not any(read) and (kind != "mixed" or {*OF_LINKS, *OF_ARCS} & set(named)):
         return Described(counts, kinds)
     sizes = [n if own == "articulated" else 1 for n, own in zip(counts, kinds, strict=True)]
     values = [
-        numbers_of(place, table, VALUES, n, problems)
+        numbers_of(place, table, SEGMENT, n, problems)
         for place, table, n in zip(places, read, sizes, strict=True)
     ]
     if problems:

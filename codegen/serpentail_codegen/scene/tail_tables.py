@@ -5,13 +5,16 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from .parameters import PARAMETERS
+from serpentail_scene.keys import SEGMENTS
+from serpentail_scene.parameters import PARAMETERS
+from serpentail_scene.rules import COUNT
+
+from .checks import MOST_LINKS
 from .problems import Problem
-from .scene import COUNT, MOST_LINKS, SEGMENTS
 from .segments import Described, are_tables, described
 from .variant import EQUAL, Shape
 
-OWN = {p.name: p.tail for p in PARAMETERS if p.tail in ("link", "arc")}
+OWN = {p.name: p.tail for p in PARAMETERS if p.of_pieces}
 
 
 @dataclass(frozen=True)

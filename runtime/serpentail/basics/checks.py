@@ -5,13 +5,13 @@ the value and what the field needs.
 """
 
 from collections.abc import Callable, Collection, Sequence
-from difflib import get_close_matches
 from operator import index
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from serpentail_scene.messages import did_you_mean, shown
 from serpentail_scene.units import in_unit
 
 from .errors import SerpentailError, StateError
@@ -54,23 +54,6 @@ def refusal(field: str, value: object, needs: str, error: Error) -> Exception:
 def needed(field: str, value: object, needs: str) -> str:
     """Return a line about a value that a field cannot have."""
     return f"{field}: value {shown(value)}: needs {needs}"
-
-
-def shown(value: object) -> str:
-    """Return a value as Python writes it, on one line and shortened if it is long."""
-    try:
-        text = repr(value)
-    except (ValueError, RecursionError):  # repr refuses integers of more than 4300 digits
-        return f"of type {type(value).__name__}, too long to show"
-    return one_line(text)
-
-
-def one_line(text: str) -> str:
-    """Return a text on one line of at most 200 characters."""
-    line = text
-    if not text.isprintable():
-        line = "".join(x if x.isprintable() else repr(x)[1:-1] for x in " ".join(text.split()))
-    return line if len(line) <= 200 else line[:197] + "..."
 
 
 def real_array(
@@ -221,9 +204,3 @@ def none_of(field: str, value: object, names: Collection[str]) -> str:
         return ""
     remedy = did_you_mean(value, names) or f"needs {' or '.join(map(repr, names))}"
     return f"{field}: value {shown(value)}: {remedy}"
-
-
-def did_you_mean(value: object, names: Collection[str]) -> str:
-    """Return a question with the nearest name; "" if no name is near."""
-    near = get_close_matches(value, names, 1) if isinstance(value, str) else []
-    return f"did you mean {near[0]!r}?" if near else ""

@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from serpentail_scene.messages import did_you_mean, one_line, shown
+from serpentail_scene.rules import NUMBER_RULES, ROUNDING, NumberRule
 from serpentail_scene.units import in_unit
 
-from ..basics.checks import did_you_mean, numbers_in, one_line, shown
+from ..basics.checks import numbers_in
 from ..basics.errors import ModelError
 
 Value = float | tuple[float, ...]
@@ -19,15 +21,6 @@ UNITS = {"tail_mass": "kg", "tail_length": "m", "gravity": "m/s^2"}
 TOTALS = {
     "tail_mass": ("link_masses", "arc_masses"),
     "tail_length": ("link_lengths", "arc_lengths"),
-}
-CHECKS = {  # of rows (K, size), for each one
-    "positive": (lambda x: (x > 0).all(axis=1), "above 0"),
-    "not_negative": (lambda x: (x >= 0).all(axis=1), "0 or above"),
-    "finite": (lambda x: np.ones(len(x), bool), ""),
-    "body_inertia": (
-        lambda x: (x > 0).all(axis=1) & (2 * x.max(axis=1) <= x.sum(axis=1) * (1 + 1e-12)),
-        "above 0, none above the sum of the other two",
-    ),
 }
 
 
@@ -226,13 +219,13 @@ def checked_value(
         return f"{one_line(f'{name}')}: no such parameter; {remedy}"
     # the required value, in words and as a shape
     size, unit = fields[name]["size"], fields[name]["unit"]
-    holds, words = CHECKS[fields[name]["check"]]
+    rule = NUMBER_RULES[fields[name]["check"]]
     pieces = fields[name].get("pieces")
     kind = "a finite number" if size == 1 else f"{size} finite numbers"
     kind += f", {size // pieces} of each piece of the tail" if pieces else ""
     of_all = "per" in fields[name]  # one number may be given for all coordinates
     kind += ", or one for all," if of_all else ""
-    needs = f"needs {kind} ({unit}){', ' if words else ''}{words}"
+    needs = f"needs {kind} ({unit}){', ' if rule.words else ''}{rule.words}"
     shape = (size,) if size > 1 or pieces else ()
     if runs is not None:
         needs, shape = f"{needs}, for each of {runs} runs", (runs, *shape)
@@ -248,14 +241,22 @@ def checked_value(
         return f"{name}: value {shown(value)}: {needs}{_counted(numbers)}"
     # the first run with a wrong value
     rows = numbers.reshape(-1, size)
-    with np.errstate(over="ignore"):
-        wrong = np.flatnonzero(~(np.isfinite(rows).all(axis=1) & holds(rows)))
+    wrong = np.flatnonzero(~_sound(rows, rule))
     if not len(wrong):
         return numbers
     needs += _broken(rows[wrong[0]])
     if runs is None:
         return f"{name}: value {shown(value)}: {needs}"
     return f"{name} of run {wrong[0]}: value {shown(numbers[wrong[0]].tolist())}: {needs}"
+
+
+def _sound(rows: np.ndarray, rule: NumberRule) -> np.ndarray:
+    """Tell which rows (K, size) are finite numbers that satisfy a rule."""
+    each = np.isfinite(rows) & (rows > rule.above) & (rows >= rule.least)
+    if not rule.of_body:
+        return each.all(axis=1)
+    with np.errstate(over="ignore", invalid="ignore"):
+        return each.all(axis=1) & (2 * rows.max(axis=1) <= rows.sum(axis=1) * ROUNDING)
 
 
 def _counted(numbers: np.ndarray | None) -> str:

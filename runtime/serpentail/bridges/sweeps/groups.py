@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from serpentail_scene.keys import Key
+
 from ... import __version__
 from ...basics.checks import Refusals, did_you_mean, numbers_in, shown
 from ...basics.errors import IdentificationError, PlanningError, SimulationError, SweepError
@@ -15,10 +17,10 @@ from ...building.options import Parameters
 from ...model.model import Model
 from ...model.parameters import independent
 from ...scenes.file import MADE_OF, read_scene, subtable
-from ...scenes.identify_keys import IDENTIFY
-from ...scenes.keys import Key, read
+from ...scenes.identify import IDENTIFY
+from ...scenes.keys import read
 from ...scenes.overrides import changed
-from ...scenes.plan_keys import PLAN
+from ...scenes.plan import PLAN
 from ...scenes.simulate_keys import SIMULATE
 from .axes import Axes, Point
 from .axis import as_json, plain

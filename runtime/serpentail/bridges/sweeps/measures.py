@@ -3,7 +3,7 @@
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
-from ...scenes.keys import Key
+from serpentail_scene.keys import Key
 
 Units = dict[str, str | Sequence[str] | None]  # by name; None: any unit, in SI
 
