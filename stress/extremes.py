@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from serpentail.model.plausible_sizes import disparity
+from serpentail.basics.plausible_values import disparity
 from stress.figures import Figure
 from stress.subjects import changed, errors, judged, state, subject
 

@@ -18,8 +18,8 @@ from filelock import FileLock
 
 import serpentail as st
 from examples.studies.parts import Part, made
-from serpentail.model.plausible_sizes import UNLIKE as UNLIKE_FROM
-from serpentail.model.plausible_sizes import disparity
+from serpentail.basics.plausible_values import UNLIKE as UNLIKE_FROM
+from serpentail.basics.plausible_values import disparity
 from stress import drops, scene_fuzz
 from stress.subjects import Subject, changed, exact_of, state
 from tests.references.metrics import mass_matrix_error

@@ -30,8 +30,8 @@ from .parameters import (
     merged,
     real_type,
     resolve,
+    warn_of_parameters,
 )
-from .plausible_sizes import warn_of_sizes
 from .snapshot import restored, snapshot
 from .tail import links_of, words_of
 
@@ -203,7 +203,7 @@ class Model(ModelMethods):
             As of ``load``.
         """
         varied = self._varied(changes)
-        warn_of_sizes(self.manifest, varied.parameters)
+        warn_of_parameters(self.manifest, varied.parameters, 2)
         return varied
 
     def _varied(self, changes: Mapping[str, Any]) -> Model:
@@ -245,7 +245,7 @@ class Model(ModelMethods):
             vectors = vector[None] if runs == 1 else np.broadcast_to(vector, (runs, len(vector)))
             return RunParameters({}, self.parameters, vectors)
         parameters = RunParameters.checked(self.manifest, self._independent(), changes, runs)
-        warn_of_sizes(self.manifest, parameters.values, 4)  # 4: the caller of st.simulate
+        warn_of_parameters(self.manifest, parameters.values, 4)  # 4: the caller of st.simulate
         return parameters
 
     def _independent(self) -> dict[str, Value]:

@@ -13,11 +13,11 @@ from serpentail_scene.units import in_unit
 
 from ..basics.checks import numbers_in
 from ..basics.errors import ModelError
+from ..basics.plausible_values import warn_of_sizes
 
 Value = float | tuple[float, ...]
 Values = Mapping[str, Any]  # name -> number or numbers, SI; of many runs (k,) or (k, size)
 # parameters that follow from the values of single links or arcs
-UNITS = {"tail_mass": "kg", "tail_length": "m", "gravity": "m/s^2"}
 TOTALS = {
     "tail_mass": ("link_masses", "arc_masses"),
     "tail_length": ("link_lengths", "arc_lengths"),
@@ -70,6 +70,13 @@ class RunParameters:
     def of(self, k: int) -> dict[str, np.ndarray]:
         """Return the changes of run k."""
         return {name: values[k] for name, values in self.changes.items()}
+
+
+def warn_of_parameters(manifest: dict, values: Values, calls: int) -> None:
+    """Warn of sizes that no animal or robot has; ``calls``: frames above this function."""
+    units = {"tail_mass": "kg", "tail_length": "m", "gravity": "m/s^2"}  # also if links decide
+    units |= {p["name"]: p["unit"] for p in manifest["parameters"]}
+    warn_of_sizes(units, values, calls + 1)
 
 
 def real_type(manifest: dict) -> type[np.floating]:

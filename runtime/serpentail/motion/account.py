@@ -2,7 +2,8 @@
 
 from typing import TYPE_CHECKING, Any
 
-from ..basics.short_repr import cut
+from serpentail_scene.messages import one_line
+
 from ..model.model import Model
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ def how_made(info: dict[str, Any]) -> str:
 
 def framed(lines: list[str]) -> str:
     """Return lines as the text of one object, each cut to the width."""
-    return "<" + "\n  ".join(cut(line, WIDTH) for line in lines) + ">"
+    return "<" + "\n  ".join(one_line(line, WIDTH) for line in lines) + ">"
 
 
 def _touched(motion: "Trajectory") -> str:
