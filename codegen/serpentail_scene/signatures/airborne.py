@@ -20,30 +20,14 @@ HESSIAN = Argument(
     ("airborne_arguments", "airborne_arguments"),
     "second derivatives of weights^T y with respect to (x, tau), both triangles",
 )
-STATE = (X, TAU, ANGULAR)
+# fmt: off
 SIGNATURES = (
-    Signature(
-        "airborne_rates",
+    Signature("airborne_rates",
         "rates of an airborne state, from which translation and omega are eliminated",
-        STATE,
-        (Y,),
-        PLANNING,
-        NAMED,
-    ),
-    Signature(
-        "airborne_rates_derivatives",
-        "airborne_rates and its Jacobian",
-        STATE,
-        (Y, J),
-        PLANNING,
-        NAMED,
-    ),
-    Signature(
-        "airborne_rates_hessian",
+        (X, TAU, ANGULAR), (Y,), PLANNING, NAMED),
+    Signature("airborne_rates_derivatives", "airborne_rates and its Jacobian",
+        (X, TAU, ANGULAR), (Y, J), PLANNING, NAMED),
+    Signature("airborne_rates_hessian",
         "airborne_rates, its Jacobian, and the Hessian of weights^T y",
-        (*STATE, WEIGHTS),
-        (Y, J, HESSIAN),
-        PLANNING,
-        NAMED,
-    ),
+        (X, TAU, ANGULAR, WEIGHTS), (Y, J, HESSIAN), PLANNING, NAMED),
 )
