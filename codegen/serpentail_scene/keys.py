@@ -20,6 +20,7 @@ from .rules import (
     different,
     one_of,
     table,
+    within,
 )
 from .signatures.table import DEFAULT
 
@@ -194,4 +195,11 @@ INERTIAS = {
     "radii": Key("m", POSITIVE, 2),
 }
 SEGMENT = {**LENGTHS, **MASSES, **INERTIAS, "link_centers": Key("m", each_link=True)}
+# of the table `body`; a torso's shape -> its three lengths, and its density
+BODY = {"scale": Key("1", within(1e-3, 1e3)), "mass": Key("kg", within(1e-9, 1e9))}
+DENSITY = {"density": Key("kg/m^3", within(1e-3, 1e5))}
+TORSOS = {
+    "ellipsoid": {"semi_axes": Key("m", POSITIVE, 3), **DENSITY},
+    "box": {"sides": Key("m", POSITIVE, 3), **DENSITY},
+}
 TAPER = {name: SEGMENT[name] for name in ("length", "radii", "density", "mass")}

@@ -3,6 +3,7 @@
 from collections.abc import Collection
 from dataclasses import dataclass
 from math import pi
+from typing import Any
 
 from .rules import BODY_INERTIA, FINITE, NOT_NEGATIVE, POSITIVE, NumberRule
 
@@ -155,3 +156,9 @@ def parts_of(named: Collection[str]) -> tuple[str, ...]:
     """Return the passive parts of which the scene names at least one parameter."""
     present = {p.needs for p in PASSIVE if p.name in named}
     return tuple(part for part in PARTS if part in present)
+
+
+def ellipsoid(m: Any, length: Any, r: Any) -> tuple[Any, Any, Any]:
+    """I = m/5 [L^2/4 + r^2, 2 r^2, L^2/4 + r^2]: uniform ellipsoid, semi-axes (r, L/2, r)."""
+    across, along = m / 5 * (length * length / 4 + r * r), m / 5 * (2 * r * r)
+    return across, along, across

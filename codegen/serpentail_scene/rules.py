@@ -9,7 +9,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class NumberRule:
-    """A rule for the numbers of a parameter, and its name in manifests.
+    """A rule for numbers, and its name in manifests if it is of parameters.
 
     of_body: the numbers are moments of inertia, none above the sum of the other two.
     """
@@ -18,19 +18,25 @@ class NumberRule:
     words: str = ""
     above: float = -math.inf
     least: float = -math.inf
+    most: float = math.inf
     of_body: bool = False
 
     def holds(self, numbers: Collection[Any]) -> bool:
         """Tell if all are finite numbers that satisfy the rule."""
-        if not all(is_finite(x) and self.above < x and self.least <= x for x in numbers):
-            return False
+        for x in numbers:
+            if not is_finite(x) or not (self.above < x and self.least <= x <= self.most):
+                return False
         return not self.of_body or 2 * max(numbers) <= sum(numbers) * ROUNDING
 
     @property
     def schema(self) -> dict[str, float]:
         """The JSON Schema of one number."""
-        limits = {"exclusiveMinimum": self.above, "minimum": self.least}
-        return {name: int(limit) for name, limit in limits.items() if limit > -math.inf}
+        limits = {
+            "exclusiveMinimum": self.above,
+            "minimum": self.least,
+            "maximum": self.most,
+        }
+        return {name: limit for name, limit in limits.items() if math.isfinite(limit)}
 
 
 ROUNDING = 1 + 1e-12  # lets a flat body, with equal sums, pass
@@ -40,7 +46,13 @@ NOT_NEGATIVE = NumberRule("not_negative", "0 or above", least=0)
 BODY_INERTIA = NumberRule(
     "body_inertia", "above 0, none above the sum of the other two", above=0, of_body=True
 )
+# of parameters
 NUMBER_RULES = {rule.name: rule for rule in (FINITE, POSITIVE, NOT_NEGATIVE, BODY_INERTIA)}
+
+
+def within(least: float, most: float) -> NumberRule:
+    """Return the rule that numbers are between two limits."""
+    return NumberRule("", f"from {least:g} to {most:g}", least=least, most=most)
 
 
 def is_whole(x: object) -> bool:

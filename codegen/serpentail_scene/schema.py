@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .keys import KEYS, ONLY, SEGMENT, TAPER, Key, foreign_to
+from .keys import BODY, KEYS, ONLY, SEGMENT, TAPER, TORSOS, Key, foreign_to, one_word
 from .parameters import PARAMETERS, PASSIVE, Parameter
 from .rules import COUNT
 from .signatures.table import ALL
@@ -26,6 +26,11 @@ def scene_schema(verbs: Mapping[str, Key]) -> Schema:
     tables = {"type": "array", "items": _table(of_segment), "minItems": 1}
     keys["segments"] = {"anyOf": [COUNT.schema, tables]}
     keys["taper"] = key_schema(Key(keys=TAPER, needs=("radii",)))
+    torsos = {
+        shape: Key(keys={"shape": one_word(shape), **lengths}, needs=("shape", *lengths))
+        for shape, lengths in TORSOS.items()
+    }
+    keys["body"] = key_schema(Key(keys={**BODY, "torso": Key(kinds=torsos)}))
     for name, key in KEYS.items():
         keys[name] |= {"description": key.rule.text} if key.rule.text else {}
     for name, verb in verbs.items():

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from itertools import accumulate, pairwise
 from math import pi
 
+from serpentail_scene.parameters import ellipsoid
+
 
 @dataclass(frozen=True)
 class Links:
@@ -85,9 +87,3 @@ def single(
         for moment in ellipsoid(m, length, radius)
     )
     return Links(tuple(masses), tuple(lengths), tuple(centers), moments)
-
-
-def ellipsoid(m: float, length: float, r: float) -> tuple[float, float, float]:
-    """I = m/5 [L^2/4 + r^2, 2 r^2, L^2/4 + r^2]: uniform ellipsoid, semi-axes (r, L/2, r)."""
-    across, along = m / 5 * (length * length / 4 + r * r), m / 5 * (2 * r * r)
-    return across, along, across

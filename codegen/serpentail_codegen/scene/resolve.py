@@ -6,11 +6,19 @@ from dataclasses import replace
 from typing import Any
 
 from serpentail_scene.keys import foreign_to
-from serpentail_scene.parameters import NAMES, PARAMETERS, PASSIVE, Parameter, Value, parts_of
+from serpentail_scene.parameters import (
+    NAMES,
+    PARAMETERS,
+    PASSIVE,
+    Parameter,
+    Value,
+    ellipsoid,
+    parts_of,
+)
 from serpentail_scene.units import in_unit
 
 from .checks import fits, number_problem, plain, unknown_keys
-from .cone import ellipsoid, single
+from .cone import single
 from .problems import Problem, SceneError
 from .scene import Parameters
 from .segment_tables import flattened

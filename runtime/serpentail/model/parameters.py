@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from serpentail_scene.messages import did_you_mean, one_line, shown
+from serpentail_scene.parameters import Value, ellipsoid
 from serpentail_scene.rules import NUMBER_RULES, ROUNDING, NumberRule
 from serpentail_scene.units import in_unit
 
@@ -15,7 +16,6 @@ from ..basics.checks import numbers_in
 from ..basics.errors import ModelError
 from ..basics.plausible_values import warn_of_sizes
 
-Value = float | tuple[float, ...]
 Values = Mapping[str, Any]  # name -> number or numbers, SI; of many runs (k,) or (k, size)
 # parameters that follow from the values of single links or arcs
 TOTALS = {
@@ -130,7 +130,7 @@ def completed(manifest: dict, values: Values) -> dict[str, Any]:
     _refuse_stops_without_room(values)
     if "link_radius" not in values:
         return dict(values)
-    moments = np.broadcast_arrays(*ellipsoid(values, manifest["dimensions"]["total"]))
+    moments = np.broadcast_arrays(*link_inertia(values, manifest["dimensions"]["total"]))
     return dict(values) | {"link_inertia": np.stack(moments, axis=-1)}
 
 
@@ -175,8 +175,8 @@ def _checked_changes(manifest: dict, changes: object, runs: int | None) -> dict[
     return sound
 
 
-def ellipsoid(values: Values, links: int) -> tuple[Any, Any, Any]:
-    """Moments of inertia (kg m^2) of one link along y, an ellipsoid of semi-axes (r, L / 2, r)."""
+def link_inertia(values: Values, links: int) -> tuple[Any, Any, Any]:
+    """Moments of inertia (kg m^2) of one link along y; ModelError if they are not finite."""
     with np.errstate(over="ignore", invalid="ignore"):
         across, along, _ = moments = ellipsoid_moments(values, links)
         sound = np.isfinite(across + along).all()
@@ -189,10 +189,9 @@ def ellipsoid(values: Values, links: int) -> tuple[Any, Any, Any]:
 
 
 def ellipsoid_moments(values: Values, links: int) -> tuple[Any, Any, Any]:
-    """Moments of inertia of ``ellipsoid``, of numbers or symbols."""
-    m, length, r = values["tail_mass"] / links, values["tail_length"] / links, values["link_radius"]
-    across, along = m / 5 * (length * length / 4 + r * r), m / 5 * (2 * r * r)
-    return across, along, across
+    """Moments of inertia of one of equal links, an ellipsoid; of numbers or symbols."""
+    mass, length = values["tail_mass"] / links, values["tail_length"] / links
+    return ellipsoid(mass, length, values["link_radius"])
 
 
 def flat(manifest: dict, values: Mapping[str, Value]) -> list[float]:

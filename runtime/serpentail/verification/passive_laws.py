@@ -5,9 +5,11 @@ from typing import Any
 
 import numpy as np
 
+from serpentail_scene.parameters import PARTS
+
 from ..model.model import Model
 from ..model.parameters import total_mass
-from ..model.passive import PARTS, passive_force, stored_energy
+from ..model.passive import passive_force, stored_energy
 from .contact_laws import HEIGHT, bristles, legs, raised
 from .errors import relative, rounding, sensitivity
 from .law import PIECEWISE, VALUE_LIMIT, Errors, Law, registry, rid_of
