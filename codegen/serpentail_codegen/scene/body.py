@@ -50,7 +50,7 @@ SAME = Size()
 
 
 @dataclass(frozen=True)
-class Body:
+class BodyTable:
     """A checked table `body`: scale or mass (kg), the parameters of the torso, and its problems."""
 
     scale: float | None = None
@@ -58,7 +58,7 @@ class Body:
     torso: Mapping[str, Value] | None = None
     problems: tuple[Problem, ...] = ()
 
-    def completed(self, named: Any, contacts: Collection[str]) -> Any:
+    def with_torso(self, named: Any, contacts: Collection[str]) -> Any:
         """Return a table of parameters, completed by those that the torso's shape determines."""
         if not self.torso or not isinstance(named, Mapping):
             return named
@@ -79,13 +79,13 @@ class Body:
         return SAME
 
 
-def body_of(table: Any, parameters: Any) -> Body:
+def body_table(table: Any, parameters: Any) -> BodyTable:
     """Return the checked table `body` of a scene; parameters: the scene's table of these."""
     if table is None:
-        return Body()
+        return BodyTable()
     named = parameters if isinstance(parameters, Mapping) else {}
     if not isinstance(table, Mapping):
-        return Body(problems=(Problem("body", table, "needs a table: scale or mass, torso"),))
+        return BodyTable(problems=(Problem("body", table, "needs a table: scale or mass, torso"),))
     known = (*BODY, "torso")
     unknown = [key for key in table if key not in known]
     problems = [Problem(f"body.{key}", table[key], suggest(key, known)) for key in unknown]
@@ -95,7 +95,7 @@ def body_of(table: Any, parameters: Any) -> Body:
     size = {name: value for name, value in table.items() if name in BODY}
     numbers = {name: x for name, (x,) in numbers_of("body", size, BODY, 1, problems).items()}
     torso = _torso(table["torso"], named, problems) if "torso" in table else None
-    return Body(numbers.get("scale"), numbers.get("mass"), torso, tuple(problems))
+    return BodyTable(numbers.get("scale"), numbers.get("mass"), torso, tuple(problems))
 
 
 def _torso(
@@ -132,17 +132,19 @@ def _shaped(shape: str, lengths: tuple[float, ...], density: float) -> dict[str,
     return dict(zip(OF_TORSO, (mass, inertia, semi_axes), strict=True))
 
 
-def scaled(body: Body, described: Parameters) -> dict[str, Any]:
+def scaled_parameters(body: BodyTable, parameters: Parameters) -> dict[str, Any]:
     """Return the scaled parameters, the original ones, and the size, as Scene stores them."""
-    tail = next(described[n] for n in ("tail_mass", "link_masses", "arc_masses") if n in described)
+    tail = next(
+        parameters[n] for n in ("tail_mass", "link_masses", "arc_masses") if n in parameters
+    )
     masses = tail if isinstance(tail, tuple) else (tail,)
-    size = body.size(float(described.get("torso_mass", 0.0)) + sum(masses))  # type: ignore[arg-type]
+    size = body.size(float(parameters.get("torso_mass", 0.0)) + sum(masses))  # type: ignore[arg-type]
     if size == SAME:
         return {}
     units = {p.name: p.unit for p in (*PARAMETERS, *PASSIVE)}
-    entries = tuple((name, size.of(name, units[name], x)) for name, x in described.entries)
+    entries = tuple((name, size.of(name, units[name], x)) for name, x in parameters.entries)
     return {
         "parameters": Parameters(entries),
-        "unscaled": described,
+        "unscaled": parameters,
         "size": (size.mass, size.length, size.time),
     }

@@ -21,7 +21,7 @@ from serpentail_scene.signatures.table import (
 from serpentail_scene.source import tables_of
 from serpentail_scene.units import in_unit
 
-from .body import OF_TORSO, body_of, scaled
+from .body import OF_TORSO, body_table, scaled_parameters
 from .checks import (
     MOST_LINKS,
     contact_problems,
@@ -40,8 +40,8 @@ from .checks import (
 from .problems import Problem, SceneError
 from .resolve import resolve_parameters
 from .scene import Scene
-from .segments import are_tables, tell_values
-from .tail_tables import tail_described
+from .segments import are_tables, have_values
+from .tail_tables import tail_description
 from .variant import EQUAL
 
 
@@ -77,25 +77,26 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
 
     # everything that is wrong with keys and functions
     problems = unknown_keys(table, "", KEYS)
-    tail = tail_described(kind, values)
+    tail = tail_description(kind, values)
     values |= tail.values
     problems += [*tail.problems, *key_problems(values), *kind_problems(table, kind)]
     problems += function_problems(values["functions"]) + contact_problems(table, values, contacts)
     problems += fixed_problems(values, contacts)
 
     # the kind and the contacts determine which parameters there are
-    links = min(sum(tail.shape.counts) or tail_pieces(values), MOST_LINKS)
-    body = body_of(values["body"], values["parameters"])
-    named = body.completed(values["parameters"], contacts)
+    links = min(sum(values["shape"].counts) or tail_pieces(values), MOST_LINKS)
+    body = body_table(values["body"], values["parameters"])
+    named = body.with_torso(values["parameters"], contacts)
     problems += body.problems
     values["body"] = "" if values["body"] is None else json.dumps(values["body"], default=str)
     try:
-        resolved = resolve_parameters(named, links, kind, contacts, tail.shape, segments_in(values))
-        values["parameters"] = resolved
+        values["parameters"] = resolve_parameters(
+            named, links, kind, contacts, values["shape"], segments_in(values)
+        )
     except SceneError as error:
         problems += error.problems
     if not problems:
-        values |= scaled(body, values["parameters"])
+        values |= scaled_parameters(body, values["parameters"])
     if not problems and values["real"] == "float":
         problems += single_problems(values["parameters"])
     if problems:
@@ -156,18 +157,18 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
     foreign |= {name for name, value in usual.items() if getattr(scene, name) == value}
     names = [field.name for field in fields(Scene) if field.name not in foreign]
     table = {name: getattr(scene, name) for name in names}
-    written = json.loads(scene.tables or "{}")
-    table |= written | ({"body": json.loads(scene.body)} if scene.body else {})
+    tables = json.loads(scene.tables or "{}")
+    table |= tables | ({"body": json.loads(scene.body)} if scene.body else {})
     if are_tables(table["segments"]):
         table.pop("links", None)
     table |= {key: list(table[key]) for key in ("functions", "contacts", "targets") if key in table}
 
     # an inertia that follows from link_radius is computed again, as are values from tables
     computed = {"link_inertia"} if "link_radius" in scene.parameters else set()
-    if written and tell_values(written):
+    if tables and have_values(tables):
         computed |= {p.name for p in PARAMETERS if p.of_pieces}
     if "torso" in table.get("body", {}):
         computed |= set(OF_TORSO)
-    described = scene.unscaled or scene.parameters
-    parameters = {n: plain(value) for n, value in described.items() if n not in computed}
+    unscaled = scene.unscaled or scene.parameters
+    parameters = {n: plain(value) for n, value in unscaled.items() if n not in computed}
     return table | {"parameters": parameters}

@@ -34,16 +34,16 @@ def table_of(place: str, table: Any, kind: str, problems: list[Problem]) -> dict
 
 def kind_of(place: str, table: Any, kind: str, problems: list[Problem]) -> str:
     """Return the kind of one segment: that of the scene, or its own in a mixed tail."""
-    given = table.get("kind") if isinstance(table, Mapping) else None
+    segment_kind = table.get("kind") if isinstance(table, Mapping) else None
     if kind == "mixed":
-        if given in ("articulated", "continuum"):
-            return str(given)
+        if segment_kind in ("articulated", "continuum"):
+            return str(segment_kind)
         remedy = 'needs "articulated" or "continuum", as the tail is mixed'
-        problems.append(Problem(f"{place}.kind", given, remedy))
+        problems.append(Problem(f"{place}.kind", segment_kind, remedy))
         return "articulated"
-    if given is not None and given != kind:
+    if segment_kind is not None and segment_kind != kind:
         remedy = f'this scene is "{kind}": remove it, or set kind = "mixed" above the tables'
-        problems.append(Problem(f"{place}.kind", given, remedy))
+        problems.append(Problem(f"{place}.kind", segment_kind, remedy))
     return kind
 
 
@@ -53,11 +53,11 @@ def count_of(
     """Return the number of links or samples of a segment; the scene's is the default, but not for
     links of a mixed tail.
     """
-    own = isinstance(table, Mapping) and "links" in table and kind == "articulated"
-    count: Any = table["links"] if own else pieces.get(kind)
+    has_links = isinstance(table, Mapping) and "links" in table and kind == "articulated"
+    count: Any = table["links"] if has_links else pieces.get(kind)
     if COUNT.holds(count) and count <= MOST_LINKS:
         return int(count)
-    field = f"{place}.links" if own or kind not in pieces else PIECES[kind]
+    field = f"{place}.links" if has_links or kind not in pieces else PIECES[kind]
     problems.append(Problem(field, count, f"needs {COUNT.text}, up to {MOST_LINKS}"))
     return 1
 
@@ -70,7 +70,7 @@ def numbers_of(
         remedy = "needs a table, such as {length = 0.2, radii = [0.004, 0.001], density = 1000}"
         problems.append(Problem(place, table, remedy))
         return {}
-    found = {}
+    numbers_by_name = {}
     for name, value in table.items():
         if name not in keys:
             problems.append(Problem(f"{place}.{name}", value, f"unknown; {suggest(name, keys)}"))
@@ -83,13 +83,13 @@ def numbers_of(
             problems.append(Problem(f"{place}.{name}", value, str(error)))
             continue
         if len(numbers) == count and key.rule.holds(numbers):
-            found[name] = tuple(float(x) + 0.0 for x in numbers)
+            numbers_by_name[name] = tuple(float(x) + 0.0 for x in numbers)
             continue
         each = f", {key.size} for each of {links} links" if key.each_link else ""
         words = "a finite number" if count == 1 else f"{count} finite numbers{each}"
         words += f", {key.rule.words}" if key.rule.words else ""
         problems.append(Problem(f"{place}.{name}", value, f"needs {words}, in {key.unit}"))
-    return found
+    return numbers_by_name
 
 
 def flattened(value: Any) -> Iterable[Any]:

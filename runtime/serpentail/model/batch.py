@@ -12,7 +12,7 @@ from weakref import WeakSet
 from ..basics.errors import ModelError
 from ..compiling.compiler import opened
 from ..compiling.threads import after_fork
-from .lazy import kept
+from .lazy import lazy_property
 from .manifest import CheckedFolder, remedy
 from .snapshot import library_in_cache, model_library
 
@@ -49,7 +49,7 @@ class LazyLibrary:
         """Length of its text."""
         return len(self.checked.files[self.source])
 
-    @kept
+    @lazy_property
     def at_hand(self) -> bool:
         """Whether the cache had it when that was first asked."""
         return library_in_cache(self.checked, [self.source], self.profile) is not None

@@ -11,7 +11,7 @@ from types import ModuleType
 from .. import __version__
 from ..basics.errors import ModelError
 from ..compiling.safe_files import Held, held
-from .lazy import kept
+from .lazy import lazy_property
 
 FORMAT = 2
 KEYS = [
@@ -44,7 +44,7 @@ class CheckedFolder:
         """Digest of the manifest, which covers all files."""
         return str(self.manifest["manifest_hash"])
 
-    @kept
+    @lazy_property
     def casadi_module(self) -> ModuleType:
         """The generated module of CasADi functions, executed from the text that was checked."""
         name = f"{self.manifest['prefix']}_casadi"
@@ -171,3 +171,12 @@ def _check(folder: Path, manifest: dict) -> None:
 
 def _sha256(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
+
+
+def links_of(pieces: int | list[int], kinds: tuple[str, ...]) -> int | tuple[int, ...] | None:
+    """Return the links of all segments, or of each, 0 of an arc; None of a continuum."""
+    if "articulated" not in kinds:
+        return None
+    if isinstance(pieces, int):
+        return pieces
+    return tuple(n if kind == "articulated" else 0 for n, kind in zip(pieces, kinds, strict=True))

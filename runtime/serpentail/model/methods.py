@@ -12,7 +12,7 @@ from ..basics.errors import ModelError, StateError
 from .compiled_functions import absent, generated_functions
 from .functions import Array, ModelFunctions
 from .kernel import Kernel
-from .lazy import kept
+from .lazy import lazy_property
 from .state_space import jacobians, q_dot, split
 
 if TYPE_CHECKING:
@@ -197,7 +197,7 @@ class ModelMethods(ModelFunctions):
 
         return step(cast("Model", self), (q, v, tau), h, settings)
 
-    @kept
+    @lazy_property
     def stepping(self) -> "Stepping":
         """What ``step`` keeps between calls."""
         from .stepping.step import Stepping
@@ -224,7 +224,7 @@ class ModelMethods(ModelFunctions):
         """
         return self.kernels[name]
 
-    @kept
+    @lazy_property
     def generated(self) -> tuple[str, ...]:
         """Names of all functions that were generated, also of those that only C calls."""
         return generated_functions(self.manifest)

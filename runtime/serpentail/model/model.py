@@ -19,8 +19,8 @@ from ..compiling.cache import cache_folder
 from .batch import BatchLibrary
 from .compiled_functions import CompiledFunctions
 from .kernel import Kernel
-from .lazy import kept
-from .manifest import CheckedFolder
+from .lazy import lazy_property
+from .manifest import CheckedFolder, links_of
 from .methods import ModelMethods
 from .parameters import (
     RunParameters,
@@ -33,7 +33,6 @@ from .parameters import (
     warn_of_parameters,
 )
 from .snapshot import restored, snapshot
-from .tail import links_of, words_of
 
 if TYPE_CHECKING:
     from .casadi import CasadiFunctions
@@ -177,7 +176,14 @@ class Model(ModelMethods):
 
     def tail_words(self) -> str:
         """Return in words what the tail is made of, such as "3 x 4 links"."""
-        return words_of(self.links, self.segments)
+        if self.links is None:
+            return f"{self.segments} continuum segments"
+        if isinstance(self.links, int):
+            return f"{self.segments} x {self.links} links"
+        if all(self.links):
+            return f"{self.segments} segments of {', '.join(map(str, self.links))} links"
+        each = (f"{n} links" if n else "an arc" for n in self.links)
+        return f"{self.segments} segments: {', '.join(each)}"
 
     def with_parameters(self, **changes: ArrayLike) -> Model:
         """Return this model with other parameters; nothing is compiled.
@@ -265,7 +271,7 @@ class Model(ModelMethods):
             (self.library is not None, self.batch_library.threads),
         )
 
-    @kept
+    @lazy_property
     def casadi(self) -> CasadiFunctions:
         """The model's functions as ``casadi.Function``, by name; needs the extra "plan".
 

@@ -12,7 +12,7 @@ import numpy as np
 from ..basics.errors import SimulationError
 from ..basics.plausible_values import LARGEST
 from ..model.kernel import address_of, aligned
-from ..model.lazy import kept
+from ..model.lazy import lazy_property
 from ..model.library import PAUSED, STEP_TOO_SMALL, STOPPED_AT_EVENT, TOO_MANY_STEPS, WHY
 from ..model.model import Model
 from ..model.parameters import RunParameters
@@ -160,7 +160,7 @@ class CompiledRun:
         self.memory.restart(q0, v0)
         self.begin(0)
 
-    @kept
+    @lazy_property
     def decay(self) -> FastestDecay:
         """How fast its joint damping is, for other starts."""
         return FastestDecay(self.acting, self.start.runs, self.memory.parameters)
