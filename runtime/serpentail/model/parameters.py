@@ -12,7 +12,7 @@ from serpentail_scene.parameters import Value, ellipsoid
 from serpentail_scene.rules import NUMBER_RULES, ROUNDING, NumberRule
 from serpentail_scene.units import in_unit
 
-from ..basics.checks import numbers_in
+from ..basics.checks import numbers_in, satisfying
 from ..basics.errors import ModelError
 from ..basics.plausible_values import warn_of_sizes
 
@@ -258,11 +258,11 @@ def checked_value(
 
 def _sound(rows: np.ndarray, rule: NumberRule) -> np.ndarray:
     """Tell which rows (K, size) are finite numbers that satisfy a rule."""
-    each = np.isfinite(rows) & (rows > rule.above) & (rows >= rule.least)
-    if not rule.of_body:
-        return each.all(axis=1)
-    with np.errstate(over="ignore", invalid="ignore"):
-        return each.all(axis=1) & (2 * rows.max(axis=1) <= rows.sum(axis=1) * ROUNDING)
+    sound: Any = satisfying(rows, rule).all(axis=1)
+    if rule.of_body:
+        with np.errstate(over="ignore", invalid="ignore"):
+            sound = sound & (2 * rows.max(axis=1) <= rows.sum(axis=1) * ROUNDING)
+    return sound
 
 
 def _counted(numbers: np.ndarray | None) -> str:
