@@ -11,13 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from serpentail_scene.digest import generator_digest
+from serpentail_scene.keys import KINDS
 from serpentail_scene.signatures.table import ALL
 
-from .scene.naming import suffix
 from .scene.parse import load_scene, parse_scene, scene_for, scene_to_dict
 from .scene.problems import Problem, SceneError
-from .scene.scene import KINDS, Scene
-from .scene.schema import scene_schema
+from .scene.scene import Scene
 
 
 def parser() -> argparse.ArgumentParser:
@@ -44,7 +43,6 @@ def parser() -> argparse.ArgumentParser:
     )
     p.add_argument("--progress", type=Path, help="keep in this file how far it is")
     p.add_argument("--print-folder", action="store_true", help="only tell which folder it is")
-    p.add_argument("--schema", action="store_true", help="only print the JSON Schema of scenes")
     return p
 
 
@@ -71,8 +69,23 @@ def scene_of(arguments: argparse.Namespace) -> Scene:
         own, scene = scene_for(*size), scene_for(*size, **chosen)
     if arguments.name:
         return scene
-    name = own.name + suffix(scene, own, arguments.functions)
+    name = own.name + _suffix(scene, own, arguments.functions)
     return parse_scene(scene_to_dict(scene) | {"name": name}, name)
+
+
+def _suffix(scene: Scene, own: Scene, functions: str | None = None) -> str:
+    """Return what options add to the name of a scene.
+
+    functions: as the user gave them; "all" is added as a word, other choices as a short hash.
+    """
+    keys = ("real", "emission", "profile")
+    words = [getattr(scene, key) for key in keys if getattr(scene, key) != getattr(own, key)]
+    if scene.baked != own.baked:
+        words.append("baked")
+    if scene.functions != own.functions:
+        digest = hashlib.sha256(",".join(scene.functions).encode()).hexdigest()
+        words.append("all" if functions == "all" else f"f{digest[:6]}")
+    return "".join(f"_{word}" for word in words)
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -87,8 +100,6 @@ def main(argv: list[str] | None = None) -> int:
 
 def _answer(arguments: argparse.Namespace) -> str:
     """Do what the arguments ask for, and return what to print."""
-    if arguments.schema:
-        return json.dumps(scene_schema())
     scene = scene_of(arguments)
     if arguments.given:
         load_scene(arguments.given)

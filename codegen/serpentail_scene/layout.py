@@ -14,7 +14,6 @@ TORSO_Q = slice(0, TORSO_NQ)  # in q
 TORSO_V = slice(0, TORSO_NV)  # in v and in generalised forces
 TAIL_Q, TAIL_V = slice(TORSO_NQ, None), slice(TORSO_NV, None)  # tail coordinates, and their rates
 PER_SEGMENT = 2  # coordinates of a segment
-GROUPS = ("feet", "tail", "torso")  # of contact points, in their order
 # in q, of all segments: alpha, a or phi; and beta, b or theta
 FIRST_Q, SECOND_Q = slice(TORSO_NQ, None, PER_SEGMENT), slice(TORSO_NQ + 1, None, PER_SEGMENT)
 

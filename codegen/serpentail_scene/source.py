@@ -1,7 +1,4 @@
-"""Reads scene files as data: regular files of bounded size, with keys of bounded depth.
-
-The runtime reads them by the same rules, in ``serpentail/building/source.py``.
-"""
+"""Reads scene files as data: regular files of bounded size, with keys of bounded depth."""
 
 import re
 import tomllib

@@ -1,8 +1,4 @@
-"""Numbers with units as users write them, such as "105.7 g": exact up to the last rounding.
-
-The generator's `scene/units.py` and the runtime's `units.py` are the same text, as neither
-imports the other; a test compares them.
-"""
+"""Numbers with units as users write them, such as "105.7 g": exact up to the last rounding."""
 
 import math
 import re

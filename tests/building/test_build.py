@@ -21,10 +21,9 @@ from serpentail.building.build import NEEDED, with_contacts
 from serpentail.building.options import ParameterOptions, SceneKeys
 from serpentail.building.scene_text import scene_text
 from serpentail.cli import cli
-from serpentail_codegen.scene.parameters import PARAMETERS
 from serpentail_codegen.scene.parse import load_scene, parse_scene
-from serpentail_codegen.scene.passive import PASSIVE
-from serpentail_codegen.scene.scene import KEYS
+from serpentail_scene.keys import KEYS
+from serpentail_scene.parameters import PARAMETERS, PASSIVE
 from serpentail_scene.signatures.table import NEEDS
 from tests.support import zoo
 from tests.support.models import folder_of
@@ -112,7 +111,7 @@ def test_what_cannot_be_built_is_refused_by_name(cache, monkeypatch):
         with row(scene, options), pytest.raises(st.SerpentailError, match=words):
             made(scene, **options)
     monkeypatch.setattr("serpentail.building.generator.find_spec", lambda name: None)
-    with pytest.raises(st.ModelError, match="without the package serpentail_codegen"):
+    with pytest.raises(st.ModelError, match="without serpentail_codegen"):
         made(**TINY)
 
 

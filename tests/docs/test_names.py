@@ -12,7 +12,7 @@ import serpentail as st
 from serpentail.cli.cli import ROOMS, arguments_of
 from serpentail.model.model import Model
 from serpentail_codegen.functions.tail import Tail
-from serpentail_codegen.scene.parameters import PARAMETERS
+from serpentail_scene.parameters import PARAMETERS
 from serpentail_scene.signatures.table import ALL, SIGNATURES
 from tests.docs.running import PAGES, ROOT, blocks
 from tests.support import zoo

@@ -9,7 +9,7 @@ from serpentail_codegen.functions.catalogue import CATALOGUE
 from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.cost import executed
-from serpentail_codegen.scene.passive import PASSIVE, PASSIVE_NAMES
+from serpentail_scene.parameters import PASSIVE, PASSIVE_NAMES
 from tests.functions.test_columns import assert_same
 from tests.references.metrics import block_error
 from tests.references.parameters import TABLE_1, random_states

@@ -10,6 +10,7 @@ ROOT = Path(__file__).parents[2]
 FOLDERS = ("codegen", "runtime", "tests", "benchmarks", "checks", "examples")
 MOST_LINES = 300
 CLASS = re.compile(r"^class (\w+)", re.MULTILINE)
+WRITTEN = {ROOT / "runtime" / "serpentail" / "model" / "functions.py"}  # by `make golden`
 
 
 def main() -> int:
@@ -19,7 +20,7 @@ def main() -> int:
     complaints, homes = [], defaultdict(list)
     for path in sorted(path for name in FOLDERS for path in (ROOT / name).rglob("*.py")):
         text = path.read_text(encoding="utf-8")
-        if (lines := text.count("\n")) > MOST_LINES:
+        if (lines := text.count("\n")) > MOST_LINES and path not in WRITTEN:
             complaints.append(f"{path}: {lines} lines, more than {MOST_LINES}: split it by concept")
         if path.relative_to(ROOT).parts[0] in FOLDERS[:2]:
             for name in CLASS.findall(text):

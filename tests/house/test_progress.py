@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.basics.progress import Stage, Told
+from serpentail.basics.progress import ProgressWriter, Stage
 from tests.support import zoo
 from tests.support.rows import row
 
@@ -66,7 +66,7 @@ def test_a_pipe_has_few_lines_and_a_terminal_one_that_ends_empty(clock):
     assert st.Progress("plan", "", None, 10.0).left is None
     texts = []
     for stream in (io.StringIO(), Terminal()):
-        with st.progress(Told(stream)):
+        with st.progress(ProgressWriter(stream)):
             with Stage("compile", "short") as stage:
                 clock(0.5)
                 stage.tell(0.5)
@@ -83,7 +83,7 @@ def test_a_pipe_has_few_lines_and_a_terminal_one_that_ends_empty(clock):
 
     # a part of another stage is told to functions alone
     stream, told = io.StringIO(), []
-    for hook in (Told(stream), told.append):
+    for hook in (ProgressWriter(stream), told.append):
         with st.progress(hook), Stage("plan", "all") as outer:
             clock(2)
             outer.tell()

@@ -19,8 +19,8 @@ import serpentail as st
 from checks.stress import drops
 from checks.stress.subjects import Subject, changed, exact_of, state
 from examples.studies.parts import Part, made
-from serpentail.model.plausible_sizes import UNLIKE as UNLIKE_FROM
-from serpentail.model.plausible_sizes import disparity
+from serpentail.basics.plausible_values import UNLIKE as UNLIKE_FROM
+from serpentail.basics.plausible_values import disparity
 from tests.references.metrics import mass_matrix_error
 from tests.support import tiny_study, zoo
 from tests.support.rows import row

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.model.parameters import RunParameters, ellipsoid, resolve
-from serpentail_codegen.scene.parameters import PARAMETERS
+from serpentail.model.parameters import RunParameters, link_inertia, resolve
 from serpentail_codegen.scene.parse import parse_scene
 from serpentail_codegen.scene.resolve import resolve_parameters
+from serpentail_scene.parameters import PARAMETERS
 from tests.support import zoo
 from tests.support.models import folder_of
 from tests.support.rows import row
@@ -61,12 +61,12 @@ def test_link_inertia_and_what_it_follows_from_replace_each_other(manifest):
     before = resolve(manifest, None)
     for name in ("tail_mass", "tail_length", "link_radius"):
         after = resolve(manifest, {name: 0.1})
-        assert after["link_inertia"] == ellipsoid(after, TOTAL) != before["link_inertia"]
+        assert after["link_inertia"] == link_inertia(after, TOTAL) != before["link_inertia"]
     values = resolve(manifest, {"link_inertia": INERTIA, "tail_mass": 0.1})
     assert values["link_inertia"] == INERTIA and "link_radius" not in values
     assert resolve(given.manifest, {"tail_mass": 0.1})["link_inertia"] == INERTIA
     values = resolve(given.manifest, {"link_radius": 0.01})
-    assert values["link_inertia"] == ellipsoid(values, 1)
+    assert values["link_inertia"] == link_inertia(values, 1)
     late = zoo.model("bare").with_parameters(**GIVEN)
     found, expected = (each.forward_dynamics(*STATE) for each in (late, given))
     assert late.parameters == given.parameters and np.array_equal(found, expected)

@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 
 from serpentail_codegen.pipeline import tail_of
-from serpentail_codegen.scene.parameters import PARAMETERS
 from serpentail_codegen.scene.parse import parse_scene
-from serpentail_codegen.scene.passive import PASSIVE, PASSIVE_NAMES
 from serpentail_codegen.scene.resolve import resolve_parameters
 from serpentail_codegen.scene.variant import EQUAL
-from serpentail_scene.layout import GROUPS
+from serpentail_scene.keys import GROUPS
+from serpentail_scene.parameters import PARAMETERS, PASSIVE, PASSIVE_NAMES
 from tests.support.rows import row
 from tests.support.scenes import VALID
 
@@ -271,8 +270,8 @@ def test_what_is_no_body_is_refused(refuse_rows):
         ({"torso": 3}, ".torso", "'box'"),
         ({"torso": {"shape": "cube"}}, ".torso", "'ellipsoid'"),
         ({"torso": one}, ".torso.density", "kg/m^3"),
-        ({"torso": one | {"sides": [1, 2, 0], "density": 1}}, ".torso.sides", "three"),
-        ({"torso": one | {"sides": [1, 2], "density": 1}}, ".torso.sides", "three"),
+        ({"torso": one | {"sides": [1, 2, 0], "density": 1}}, ".torso.sides", "3 finite"),
+        ({"torso": one | {"sides": [1, 2], "density": 1}}, ".torso.sides", "3 finite"),
         ({"torso": one | {"sides": "1 kg", "density": 1}}, ".torso.sides", "mm"),
         ({"torso": one | {"density": 1, "x": 1}}, ".torso.x", "sides"),
         ({"torso": one | {"density": 1.1e5}}, ".torso.density", "100000"),

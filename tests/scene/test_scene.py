@@ -8,11 +8,11 @@ import pytest
 
 from serpentail_codegen.__main__ import main, parser, scene_of
 from serpentail_codegen.functions.catalogue import CATALOGUE
-from serpentail_codegen.scene.parameters import PARAMETERS
 from serpentail_codegen.scene.parse import parse_scene, scene_for, scene_to_dict
 from serpentail_codegen.scene.problems import SceneError
 from serpentail_codegen.scene.resolve import resolve_parameters
 from serpentail_codegen.scene.scene import Scene
+from serpentail_scene.parameters import PARAMETERS
 from serpentail_scene.signatures import table as functions
 from serpentail_scene.signatures.signature import ALWAYS, CALLED, GROUND, NAMED
 from serpentail_scene.signatures.table import ALL, DEFAULT, FIXED, SIGNATURES

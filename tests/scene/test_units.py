@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as some
 from mpmath import mp, mpf
 
-from serpentail_codegen.scene.parameters import PARAMETERS
+from serpentail_scene.parameters import PARAMETERS
 from serpentail_scene.units import MEASURES, dimensions, in_unit, pattern, plain
 from tests.support.rows import row
 from tests.support.scenes import VALID

@@ -13,8 +13,7 @@ from serpentail.cli import cli
 from serpentail.planning.problem import SETTINGS as PROBLEM_SETTINGS
 from serpentail.planning.settings import PlanSettings
 from serpentail.scenes.keys import read
-from serpentail.scenes.plan import CODE_ONLY, plan_arguments
-from serpentail.scenes.plan_keys import BOUNDS, GOAL, PLAN
+from serpentail.scenes.plan import BOUNDS, CODE_ONLY, GOAL, PLAN, plan_arguments
 from serpentail.scenes.simulate_keys import SIMULATE
 from tests.support import zoo
 from tests.support.rows import row

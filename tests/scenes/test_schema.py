@@ -16,15 +16,13 @@ from hypothesis import strategies as some
 import serpentail as st
 from serpentail.cli import cli
 from serpentail.planning.nlp.rules import collocation_rule
-from serpentail.scenes import plan_keys, simulate_keys
 from serpentail.scenes.plan import plan_arguments
-from serpentail.scenes.schema import scene_schema
+from serpentail.scenes.schema import TABLES, scene_schema
 from serpentail.scenes.simulate import scenario_of
-from serpentail_codegen.scene.parameters import PARAMETERS
 from serpentail_codegen.scene.parse import load_scene, parse_scene
-from serpentail_codegen.scene.passive import PASSIVE
 from serpentail_codegen.scene.problems import SceneError
-from serpentail_codegen.scene.scene import KEYS, NAMES
+from serpentail_scene.keys import KEYS
+from serpentail_scene.parameters import NAMES, PARAMETERS, PASSIVE
 from tests.support import zoo
 from tests.support.posed import posed
 from tests.support.rows import row
@@ -219,8 +217,8 @@ def anything(table, keys):
 )
 @given(
     anything(GENERATE, (*KEYS, *NAMES)),
-    anything(SIMULATE, simulate_keys.SIMULATE.keys),
-    anything(PLAN, plan_keys.PLAN.keys),
+    anything(SIMULATE, TABLES["simulate"].keys),
+    anything(PLAN, TABLES["plan"].keys),
 )
 def test_any_table_is_taken_or_refused(scene, motion, task):
     if isinstance(motion.get("start"), dict):

@@ -34,7 +34,8 @@ def broken(model, name, change):
     def call(*arrays):
         return change(kernel(*arrays), *arrays)
 
-    faulty.kernels = model.kernels | {name: call}
+    faulty.kernels = copy.copy(model.kernels)
+    faulty.kernels[name] = call
     return faulty
 
 

@@ -17,12 +17,12 @@ from serpentail_codegen.ir import program as ir
 from serpentail_codegen.ir.builder import Builder
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.scene.parse import scene_for
-from serpentail_codegen.scene.scene import TARGETS as NAMES
 from serpentail_codegen.targets.c.loops import LoopPrinter, in_loops
 from serpentail_codegen.targets.c.routine import routine_lines
 from serpentail_codegen.targets.casadi.printer import PythonPrinter, step_view
 from serpentail_codegen.targets.target import UnprintableStatement
 from serpentail_codegen.targets.templating import render
+from serpentail_scene.keys import TARGETS as NAMES
 from tests.references.parameters import random_states
 from tests.support.programs import SWAP
 from tests.support.rows import row

@@ -16,7 +16,6 @@ from pathlib import Path
 import numpy as np
 
 import serpentail as st
-from serpentail.model.passive import PARTS
 from serpentail.verification.errors import block_error, differences, matrix_error
 from serpentail.verification.law import VALUE_LIMIT, Law, rid_of
 from serpentail.verification.report import Check, as_short_text, as_text, check, laws, summary
@@ -26,8 +25,8 @@ from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.pipeline import generate, tail_of
 from serpentail_codegen.scene.parse import parse_scene
-from serpentail_codegen.scene.passive import PASSIVE_NAMES
 from serpentail_scene.layout import TAIL_Q, TAIL_V, TORSO_NQ
+from serpentail_scene.parameters import PARTS, PASSIVE_NAMES
 from serpentail_scene.signatures.signature import CONTACT, IMPLICIT, SIMULATION
 from serpentail_scene.signatures.table import in_group
 

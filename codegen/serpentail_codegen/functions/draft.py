@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
+from serpentail_scene.parameters import Parameter
 from serpentail_scene.signatures.table import SIGNATURES
 
 from ..ir.builder import Builder, narrowed
@@ -13,7 +14,6 @@ from ..ir.program import Index, Ref
 from ..ir.step import Step, specialised
 from ..ir.tape import Number
 from ..mechanics.lower import declared_shapes, derive
-from ..scene.parameters import Parameter
 from ..scene.variant import Stretch
 from .scope import Instead, Scope, Vectors
 from .tail import Tail

@@ -9,22 +9,20 @@ from dataclasses import dataclass
 from math import pi, prod
 from typing import Any
 
-from serpentail_scene.units import dimensions, in_unit
+from serpentail_scene.keys import BODY, TORSOS
+from serpentail_scene.parameters import PARAMETERS, PASSIVE, Value
+from serpentail_scene.units import dimensions
 
-from .checks import is_finite
-from .parameters import PARAMETERS, Parameters, Value
-from .passive import PASSIVE
 from .problems import Problem, suggest
+from .scene import Parameters
+from .segment_tables import numbers_of
 
 # Exponents of the body mass: bone lengths of legs, Alexander, Jayes, Maloiy & Wathuta, J. Zool. 189
 # (1979) 305-314; times of a stride at equivalent speeds, Heglund & Taylor, J. Exp. Biol. 138 (1988)
 # 301-318; all else keeps its shape.
 LENGTH, LEG, TIME = 1 / 3, 0.35, 0.15
 LEG_BONES = "L_"  # first letters of the names of their lengths
-TORSOS = {"ellipsoid": "semi_axes", "box": "sides"}  # shape -> its three lengths
-OF_TORSO = ("torso_mass", "torso_inertia", "torso_semi_axes")  # what a torso's shape tells
-KEYS = ("scale", "mass", "torso")
-LARGEST = 1e3  # scale; 1 over it is the least
+OF_TORSO = ("torso_mass", "torso_inertia", "torso_semi_axes")  # what a torso's shape gives
 
 
 @dataclass(frozen=True)
@@ -52,7 +50,7 @@ SAME = Size()
 
 
 @dataclass(frozen=True)
-class Body:
+class BodyTable:
     """A checked table `body`: scale or mass (kg), the parameters of the torso, and its problems."""
 
     scale: float | None = None
@@ -60,7 +58,7 @@ class Body:
     torso: Mapping[str, Value] | None = None
     problems: tuple[Problem, ...] = ()
 
-    def completed(self, named: Any, contacts: Collection[str]) -> Any:
+    def with_torso(self, named: Any, contacts: Collection[str]) -> Any:
         """Return a table of parameters, completed by those that the torso's shape determines."""
         if not self.torso or not isinstance(named, Mapping):
             return named
@@ -81,40 +79,23 @@ class Body:
         return SAME
 
 
-def body_of(table: Any, parameters: Any) -> Body:
+def body_table(table: Any, parameters: Any) -> BodyTable:
     """Return the checked table `body` of a scene; parameters: the scene's table of these."""
     if table is None:
-        return Body()
+        return BodyTable()
     named = parameters if isinstance(parameters, Mapping) else {}
     if not isinstance(table, Mapping):
-        return Body(problems=(Problem("body", table, "needs a table: scale or mass, torso"),))
-    unknown = [key for key in table if key not in KEYS]
-    problems = [Problem(f"body.{key}", table[key], suggest(key, KEYS)) for key in unknown]
+        return BodyTable(problems=(Problem("body", table, "needs a table: scale or mass, torso"),))
+    known = (*BODY, "torso")
+    unknown = [key for key in table if key not in known]
+    problems = [Problem(f"body.{key}", table[key], suggest(key, known)) for key in unknown]
     if "scale" in table and "mass" in table:
         remedy = "given together with scale: each decides the size; remove one of the two"
         problems.append(Problem("body.mass", table["mass"], remedy))
-    scale = _number("body.scale", table.get("scale"), "1", (1 / LARGEST, LARGEST), problems)
-    mass = _number("body.mass", table.get("mass"), "kg", (1e-9, 1e9), problems)
+    size = {name: value for name, value in table.items() if name in BODY}
+    numbers = {name: x for name, (x,) in numbers_of("body", size, BODY, 1, problems).items()}
     torso = _torso(table["torso"], named, problems) if "torso" in table else None
-    return Body(scale, mass, torso, tuple(problems))
-
-
-def _number(
-    field: str, value: Any, unit: str, bounds: tuple[float, float], problems: list[Problem]
-) -> float | None:
-    """Return a number between bounds; None if it is missing or wrong."""
-    if value is None:
-        return None
-    try:
-        number = in_unit(value, unit)
-    except ValueError as error:
-        problems.append(Problem(field, value, str(error)))
-        return None
-    if not is_finite(number) or not bounds[0] <= number <= bounds[1]:
-        remedy = f"needs a number from {bounds[0]:g} to {bounds[1]:g}, in {unit}"
-        problems.append(Problem(field, value, remedy))
-        return None
-    return float(number)
+    return BodyTable(numbers.get("scale"), numbers.get("mass"), torso, tuple(problems))
 
 
 def _torso(
@@ -127,37 +108,17 @@ def _torso(
         remedy = f"needs a table with shape ({names}), its lengths, and density"
         problems.append(Problem("body.torso", table, remedy))
         return None
-    lengths_name, before = TORSOS[shape], len(problems)
-    keys = ("shape", lengths_name, "density")
-    for key in set(table) - set(keys):
-        remedy = suggest(str(key), keys) or f"unknown; needs {', '.join(keys)}"
-        problems.append(Problem(f"body.torso.{key}", table[key], remedy))
-    lengths = _lengths(f"body.torso.{lengths_name}", table.get(lengths_name), problems)
-    density_field = "body.torso.density"
-    if table.get("density") is None:
-        problems.append(Problem(density_field, None, "needs a number, in kg/m^3"))
-    density = _number(density_field, table.get("density"), "kg/m^3", (1e-3, 1e5), problems)
-    if len(problems) > before or density is None:
+    keys, before = TORSOS[shape], len(problems)
+    values = dict.fromkeys(keys) | {name: x for name, x in table.items() if name != "shape"}
+    numbers = numbers_of("body.torso", values, keys, 1, problems)
+    if len(problems) > before:
         return None
-    found = _shaped(shape, lengths, density)
-    for name in found.keys() & named.keys():
-        remedy = "body.torso tells it: remove one of the two"
+    lengths, (density,) = (numbers[name] for name in keys)
+    torso = _shaped(shape, lengths, density)
+    for name in torso.keys() & named.keys():
+        remedy = "body.torso gives it: remove one of the two"
         problems.append(Problem(f"parameters.{name}", named[name], remedy))
-    return found
-
-
-def _lengths(field: str, value: Any, problems: list[Problem]) -> tuple[float, ...]:
-    """Return three lengths above 0 (m)."""
-    try:
-        lengths = in_unit(value, "m")
-    except ValueError as error:
-        problems.append(Problem(field, value, str(error)))
-        return ()
-    sound = isinstance(lengths, list | tuple) and len(lengths) == 3
-    if not sound or not all(is_finite(x) and x > 0 for x in lengths):
-        problems.append(Problem(field, value, "needs three lengths above 0, in m"))
-        return ()
-    return tuple(map(float, lengths))
+    return torso
 
 
 def _shaped(shape: str, lengths: tuple[float, ...], density: float) -> dict[str, Value]:
@@ -171,17 +132,19 @@ def _shaped(shape: str, lengths: tuple[float, ...], density: float) -> dict[str,
     return dict(zip(OF_TORSO, (mass, inertia, semi_axes), strict=True))
 
 
-def scaled(body: Body, described: Parameters) -> dict[str, Any]:
+def scaled_parameters(body: BodyTable, parameters: Parameters) -> dict[str, Any]:
     """Return the scaled parameters, the original ones, and the size, as Scene stores them."""
-    tail = next(described[n] for n in ("tail_mass", "link_masses", "arc_masses") if n in described)
+    tail = next(
+        parameters[n] for n in ("tail_mass", "link_masses", "arc_masses") if n in parameters
+    )
     masses = tail if isinstance(tail, tuple) else (tail,)
-    size = body.size(float(described.get("torso_mass", 0.0)) + sum(masses))  # type: ignore[arg-type]
+    size = body.size(float(parameters.get("torso_mass", 0.0)) + sum(masses))  # type: ignore[arg-type]
     if size == SAME:
         return {}
     units = {p.name: p.unit for p in (*PARAMETERS, *PASSIVE)}
-    entries = tuple((name, size.of(name, units[name], x)) for name, x in described.entries)
+    entries = tuple((name, size.of(name, units[name], x)) for name, x in parameters.entries)
     return {
         "parameters": Parameters(entries),
-        "unscaled": described,
+        "unscaled": parameters,
         "size": (size.mass, size.length, size.time),
     }

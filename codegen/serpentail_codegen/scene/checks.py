@@ -1,25 +1,21 @@
 """The rules for a scene's table. A broken rule becomes a problem with a remedy."""
 
-import sys
 from collections.abc import Collection, Mapping
 from typing import Any
 
+from serpentail_scene.keys import KEYS, ONLY, foreign_to
+from serpentail_scene.parameters import NAMES, PARAMETERS, PARTS, PASSIVE_NAMES, Parameter, Value
+from serpentail_scene.rules import COUNT
 from serpentail_scene.signatures.table import AIRBORNE, ALL, DERIVATIVES, FIXED, NEEDS
 
-from .parameters import PARAMETERS, SINGLE, Parameter, Value
-from .passive import PARTS, PASSIVE_NAMES
 from .problems import Problem, suggest
-from .scene import (
-    COUNT,
-    KEYS,
-    MOST_LINKS,
-    MOST_SEGMENTS,
-    MOST_STRAIGHT,
-    NAMES,
-    ONLY,
-    foreign_to,
-    is_whole,
-)
+
+# Larger models would take more than about a minute: the work grows with the cube of the
+# number of segments, and the text of straight lines with every piece.
+MOST_SEGMENTS = 100
+MOST_LINKS = 10_000  # or samples, of all segments
+MOST_STRAIGHT = (20, 100)  # segments, and pieces in all, of straight lines
+SINGLE = (2.0**-126, (2 - 2.0**-23) * 2.0**127)  # least normal and largest number of a float
 
 
 def plain(value: Value) -> float | list[float]:
@@ -32,16 +28,7 @@ def fits(parameter: Parameter, value: Any) -> bool:
     if (parameter.size > 1) != isinstance(value, list | tuple):
         return False
     numbers = value if parameter.size > 1 else [value]
-    return (
-        len(numbers) == parameter.size
-        and all(map(is_finite, numbers))
-        and parameter.check.holds(numbers)
-    )
-
-
-def is_finite(x: Any) -> bool:
-    """Tell if x is a number that a float can hold."""
-    return (is_whole(x) or isinstance(x, float)) and abs(x) <= sys.float_info.max
+    return len(numbers) == parameter.size and parameter.rule.holds(numbers)
 
 
 def number_problem(parameter: Parameter, value: object) -> Problem:
@@ -53,14 +40,15 @@ def number_problem(parameter: Parameter, value: object) -> Problem:
     hint = f"(default: {default})"
     if parameter.needs in PARTS:
         shape, hint = f"{shape} or one for all", "(one for each tail coordinate)"
-    remedy = f"needs {shape}{parameter.check.text}, in {parameter.unit} {hint}"
+    words = f", {parameter.rule.words}" if parameter.rule.words else ""
+    remedy = f"needs {shape}{words}, in {parameter.unit} {hint}"
     return Problem(f"parameters.{parameter.name}", value, remedy)
 
 
 def key_problems(values: Mapping[str, Any]) -> list[Problem]:
     """Return a problem for each key whose rule is broken, and for a tail that is too long."""
-    broken = [(key, rule) for key, (_, rule) in KEYS.items() if not rule.holds(values[key])]
-    problems = [Problem(key, values[key], f"needs {rule.text}") for key, rule in broken]
+    broken = [name for name, key in KEYS.items() if not key.rule.holds(values[name])]
+    problems = [Problem(name, values[name], f"needs {KEYS[name].rule.text}") for name in broken]
     return problems + size_problems(values)
 
 

@@ -9,9 +9,11 @@ from dataclasses import dataclass
 from itertools import accumulate, pairwise
 from math import pi
 
+from serpentail_scene.parameters import ellipsoid
+
 
 @dataclass(frozen=True)
-class Links:
+class LinkValues:
     """Numbers of links: kg, m, COM from the joint (m), kg m^2 about the COM."""
 
     masses: tuple[float, ...]
@@ -19,16 +21,16 @@ class Links:
     centers: tuple[float, ...]
     inertias: tuple[float, ...]  # 3 for each link, y along it
 
-    def __add__(self, other: "Links") -> "Links":
-        return Links(*(a + b for a, b in zip(_fields(self), _fields(other), strict=True)))
+    def __add__(self, other: "LinkValues") -> "LinkValues":
+        return LinkValues(*(a + b for a, b in zip(_fields(self), _fields(other), strict=True)))
 
 
-def _fields(links: Links) -> tuple[tuple[float, ...], ...]:
+def _fields(links: LinkValues) -> tuple[tuple[float, ...], ...]:
     """Return all numbers of links."""
     return links.masses, links.lengths, links.centers, links.inertias
 
 
-def cut(lengths: Sequence[float], radii: Sequence[float], density: float) -> Links:
+def links_of_cone(lengths: Sequence[float], radii: Sequence[float], density: float) -> LinkValues:
     """Return links of these lengths, from the root on, cut out of a cone with radii at both
     ends.
     """
@@ -39,7 +41,7 @@ def cut(lengths: Sequence[float], radii: Sequence[float], density: float) -> Lin
     slices = [
         _slice(*ends, length, density) for ends, length in zip(pairwise(at), lengths, strict=True)
     ]
-    return Links(
+    return LinkValues(
         tuple(mass for mass, _, _ in slices),
         tuple(lengths),
         tuple(center for _, center, _ in slices),
@@ -71,23 +73,17 @@ def _slice(
     return mass, center, (across, along, across)
 
 
-def single(
+def single_links(
     masses: Sequence[float],
     lengths: Sequence[float],
     centers: Sequence[float],
     inertias: Sequence[float],
     radius: float,
-) -> Links:
+) -> LinkValues:
     """Return single links; without ``inertias`` each is an ellipsoid of semi-axes (r, L / 2, r)."""
     moments = tuple(inertias) or tuple(
         moment
         for m, length in zip(masses, lengths, strict=True)
         for moment in ellipsoid(m, length, radius)
     )
-    return Links(tuple(masses), tuple(lengths), tuple(centers), moments)
-
-
-def ellipsoid(m: float, length: float, r: float) -> tuple[float, float, float]:
-    """I = m/5 [L^2/4 + r^2, 2 r^2, L^2/4 + r^2]: uniform ellipsoid, semi-axes (r, L/2, r)."""
-    across, along = m / 5 * (length * length / 4 + r * r), m / 5 * (2 * r * r)
-    return across, along, across
+    return LinkValues(tuple(masses), tuple(lengths), tuple(centers), moments)

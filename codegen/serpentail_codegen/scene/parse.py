@@ -8,7 +8,8 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from serpentail_scene.layout import GROUPS
+from serpentail_scene.keys import CONTACTS, GROUPS, KEYS, ONLY, TARGETS, Only, foreign_to
+from serpentail_scene.parameters import PARAMETERS, parts_of
 from serpentail_scene.signatures.table import (
     ALL,
     DEFAULT,
@@ -20,8 +21,9 @@ from serpentail_scene.signatures.table import (
 from serpentail_scene.source import tables_of
 from serpentail_scene.units import in_unit
 
-from .body import OF_TORSO, body_of, scaled
+from .body import OF_TORSO, body_table, scaled_parameters
 from .checks import (
+    MOST_LINKS,
     contact_problems,
     fixed_problems,
     function_problems,
@@ -35,22 +37,11 @@ from .checks import (
     tail_pieces,
     unknown_keys,
 )
-from .parameters import PARAMETERS
-from .passive import parts_of
 from .problems import Problem, SceneError
 from .resolve import resolve_parameters
-from .scene import (
-    CONTACTS,
-    KEYS,
-    MOST_LINKS,
-    ONLY,
-    TARGETS,
-    Only,
-    Scene,
-    foreign_to,
-)
-from .segments import are_tables, tell_values
-from .tail_tables import tail_described
+from .scene import Scene
+from .segments import are_tables, have_values
+from .tail_tables import tail_description
 from .variant import EQUAL
 
 
@@ -86,25 +77,26 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
 
     # everything that is wrong with keys and functions
     problems = unknown_keys(table, "", KEYS)
-    tail = tail_described(kind, values)
+    tail = tail_description(kind, values)
     values |= tail.values
     problems += [*tail.problems, *key_problems(values), *kind_problems(table, kind)]
     problems += function_problems(values["functions"]) + contact_problems(table, values, contacts)
     problems += fixed_problems(values, contacts)
 
     # the kind and the contacts determine which parameters there are
-    links = min(sum(tail.shape.counts) or tail_pieces(values), MOST_LINKS)
-    body = body_of(values["body"], values["parameters"])
-    named = body.completed(values["parameters"], contacts)
+    links = min(sum(values["shape"].counts) or tail_pieces(values), MOST_LINKS)
+    body = body_table(values["body"], values["parameters"])
+    named = body.with_torso(values["parameters"], contacts)
     problems += body.problems
     values["body"] = "" if values["body"] is None else json.dumps(values["body"], default=str)
     try:
-        resolved = resolve_parameters(named, links, kind, contacts, tail.shape, segments_in(values))
-        values["parameters"] = resolved
+        values["parameters"] = resolve_parameters(
+            named, links, kind, contacts, values["shape"], segments_in(values)
+        )
     except SceneError as error:
         problems += error.problems
     if not problems:
-        values |= scaled(body, values["parameters"])
+        values |= scaled_parameters(body, values["parameters"])
     if not problems and values["real"] == "float":
         problems += single_problems(values["parameters"])
     if problems:
@@ -125,7 +117,7 @@ def _kind(table: Mapping[str, Any]) -> str:
 
 def _with_defaults(table: Mapping[str, Any], name: str, rules: Only) -> dict[str, Any]:
     """Return a table with defaults for missing keys, None for a missing key that is required."""
-    values = {key: default for key, (default, _) in KEYS.items()}
+    values = {name: key.default for name, key in KEYS.items()}
     values |= {"name": name, "coordinates": rules.coordinates[0]}
     values |= dict.fromkeys(rules.required) | {"shape": EQUAL, "tables": ""}
     values |= {"unscaled": None, "size": Scene.size}
@@ -161,21 +153,22 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
     foreign = {*foreign_to(scene.kind)[0]}
     foreign |= set() if scene.contacts else {"contacts", "friction"}
     foreign |= {"shape", "tables", "body", "unscaled", "size"}  # these follow from other keys
-    foreign |= {name for name in ("base", "weightless") if getattr(scene, name) == KEYS[name][0]}
+    usual = {name: KEYS[name].default for name in ("base", "weightless")}
+    foreign |= {name for name, value in usual.items() if getattr(scene, name) == value}
     names = [field.name for field in fields(Scene) if field.name not in foreign]
     table = {name: getattr(scene, name) for name in names}
-    written = json.loads(scene.tables or "{}")
-    table |= written | ({"body": json.loads(scene.body)} if scene.body else {})
+    tables = json.loads(scene.tables or "{}")
+    table |= tables | ({"body": json.loads(scene.body)} if scene.body else {})
     if are_tables(table["segments"]):
         table.pop("links", None)
     table |= {key: list(table[key]) for key in ("functions", "contacts", "targets") if key in table}
 
     # an inertia that follows from link_radius is computed again, as are values from tables
     computed = {"link_inertia"} if "link_radius" in scene.parameters else set()
-    if written and tell_values(written):
-        computed |= {p.name for p in PARAMETERS if p.tail in ("link", "arc")}
+    if tables and have_values(tables):
+        computed |= {p.name for p in PARAMETERS if p.of_pieces}
     if "torso" in table.get("body", {}):
         computed |= set(OF_TORSO)
-    described = scene.unscaled or scene.parameters
-    parameters = {n: plain(value) for n, value in described.items() if n not in computed}
+    unscaled = scene.unscaled or scene.parameters
+    parameters = {n: plain(value) for n, value in unscaled.items() if n not in computed}
     return table | {"parameters": parameters}

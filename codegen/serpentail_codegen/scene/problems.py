@@ -2,18 +2,10 @@
 
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
-from difflib import get_close_matches
 
-# Names that other software uses for the same things: suggested, never accepted.
-ALIASES = {
-    "crba": "mass_matrix",
-    "nle": "bias_force",
-    "rnea": "inverse_dynamics",
-    "aba": "forward_dynamics",
-    "m": "segments",
-    "n": "links",
-    "tail": "kind",
-}
+from serpentail_scene.messages import did_you_mean, one_line, shown
+
+LONGEST = 80  # characters of a field or a value in a line
 
 
 @dataclass(frozen=True)
@@ -25,7 +17,12 @@ class Problem:
     remedy: str
 
     def __str__(self) -> str:
-        return f"{one_line(self.field)}: {show(self.value)}: {self.remedy}"
+        text = f"value {shown(self.value, LONGEST)}"
+        if self.value is None:
+            text = "no value"
+        elif isinstance(self.value, bool):
+            text = f"value {self.value}".lower()  # as TOML writes it
+        return f"{one_line(self.field, LONGEST)}: {text}: {self.remedy}"
 
 
 class SceneError(ValueError):
@@ -41,22 +38,4 @@ class SceneError(ValueError):
 
 def suggest(word: object, names: Collection[str]) -> str:
     """Return "did you mean ...?", or the list of all names."""
-    text = word[:64].lower() if isinstance(word, str) else ""
-    near = [ALIASES[text]] if ALIASES.get(text) in names else get_close_matches(text, names, 1)
-    return f"did you mean '{near[0]}'?" if near else f"known: {', '.join(names)}"
-
-
-def show(value: object) -> str:
-    """Return "value ..." in the notation of the file."""
-    if value is None:
-        return "no value"
-    try:
-        return "value " + one_line(repr(value).lower() if isinstance(value, bool) else repr(value))
-    except (ValueError, RecursionError):  # repr refuses integers of more than 4300 digits
-        return "value too long to show"
-
-
-def one_line(text: str) -> str:
-    """Return the text on one line of at most 80 characters."""
-    line = text if text.isprintable() else repr(text)
-    return line if len(line) <= 80 else line[:77] + "..."
+    return did_you_mean(word, names) or f"known: {', '.join(names)}"

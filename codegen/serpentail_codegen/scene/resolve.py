@@ -5,20 +5,22 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import Any
 
+from serpentail_scene.keys import foreign_to
+from serpentail_scene.parameters import (
+    NAMES,
+    PARAMETERS,
+    PASSIVE,
+    Parameter,
+    Value,
+    ellipsoid,
+    parts_of,
+)
 from serpentail_scene.units import in_unit
 
 from .checks import fits, number_problem, plain, unknown_keys
-from .cone import ellipsoid, single
-from .parameters import PARAMETERS, Parameter, Parameters, Value
-from .passive import (
-    for_all,
-    lacking_passive,
-    parts_of,
-    passive_parameters,
-    stop_problems,
-)
+from .cone import single_links
 from .problems import Problem, SceneError
-from .scene import NAMES, foreign_to
+from .scene import Parameters
 from .segment_tables import flattened
 from .segments import RADIUS
 from .variant import EQUAL, Shape
@@ -48,12 +50,12 @@ def parameters_of(
     """
     foreign = foreign_to(kind)[1]
     present = {"", *contacts, *(["contacts"] if contacts else [])}
-    found = [p for p in PARAMETERS if p.name not in foreign and p.needs in present]
-    counted = [(p, shape.numbers_of(p.tail)) for p in found]
-    own = tuple(replace(p, size=p.size * count) for p, count in counted if count)
+    candidates = [p for p in PARAMETERS if p.name not in foreign and p.needs in present]
+    counted = [(p, shape.numbers_of(p.tail)) for p in candidates]
+    parameters = tuple(replace(p, size=p.size * count) for p, count in counted if count)
     if kind == "mixed":
-        own = tuple(replace(p, meaning=MEANINGS.get(p.name, p.meaning)) for p in own)
-    return own + passive_parameters(passive, segments)
+        parameters = tuple(replace(p, meaning=MEANINGS.get(p.name, p.meaning)) for p in parameters)
+    return parameters + passive_parameters(passive, segments)
 
 
 def resolve_parameters(
@@ -72,35 +74,35 @@ def resolve_parameters(
     if "link_inertia" in named and "link_radius" in named:
         remedy = "given together with link_radius, which it overrides; remove one of the two"
         problems.append(Problem("parameters.link_inertia", named["link_inertia"], remedy))
-    given: dict[str, Any] = {}
+    numbers: dict[str, Any] = {}
     passive = parts_of(named)
-    problems += lacking_passive(named, passive)
-    own = parameters_of(kind, contacts, shape, passive, segments)
-    sized = {p.name: p for p in (*PARAMETERS, *own)}
+    problems += missing_passive(named, passive)
+    parameters = parameters_of(kind, contacts, shape, passive, segments)
+    sized = {p.name: p for p in (*PARAMETERS, *parameters)}
     for p in [p for p in sized.values() if p.name in named]:
         try:
-            given[p.name] = of_pieces(p, in_unit(named[p.name], p.unit))
+            numbers[p.name] = of_pieces(p, in_unit(named[p.name], p.unit))
         except ValueError as error:
             problems.append(Problem(f"parameters.{p.name}", named[p.name], str(error)))
             continue
         if p.needs in passive:
-            given[p.name] = for_all(p, given[p.name])
-        if not fits(p, given[p.name]):
+            numbers[p.name] = for_all(p, numbers[p.name])
+        if not fits(p, numbers[p.name]):
             problems.append(number_problem(p, named[p.name]))
-    problems += [] if problems else own_problems(given, shape)
+    problems += [] if problems else piece_problems(numbers, shape)
     if not problems and "stops" in passive:
-        problems += stop_problems(given)
+        problems += stop_problems(numbers)
     if problems:
         raise SceneError(problems)
 
     # defaults for what is not named; the link's inertia follows from its radius, or replaces it
     unused = "link_radius" if "link_inertia" in named else "link_inertia"
-    values = {p.name: p.default for p in own if p.name != unused}
-    values |= given if not shape.links else completed(given, shape.links)
-    resolved = {name: _floats(value) for name, value in values.items()}
-    if "link_radius" in resolved:
-        resolved["link_inertia"] = _ellipsoid_inertia(resolved, tail_links)
-    return Parameters(tuple((name, resolved[name]) for name in NAMES if name in resolved))
+    values = {p.name: p.default for p in parameters if p.name != unused}
+    values |= numbers if not shape.links else with_link_defaults(numbers, shape.links)
+    floats = {name: _floats(value) for name, value in values.items()}
+    if "link_radius" in floats:
+        floats["link_inertia"] = _ellipsoid_inertia(floats, tail_links)
+    return Parameters(tuple((name, floats[name]) for name in NAMES if name in floats))
 
 
 def _ellipsoid_inertia(parameters: Mapping[str, Any], tail_links: int) -> tuple[float, ...]:
@@ -117,36 +119,36 @@ def _ellipsoid_inertia(parameters: Mapping[str, Any], tail_links: int) -> tuple[
 
 def of_pieces(parameter: Parameter, value: Any) -> Any:
     """Return a value of single links or arcs as one array; each may have its own three moments."""
-    if parameter.tail not in ("link", "arc") or not isinstance(value, list | tuple):
+    if not parameter.of_pieces or not isinstance(value, list | tuple):
         return value
     numbers = list(flattened(value))
     return numbers[0] if parameter.size == len(numbers) == 1 else numbers
 
 
-def own_problems(given: Mapping[str, Any], shape: Shape) -> list[Problem]:
+def piece_problems(numbers: Mapping[str, Any], shape: Shape) -> list[Problem]:
     """Return a problem for each missing value of single links or arcs, and for each parameter that
     this tail or base does not have.
     """
     problems = []
     for p in PARAMETERS:
-        lacks = p.default is None and p.tail and p.name not in OPTIONAL
-        if p.tail in HAS_NOT and not shape.numbers_of(p.tail) and p.name in given:
+        required = p.default is None and p.tail and p.name not in OPTIONAL
+        if p.tail in HAS_NOT and not shape.numbers_of(p.tail) and p.name in numbers:
             remedy = f"{HAS_NOT[p.tail]}; remove it"
-            problems.append(Problem(f"parameters.{p.name}", plain(given[p.name]), remedy))
-        elif shape.own and lacks and shape.numbers_of(p.tail) and p.name not in given:
+            problems.append(Problem(f"parameters.{p.name}", plain(numbers[p.name]), remedy))
+        elif shape.own and required and shape.numbers_of(p.tail) and p.name not in numbers:
             sized = replace(p, size=p.size * shape.numbers_of(p.tail))
             problems.append(number_problem(sized, None))
     return problems
 
 
-def completed(given: Mapping[str, Any], links: int) -> dict[str, Any]:
+def with_link_defaults(numbers: Mapping[str, Any], links: int) -> dict[str, Any]:
     """Return the values of single links, with defaults: COM in the middle, inertia of an
     ellipsoid.
     """
-    masses, lengths = (tuple(flattened(given[name])) for name in ("link_masses", "link_lengths"))
-    default = single(masses, lengths, tuple(length / 2 for length in lengths), (), RADIUS)
+    masses, lengths = (tuple(flattened(numbers[name])) for name in ("link_masses", "link_lengths"))
+    default = single_links(masses, lengths, tuple(length / 2 for length in lengths), (), RADIUS)
     centers = default.centers if links > 1 else default.centers[0]
-    return {"link_centers": centers, "link_inertias": default.inertias, **given}
+    return {"link_centers": centers, "link_inertias": default.inertias, **numbers}
 
 
 def _floats(value: Any) -> Value:
@@ -154,3 +156,47 @@ def _floats(value: Any) -> Value:
     if isinstance(value, list | tuple):
         return tuple(float(x) + 0.0 for x in value)
     return float(value) + 0.0
+
+
+# ---- the passive tail ---------------------------------------------------------------------------
+
+
+def passive_parameters(passive: Collection[str], segments: int) -> tuple[Parameter, ...]:
+    """Return the parameters of a tail's passive parts, with one number for each coordinate."""
+    size = 2 * segments
+    return tuple(
+        replace(p, size=size, default=(p.default,) * size if isinstance(p.default, float) else None)
+        for p in PASSIVE
+        if p.needs in passive
+    )
+
+
+def for_all(parameter: Parameter, value: Any) -> Any:
+    """Return one number for each coordinate, also if a single number stands for all."""
+    alone = isinstance(value, int | float) and not isinstance(value, bool)
+    return [value] * parameter.size if alone else value
+
+
+def missing_passive(named: Mapping[str, Any], passive: Collection[str]) -> list[Problem]:
+    """Return a problem for each parameter that a part needs and the scene does not name."""
+    problems = []
+    for p in PASSIVE:
+        if p.needs in passive and p.default is None and p.name not in named:
+            first = next(q.name for q in PASSIVE if q.needs == p.needs and q.name in named)
+            remedy = f"has no default, and {first} needs it: give it in {p.unit}, or remove {first}"
+            problems.append(Problem(f"parameters.{p.name}", None, remedy))
+    return problems
+
+
+def stop_problems(numbers: Mapping[str, Any]) -> list[Problem]:
+    """Return a problem for each coordinate whose stops leave no room between them."""
+    pairs = zip(numbers["tail_stop_lower"], numbers["tail_stop_upper"], strict=True)
+    return [
+        Problem(
+            f"parameters.tail_stop_lower[{k}]",
+            lower,
+            f"needs to be below tail_stop_upper[{k}] = {upper}: stops exclude each other",
+        )
+        for k, (lower, upper) in enumerate(pairs)
+        if not lower < upper
+    ]

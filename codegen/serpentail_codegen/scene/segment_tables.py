@@ -1,46 +1,20 @@
 """Reads the tables `segments` and `taper` of a scene: keys, counts, numbers with units."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
+from serpentail_scene.keys import SEGMENT, Key
+from serpentail_scene.rules import COUNT
 from serpentail_scene.units import in_unit
 
-from .checks import is_finite
-from .parameters import ANY, NOT_NEGATIVE, POSITIVE, Rule
+from .checks import MOST_LINKS
 from .problems import Problem, suggest
-from .scene import COUNT, MOST_LINKS
 
 Numbers = Mapping[str, tuple[float, ...]]  # the numbers of a table by key, in SI units
 PIECES = {"articulated": "links", "continuum": "samples"}
 
 
-@dataclass(frozen=True)
-class Key:
-    """What a key of a table holds: a number of values in a unit, or as many for each link."""
-
-    unit: str
-    rule: Rule
-    size: int = 1
-    of_links: bool = False
-
-
-LENGTHS = {"length": Key("m", POSITIVE), "link_lengths": Key("m", POSITIVE, of_links=True)}
-MASSES = {
-    "mass": Key("kg", POSITIVE),
-    "link_masses": Key("kg", POSITIVE, of_links=True),
-    "density": Key("kg/m^3", POSITIVE),
-}
-INERTIAS = {
-    "link_radius": Key("m", NOT_NEGATIVE),
-    "link_inertia": Key("kg m^2", NOT_NEGATIVE, 3),
-    "link_inertias": Key("kg m^2", NOT_NEGATIVE, 3, of_links=True),
-    "radii": Key("m", POSITIVE, 2),
-}
-CENTERS = {"link_centers": Key("m", ANY, of_links=True)}
-VALUES = LENGTHS | MASSES | INERTIAS | CENTERS
-OF_LINKS = {name for name in VALUES if name.startswith("link_")}  # only links have them
-TAPER = {name: VALUES[name] for name in ("length", "radii", "density", "mass")}
+OF_LINKS = {"links", *(name for name in SEGMENT if name.startswith("link_"))}  # arcs have none
 
 
 def table_of(place: str, table: Any, kind: str, problems: list[Problem]) -> dict[str, Any]:
@@ -49,28 +23,27 @@ def table_of(place: str, table: Any, kind: str, problems: list[Problem]) -> dict
         problems.append(Problem(place, table, "needs a table, such as {links = 4}"))
         return {}
     jointed = kind == "articulated"
-    of_links = {"links", *OF_LINKS}
-    known = [key for key in ("kind", "links", *VALUES) if jointed or key not in of_links]
+    known = [key for key in ("kind", "links", *SEGMENT) if jointed or key not in OF_LINKS]
     for key in [key for key in table if key not in known]:
         remedy = f"unknown; {suggest(key, known)}"
-        if key in of_links:
+        if key in OF_LINKS:
             remedy = "an arc has no links: remove it, or choose another kind"
         problems.append(Problem(f"{place}.{key}", table[key], remedy))
-    return {key: value for key, value in table.items() if key in VALUES}
+    return {key: value for key, value in table.items() if key in SEGMENT}
 
 
 def kind_of(place: str, table: Any, kind: str, problems: list[Problem]) -> str:
     """Return the kind of one segment: that of the scene, or its own in a mixed tail."""
-    given = table.get("kind") if isinstance(table, Mapping) else None
+    segment_kind = table.get("kind") if isinstance(table, Mapping) else None
     if kind == "mixed":
-        if given in ("articulated", "continuum"):
-            return str(given)
+        if segment_kind in ("articulated", "continuum"):
+            return str(segment_kind)
         remedy = 'needs "articulated" or "continuum", as the tail is mixed'
-        problems.append(Problem(f"{place}.kind", given, remedy))
+        problems.append(Problem(f"{place}.kind", segment_kind, remedy))
         return "articulated"
-    if given is not None and given != kind:
+    if segment_kind is not None and segment_kind != kind:
         remedy = f'this scene is "{kind}": remove it, or set kind = "mixed" above the tables'
-        problems.append(Problem(f"{place}.kind", given, remedy))
+        problems.append(Problem(f"{place}.kind", segment_kind, remedy))
     return kind
 
 
@@ -80,11 +53,11 @@ def count_of(
     """Return the number of links or samples of a segment; the scene's is the default, but not for
     links of a mixed tail.
     """
-    own = isinstance(table, Mapping) and "links" in table and kind == "articulated"
-    count: Any = table["links"] if own else pieces.get(kind)
+    has_links = isinstance(table, Mapping) and "links" in table and kind == "articulated"
+    count: Any = table["links"] if has_links else pieces.get(kind)
     if COUNT.holds(count) and count <= MOST_LINKS:
         return int(count)
-    field = f"{place}.links" if own or kind not in pieces else PIECES[kind]
+    field = f"{place}.links" if has_links or kind not in pieces else PIECES[kind]
     problems.append(Problem(field, count, f"needs {COUNT.text}, up to {MOST_LINKS}"))
     return 1
 
@@ -97,28 +70,26 @@ def numbers_of(
         remedy = "needs a table, such as {length = 0.2, radii = [0.004, 0.001], density = 1000}"
         problems.append(Problem(place, table, remedy))
         return {}
-    found = {}
+    numbers_by_name = {}
     for name, value in table.items():
         if name not in keys:
             problems.append(Problem(f"{place}.{name}", value, f"unknown; {suggest(name, keys)}"))
             continue
         key = keys[name]
-        count = key.size * (links if key.of_links else 1)
+        count = key.size * (links if key.each_link else 1)
         try:
             numbers = tuple(flattened(in_unit(value, key.unit)))
         except ValueError as error:
             problems.append(Problem(f"{place}.{name}", value, str(error)))
             continue
-        sound = len(numbers) == count and all(map(is_finite, numbers)) and key.rule.holds(numbers)
-        if sound:
-            found[name] = tuple(float(x) + 0.0 for x in numbers)
+        if len(numbers) == count and key.rule.holds(numbers):
+            numbers_by_name[name] = tuple(float(x) + 0.0 for x in numbers)
             continue
-        each = f", {key.size} for each of {links} links" if key.of_links else ""
+        each = f", {key.size} for each of {links} links" if key.each_link else ""
         words = "a finite number" if count == 1 else f"{count} finite numbers{each}"
-        problems.append(
-            Problem(f"{place}.{name}", value, f"needs {words}{key.rule.text}, in {key.unit}")
-        )
-    return found
+        words += f", {key.rule.words}" if key.rule.words else ""
+        problems.append(Problem(f"{place}.{name}", value, f"needs {words}, in {key.unit}"))
+    return numbers_by_name
 
 
 def flattened(value: Any) -> Iterable[Any]:

@@ -74,22 +74,22 @@ def stretches_of(segments: int, links: int, kind: str, shape: Shape) -> tuple[St
     """
     kinds, counts = shape.kinds or (kind,) * segments, shape.counts or (links,) * segments
     stretches: list[Stretch] = []
-    for (own, points), members in groupby(zip(kinds, counts, strict=True)):
+    for (its_kind, points), members in groupby(zip(kinds, counts, strict=True)):
         first = stretches[-1].stop if stretches else 0
-        pieces = points if own == "articulated" else 1
+        pieces = points if its_kind == "articulated" else 1
         before = (
             (stretches[-1].pieces_before(first), stretches[-1].points_before(first))
             if stretches
             else (0, 0)
         )
-        others = sum(s.pieces * (s.stop - s.first) for s in stretches if s.kind != own)
+        others = sum(s.pieces * (s.stop - s.first) for s in stretches if s.kind != its_kind)
         stop = first + len(list(members))
-        stretches.append(Stretch(own, first, stop, pieces, points, *before, others))
+        stretches.append(Stretch(its_kind, first, stop, pieces, points, *before, others))
     return tuple(stretches)
 
 
 @dataclass(frozen=True)
-class Run:
+class SegmentRun:
     """Segments ``first`` to ``stop`` - 1 of one kind, and their pieces.
 
     other_pieces, other_points, other_segments: numbers of the other kind before them.
@@ -104,15 +104,15 @@ class Run:
     other_segments: int = 0
 
 
-def runs_of(stretches: tuple[Stretch, ...], kind: str) -> tuple[Run, ...]:
+def runs_of(stretches: tuple[Stretch, ...], kind: str) -> tuple[SegmentRun, ...]:
     """Return the runs of segments of a kind, each as long as possible."""
     runs, points, before = [], 0, 0
-    for own, members in groupby(stretches, lambda stretch: stretch.kind):
-        found = list(members)
-        first, last = found[0], found[-1]
-        if own == kind:
+    for its_kind, members in groupby(stretches, lambda stretch: stretch.kind):
+        stretches_of_run = list(members)
+        first, last = stretches_of_run[0], stretches_of_run[-1]
+        if its_kind == kind:
             pieces = first.first_piece, last.pieces_before(last.stop)
-            runs.append(Run(first.first, last.stop, *pieces, first.others, points, before))
+            runs.append(SegmentRun(first.first, last.stop, *pieces, first.others, points, before))
         else:
             points += last.points_before(last.stop) - first.first_point
             before += last.stop - first.first

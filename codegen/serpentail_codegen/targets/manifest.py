@@ -7,25 +7,18 @@ others, such as the workspace of C functions.
 from collections.abc import Sequence
 from typing import Any
 
+from serpentail_scene.parameters import PARTS, Parameter
 from serpentail_scene.signatures.arguments import Argument
 from serpentail_scene.signatures.table import EXACT_DERIVATIVES, SIGNATURES
 
 from ..functions.function import Function
 from ..functions.tail import Tail
-from ..scene.parameters import ANY, BODY_INERTIA, NOT_NEGATIVE, POSITIVE, Parameter
 from ..scene.parse import scene_to_dict
-from ..scene.passive import PARTS
 from ..scene.resolve import parameters_of
 from ..scene.scene import Scene
 from .target import Emission
 
 FORMAT = 2
-CHECKS = {
-    ANY: "finite",
-    POSITIVE: "positive",
-    NOT_NEGATIVE: "not_negative",
-    BODY_INERTIA: "body_inertia",
-}
 
 
 def manifest(
@@ -66,7 +59,7 @@ def parameter_entry(scene: Scene, parameter: Parameter) -> dict[str, Any]:
     pieces: how many links or arcs have their own numbers, in one array for all.
     """
     value = scene.parameters.get(parameter.name)
-    own = parameter.tail in ("link", "arc")
+    own = parameter.of_pieces
     pieces = {"pieces": scene.shape.numbers_of(parameter.tail)} if own else {}
     default: Any = list(value) if isinstance(value, tuple) else value
     if own and not isinstance(default, list):  # of a single piece
@@ -76,7 +69,7 @@ def parameter_entry(scene: Scene, parameter: Parameter) -> dict[str, Any]:
         "size": parameter.size,
         "unit": parameter.unit,
         "meaning": parameter.meaning,
-        "check": CHECKS[parameter.check],
+        "check": parameter.rule.name,
         "default": default,
         "in_struct": parameter.name != "link_radius",
     }

@@ -5,13 +5,14 @@ the value and what the field needs.
 """
 
 from collections.abc import Callable, Collection, Sequence
-from difflib import get_close_matches
 from operator import index
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from serpentail_scene.messages import did_you_mean, shown
+from serpentail_scene.rules import NumberRule
 from serpentail_scene.units import in_unit
 
 from .errors import SerpentailError, StateError
@@ -54,23 +55,6 @@ def refusal(field: str, value: object, needs: str, error: Error) -> Exception:
 def needed(field: str, value: object, needs: str) -> str:
     """Return a line about a value that a field cannot have."""
     return f"{field}: value {shown(value)}: needs {needs}"
-
-
-def shown(value: object) -> str:
-    """Return a value as Python writes it, on one line and shortened if it is long."""
-    try:
-        text = repr(value)
-    except (ValueError, RecursionError):  # repr refuses integers of more than 4300 digits
-        return f"of type {type(value).__name__}, too long to show"
-    return one_line(text)
-
-
-def one_line(text: str) -> str:
-    """Return a text on one line of at most 200 characters."""
-    line = text
-    if not text.isprintable():
-        line = "".join(x if x.isprintable() else repr(x)[1:-1] for x in " ".join(text.split()))
-    return line if len(line) <= 200 else line[:197] + "..."
 
 
 def real_array(
@@ -126,9 +110,9 @@ def number(
     """Return a finite number above one bound, not below another and not beyond the last."""
     if type(value) is float and above < value < np.inf and least <= value <= most:
         return value
-    numbers, bounds = numbers_in(value), (above, least, most)
-    if numbers is None or numbers.shape != () or not _within(numbers, bounds):
-        raise refusal(field, value, f"a {_words('number', bounds)}{_no_text(value)}", error)
+    numbers, rule = numbers_in(value), NumberRule("", "", above, least, most)
+    if numbers is None or numbers.shape != () or not satisfying(numbers, rule):
+        raise refusal(field, value, f"a {_words('number', rule)}{_no_text(value)}", error)
     return float(numbers)
 
 
@@ -154,9 +138,10 @@ def numbers(
     most: float = np.inf,
 ) -> NDArray[np.float64]:
     """Return finite numbers (size,) within bounds; a single one is repeated."""
-    numbers, bounds = numbers_in(value), (-np.inf, least, most)
-    if numbers is None or numbers.shape not in ((), (size,)) or not _within(numbers, bounds):
-        needs = f"one or {size} {_words('numbers', bounds)}{_no_text(value)}"
+    numbers, rule = numbers_in(value), NumberRule("", least=least, most=most)
+    shapes = ((), (size,))
+    if numbers is None or numbers.shape not in shapes or not satisfying(numbers, rule).all():
+        needs = f"one or {size} {_words('numbers', rule)}{_no_text(value)}"
         raise refusal(field, value, needs, error)
     return np.broadcast_to(numbers, (size,)).copy()
 
@@ -177,23 +162,18 @@ def numbers_in(value: object) -> NDArray[np.float64] | None:
         return None
 
 
-Bounds = tuple[float, float, float]  # above, least, most
+def satisfying(numbers: NDArray[np.float64], rule: NumberRule) -> NDArray[np.bool_]:
+    """Tell which numbers are finite and within the limits of a rule."""
+    above_least = (numbers > rule.above) & (numbers >= rule.least)
+    return np.isfinite(numbers) & above_least & (numbers <= rule.most)
 
 
-def _within(numbers: NDArray[np.float64], bounds: Bounds) -> bool:
-    """Tell whether numbers are finite and within bounds."""
-    above, least, most = bounds
-    sound = np.isfinite(numbers) & (numbers > above) & (numbers >= least) & (numbers <= most)
-    return bool(sound.all())
-
-
-def _words(noun: str, bounds: Bounds) -> str:
-    """Return in words what `_within` checks."""
-    above, least, most = bounds
-    to = f" to {most:g}" if most < np.inf else ""
-    if above > -np.inf:
-        return f"{noun} above {above:g}{to}"
-    return f"{noun} from {least:g}{to}" if least > -np.inf else f"finite {noun}{to}"
+def _words(noun: str, rule: NumberRule) -> str:
+    """Return the limits of a rule in words."""
+    to = f" to {rule.most:g}" if rule.most < np.inf else ""
+    if rule.above > -np.inf:
+        return f"{noun} above {rule.above:g}{to}"
+    return f"{noun} from {rule.least:g}{to}" if rule.least > -np.inf else f"finite {noun}{to}"
 
 
 def _no_text(value: object) -> str:
@@ -221,9 +201,3 @@ def none_of(field: str, value: object, names: Collection[str]) -> str:
         return ""
     remedy = did_you_mean(value, names) or f"needs {' or '.join(map(repr, names))}"
     return f"{field}: value {shown(value)}: {remedy}"
-
-
-def did_you_mean(value: object, names: Collection[str]) -> str:
-    """Return a question with the nearest name; "" if no name is near."""
-    near = get_close_matches(value, names, 1) if isinstance(value, str) else []
-    return f"did you mean {near[0]!r}?" if near else ""

@@ -84,7 +84,7 @@ def progress(hook: Hook | None = None) -> Iterator[None]:
     >>> with st.progress():  # doctest: +SKIP
     ...     plan = st.plan(model, start=(q0, v0), duration=0.3)
     """
-    token = _hook.set(hook or Told(sys.stderr))
+    token = _hook.set(hook or ProgressWriter(sys.stderr))
     try:
         yield
     finally:
@@ -128,7 +128,7 @@ class Stage:
         return Progress(self.name, what, self.done, seconds, ended, self.depth)
 
 
-class Told:
+class ProgressWriter:
     """Writes progress to a stream: one line that is updated on a terminal, else separate lines."""
 
     def __init__(self, stream: TextIO):

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from serpentail_scene.messages import one_line, shown
+
 MOST = 90  # characters of a field's value
 FEW = 7  # numbers that are shown as they are: an attitude, a vector, a small row of bounds
 
@@ -16,21 +18,15 @@ def brief(thing: Any) -> str:
     It serves as ``__repr__``: arrays of more than FEW numbers are shown by their shapes, and long
     values are cut.
     """
-    told = [f"{each.name}={_value(getattr(thing, each.name))}" for each in fields(thing)]
-    return f"{type(thing).__name__}({', '.join(told)})"
-
-
-def cut(text: str, most: int = MOST) -> str:
-    """Return a text on one line of at most ``most`` characters."""
-    line = " ".join(text.split())
-    return line if len(line) <= most else line[: most - 3] + "..."
+    entries = [f"{each.name}={_value(getattr(thing, each.name))}" for each in fields(thing)]
+    return f"{type(thing).__name__}({', '.join(entries)})"
 
 
 def _value(value: Any) -> str:
     """A field's value."""
     if isinstance(value, Mapping):
-        told = [f"{name}: {_value(entry)}" for name, entry in value.items()]
-        return cut(f"{{{', '.join(told)}}}")
+        entries = [f"{name}: {_value(entry)}" for name, entry in value.items()]
+        return one_line(f"{{{', '.join(entries)}}}", MOST)
     if isinstance(value, np.ndarray) and value.size > FEW:
         return f"array of {' x '.join(map(str, value.shape))}"
-    return cut(repr(value.tolist() if isinstance(value, np.ndarray) else value))
+    return shown(value.tolist() if isinstance(value, np.ndarray) else value, MOST)

@@ -10,9 +10,6 @@ Three = Sequence[float]
 OneOrEach = float | Sequence[float]  # of all tail coordinates, or of each
 
 
-PAPER = {"m": "segments", "n": "links"}  # the sizes' letters in the paper and in the documents
-
-
 class ParameterOptions(TypedDict, total=False):
     """Parameters by name, SI; by default the scene's values, else the paper's kangaroo rat.
 
@@ -103,9 +100,7 @@ def separated(options: Options) -> tuple[dict[str, Any], dict[str, Any]]:
 def _unknown(name: str, value: object) -> ModelError:
     """Return the error about a name that is neither a scene key nor a parameter."""
     known = Options.__annotations__
-    meant = PAPER.get(name)
-    remedy = f"did you mean {meant!r}?" if meant else did_you_mean(name, known)
-    remedy = remedy or f"give some of {', '.join(known)}"
+    remedy = did_you_mean(name, known) or f"give some of {', '.join(known)}"
     return ModelError(
         f"{name}: value {shown(value)}: is neither a scene key nor a parameter; {remedy}"
     )

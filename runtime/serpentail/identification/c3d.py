@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..basics.checks import one_line
+from serpentail_scene.messages import one_line
+
 from ..basics.errors import IdentificationError
 from ..basics.extras import needed
 from ..compiling.commands import inherited

@@ -11,7 +11,7 @@ import numpy as np
 from ..basics.checks import did_you_mean, needed, number, refusal
 from ..basics.errors import IdentificationError, UnlikeBodies, UnusualSize
 from ..model.model import Model
-from ..model.parameters import ellipsoid, flat, independent
+from ..model.parameters import flat, independent, link_inertia
 from .placement import STEP, Placements
 
 MARKER = "marker:"
@@ -152,7 +152,7 @@ def _struct_direction(model: Model, unknown: Unknown) -> np.ndarray:
     # the inertia of links that are ellipsoids follows from their other parameters
     if "link_radius" in values:
         pieces = int(np.sum(model.joints_each))
-        values["link_inertia"] = np.array(ellipsoid(values, pieces))
+        values["link_inertia"] = np.array(link_inertia(values, pieces))
     as_tuples = {name: tuple(np.atleast_1d(x)) for name, x in values.items()}
     return np.array(flat(model.manifest, as_tuples)).imag / TINY
 

@@ -11,7 +11,7 @@ from serpentail_scene.layout import OMEGA, QUATERNION, TAIL_V, VELOCITY
 from ..basics.checks import one_of, whole_number
 from ..basics.errors import ModelError
 from ..compiling.threads import threads
-from .lazy import kept
+from .lazy import lazy_property
 from .nodes.function import MOST_NODES, RESULTS, nodes_function
 from .parameters import flat, flat_names
 from .state_space import RATE
@@ -39,7 +39,7 @@ class CasadiFunctions:
         self._model = model
         self._nodes: dict[tuple[str, int, int, int], casadi.Function] = {}  # they stay loaded
 
-    @kept
+    @lazy_property
     def _module(self) -> ModuleType:
         """The generated module; ModelError if the scene did not ask for it."""
         if not self._has_module:
@@ -67,7 +67,7 @@ class CasadiFunctions:
         setattr(self, name, function)
         return function
 
-    @kept
+    @lazy_property
     def x_dot(self) -> casadi.Function:
         """Time derivative of the state x = (q, v), as SX operations.
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 
-def kept(make: Callable[[Any], Any]) -> property:
+def lazy_property(make: Callable[[Any], Any]) -> property:
     """Return a property that is made once and kept; in a race of threads, the first one's.
 
     ``functools.cached_property`` of Python 3.11 has a lock for all objects of a class: a child

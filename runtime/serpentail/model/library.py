@@ -15,7 +15,7 @@ from ..basics.errors import ModelError
 from ..compiling.cache import cache_folder
 from ..compiling.compiler import library_in_cache, library_of, opened
 from ..compiling.threads import after_fork
-from .lazy import kept
+from .lazy import lazy_property
 from .manifest import CheckedFolder, remedy, snapshot
 
 NOT_POSITIVE_DEFINITE, NOT_FINITE, OUT_OF_RANGE = 1, 2, 3
@@ -114,7 +114,7 @@ class LazyLibrary:
         """Length of its text."""
         return len(self.checked.files[self.source])
 
-    @kept
+    @lazy_property
     def at_hand(self) -> bool:
         """Whether the cache had it when that was first asked."""
         digests = _digests(self.checked, [self.source])

@@ -8,13 +8,12 @@ import numpy as np
 
 from ..basics.errors import ModelError
 from ..compiling.threads import checked_threads
+from .compiled_functions import without_c
 from .even_arcs import warn_of_even_arcs
 from .library import BatchLibrary, open_library
 from .manifest import CheckedFolder, read_folder
-from .methods.evaluated import without_c
 from .model import Model
-from .parameters import resolve
-from .plausible_sizes import warn_of_sizes
+from .parameters import resolve, warn_of_parameters
 
 
 def load(
@@ -95,7 +94,7 @@ def model_from(
     """Return the model of a folder that was checked; arguments and errors as of ``load``."""
     manifest = checked.manifest
     values = resolve(manifest, parameters)
-    warn_of_sizes(manifest, values, 3)  # 3: the caller of st.load
+    warn_of_parameters(manifest, values, 3)  # 3: the caller of st.load
     warn_of_even_arcs(manifest, values, 3)
     profile = manifest["scene"]["profile"] if profile is None else profile
     if not isinstance(compiled, bool | np.bool_):

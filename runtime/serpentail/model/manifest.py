@@ -23,7 +23,7 @@ from ..compiling.cache import (
     regular_bytes,
     workshop,
 )
-from .lazy import kept
+from .lazy import lazy_property
 
 FORMAT = 2
 KEYS = ["prefix", "real", "scene", "dimensions", "parameters", "functions"]
@@ -48,7 +48,7 @@ class CheckedFolder:
         """Digest of the manifest, which covers all files."""
         return str(self.manifest["manifest_hash"])
 
-    @kept
+    @lazy_property
     def casadi_module(self) -> ModuleType:
         """The generated module of CasADi functions, executed from the text that was checked."""
         name = f"{self.manifest['prefix']}_casadi"
@@ -202,3 +202,12 @@ def restored(manifest_hash: str, folder: Path) -> CheckedFolder:
             "the pickled one: generate it again as it was, or load and pickle the model anew"
         )
     return checked
+
+
+def links_of(pieces: int | list[int], kinds: tuple[str, ...]) -> int | tuple[int, ...] | None:
+    """Return the links of all segments, or of each, 0 of an arc; None of a continuum."""
+    if "articulated" not in kinds:
+        return None
+    if isinstance(pieces, int):
+        return pieces
+    return tuple(n if kind == "articulated" else 0 for n, kind in zip(pieces, kinds, strict=True))

@@ -16,12 +16,12 @@ from serpentail_scene.layout import Layout
 from ..basics.errors import SerpentailError
 from ..basics.extras import needed
 from ..compiling.cache import cache_folder
-from .functions import Functions
+from .compiled_functions import CompiledFunctions
 from .kernel import Kernel
-from .lazy import kept
+from .lazy import lazy_property
 from .library import BatchLibrary
-from .manifest import CheckedFolder, restored, snapshot
-from .methods.steps import StepMethods
+from .manifest import CheckedFolder, links_of, restored, snapshot
+from .methods import ModelMethods
 from .parameters import (
     RunParameters,
     Value,
@@ -30,9 +30,8 @@ from .parameters import (
     merged,
     real_type,
     resolve,
+    warn_of_parameters,
 )
-from .plausible_sizes import warn_of_sizes
-from .tail import links_of, words_of
 
 if TYPE_CHECKING:
     from .casadi import CasadiFunctions
@@ -51,7 +50,7 @@ def _unpickled(
     return model_from(restored(manifest_hash, folder), parameters, profile, *options)
 
 
-class Model(Functions, StepMethods):
+class Model(ModelMethods):
     """Equations of motion of a body with a tail, compiled: H v_dot + C = [0; tau] + J^T f (Eq. 1).
 
     ``load`` and ``build`` make models. All quantities are in SI units and radians. The world's
@@ -107,6 +106,11 @@ class Model(Functions, StepMethods):
     the body frame (rad/s), and the rates of the tail coordinates (rad/s). On a fixed base ``q``
     and ``v`` hold the tail coordinates and their rates only.
 
+    A derivative with respect to ``q`` is taken in its tangent space: column k is the rate of change
+    when ``q`` moves with the velocity e_k. Columns 3 to 5 are rotations of the torso about its body
+    axes. N is the number of joints or samples of the tail; K is the number of points that can touch
+    the ground, in the order of ``contacts``.
+
     Every numeric method also takes arrays with a leading batch axis, and repeats a single state
     over the batch. With the profile "fast" the last digits of a result may depend on the size
     of the batch. Every method raises ``StateError`` if a shape is wrong or a value is not
@@ -160,7 +164,7 @@ class Model(Functions, StepMethods):
         self.parameter_vector = np.array(flat(manifest, parameters), real_type(manifest))
         self.parameter_vector.setflags(write=False)  # with_parameters makes another model
         self.batch_library = batch_library or BatchLibrary(checked, profile)
-        self.kernels: dict[str, Kernel] = {}
+        self.kernels = CompiledFunctions(manifest, library is not None)
         if library is not None:
             for name in manifest["functions"]:
                 self.kernels[name] = Kernel(
@@ -172,7 +176,14 @@ class Model(Functions, StepMethods):
 
     def tail_words(self) -> str:
         """Return in words what the tail is made of, such as "3 x 4 links"."""
-        return words_of(self.links, self.segments)
+        if self.links is None:
+            return f"{self.segments} continuum segments"
+        if isinstance(self.links, int):
+            return f"{self.segments} x {self.links} links"
+        if all(self.links):
+            return f"{self.segments} segments of {', '.join(map(str, self.links))} links"
+        each = (f"{n} links" if n else "an arc" for n in self.links)
+        return f"{self.segments} segments: {', '.join(each)}"
 
     def with_parameters(self, **changes: ArrayLike) -> Model:
         """Return this model with other parameters; nothing is compiled.
@@ -198,7 +209,7 @@ class Model(Functions, StepMethods):
             As of ``load``.
         """
         varied = self._varied(changes)
-        warn_of_sizes(self.manifest, varied.parameters)
+        warn_of_parameters(self.manifest, varied.parameters, 2)
         return varied
 
     def _varied(self, changes: Mapping[str, Any]) -> Model:
@@ -240,7 +251,7 @@ class Model(Functions, StepMethods):
             vectors = vector[None] if runs == 1 else np.broadcast_to(vector, (runs, len(vector)))
             return RunParameters({}, self.parameters, vectors)
         parameters = RunParameters.checked(self.manifest, self._independent(), changes, runs)
-        warn_of_sizes(self.manifest, parameters.values, 4)  # 4: the caller of st.simulate
+        warn_of_parameters(self.manifest, parameters.values, 4)  # 4: the caller of st.simulate
         return parameters
 
     def _independent(self) -> dict[str, Value]:
@@ -260,7 +271,7 @@ class Model(Functions, StepMethods):
             (self.library is not None, self.batch_library.threads),
         )
 
-    @kept
+    @lazy_property
     def casadi(self) -> CasadiFunctions:
         """The model's functions as ``casadi.Function``, by name; needs the extra "plan".
 

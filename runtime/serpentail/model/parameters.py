@@ -7,27 +7,20 @@ from typing import Any
 
 import numpy as np
 
+from serpentail_scene.messages import did_you_mean, one_line, shown
+from serpentail_scene.parameters import Value, ellipsoid
+from serpentail_scene.rules import NUMBER_RULES, ROUNDING, NumberRule
 from serpentail_scene.units import in_unit
 
-from ..basics.checks import did_you_mean, numbers_in, one_line, shown
+from ..basics.checks import numbers_in, satisfying
 from ..basics.errors import ModelError
+from ..basics.plausible_values import warn_of_sizes
 
-Value = float | tuple[float, ...]
 Values = Mapping[str, Any]  # name -> number or numbers, SI; of many runs (k,) or (k, size)
 # parameters that follow from the values of single links or arcs
-UNITS = {"tail_mass": "kg", "tail_length": "m", "gravity": "m/s^2"}
 TOTALS = {
     "tail_mass": ("link_masses", "arc_masses"),
     "tail_length": ("link_lengths", "arc_lengths"),
-}
-CHECKS = {  # of rows (K, size), for each one
-    "positive": (lambda x: (x > 0).all(axis=1), "above 0"),
-    "not_negative": (lambda x: (x >= 0).all(axis=1), "0 or above"),
-    "finite": (lambda x: np.ones(len(x), bool), ""),
-    "body_inertia": (
-        lambda x: (x > 0).all(axis=1) & (2 * x.max(axis=1) <= x.sum(axis=1) * (1 + 1e-12)),
-        "above 0, none above the sum of the other two",
-    ),
 }
 
 
@@ -77,6 +70,13 @@ class RunParameters:
     def of(self, k: int) -> dict[str, np.ndarray]:
         """Return the changes of run k."""
         return {name: values[k] for name, values in self.changes.items()}
+
+
+def warn_of_parameters(manifest: dict, values: Values, calls: int) -> None:
+    """Warn of sizes that no animal or robot has; ``calls``: frames above this function."""
+    units = {"tail_mass": "kg", "tail_length": "m", "gravity": "m/s^2"}  # also if links decide
+    units |= {p["name"]: p["unit"] for p in manifest["parameters"]}
+    warn_of_sizes(units, values, calls + 1)
 
 
 def real_type(manifest: dict) -> type[np.floating]:
@@ -130,7 +130,7 @@ def completed(manifest: dict, values: Values) -> dict[str, Any]:
     _refuse_stops_without_room(values)
     if "link_radius" not in values:
         return dict(values)
-    moments = np.broadcast_arrays(*ellipsoid(values, manifest["dimensions"]["total"]))
+    moments = np.broadcast_arrays(*link_inertia(values, manifest["dimensions"]["total"]))
     return dict(values) | {"link_inertia": np.stack(moments, axis=-1)}
 
 
@@ -175,8 +175,8 @@ def _checked_changes(manifest: dict, changes: object, runs: int | None) -> dict[
     return sound
 
 
-def ellipsoid(values: Values, links: int) -> tuple[Any, Any, Any]:
-    """Moments of inertia (kg m^2) of one link along y, an ellipsoid of semi-axes (r, L / 2, r)."""
+def link_inertia(values: Values, links: int) -> tuple[Any, Any, Any]:
+    """Moments of inertia (kg m^2) of one link along y; ModelError if they are not finite."""
     with np.errstate(over="ignore", invalid="ignore"):
         across, along, _ = moments = ellipsoid_moments(values, links)
         sound = np.isfinite(across + along).all()
@@ -189,10 +189,9 @@ def ellipsoid(values: Values, links: int) -> tuple[Any, Any, Any]:
 
 
 def ellipsoid_moments(values: Values, links: int) -> tuple[Any, Any, Any]:
-    """Moments of inertia of ``ellipsoid``, of numbers or symbols."""
-    m, length, r = values["tail_mass"] / links, values["tail_length"] / links, values["link_radius"]
-    across, along = m / 5 * (length * length / 4 + r * r), m / 5 * (2 * r * r)
-    return across, along, across
+    """Moments of inertia of one of equal links, an ellipsoid; of numbers or symbols."""
+    mass, length = values["tail_mass"] / links, values["tail_length"] / links
+    return ellipsoid(mass, length, values["link_radius"])
 
 
 def flat(manifest: dict, values: Mapping[str, Value]) -> list[float]:
@@ -226,13 +225,13 @@ def checked_value(
         return f"{one_line(f'{name}')}: no such parameter; {remedy}"
     # the required value, in words and as a shape
     size, unit = fields[name]["size"], fields[name]["unit"]
-    holds, words = CHECKS[fields[name]["check"]]
+    rule = NUMBER_RULES[fields[name]["check"]]
     pieces = fields[name].get("pieces")
     kind = "a finite number" if size == 1 else f"{size} finite numbers"
     kind += f", {size // pieces} of each piece of the tail" if pieces else ""
     of_all = "per" in fields[name]  # one number may be given for all coordinates
     kind += ", or one for all," if of_all else ""
-    needs = f"needs {kind} ({unit}){', ' if words else ''}{words}"
+    needs = f"needs {kind} ({unit}){', ' if rule.words else ''}{rule.words}"
     shape = (size,) if size > 1 or pieces else ()
     if runs is not None:
         needs, shape = f"{needs}, for each of {runs} runs", (runs, *shape)
@@ -248,14 +247,22 @@ def checked_value(
         return f"{name}: value {shown(value)}: {needs}{_counted(numbers)}"
     # the first run with a wrong value
     rows = numbers.reshape(-1, size)
-    with np.errstate(over="ignore"):
-        wrong = np.flatnonzero(~(np.isfinite(rows).all(axis=1) & holds(rows)))
+    wrong = np.flatnonzero(~_sound(rows, rule))
     if not len(wrong):
         return numbers
     needs += _broken(rows[wrong[0]])
     if runs is None:
         return f"{name}: value {shown(value)}: {needs}"
     return f"{name} of run {wrong[0]}: value {shown(numbers[wrong[0]].tolist())}: {needs}"
+
+
+def _sound(rows: np.ndarray, rule: NumberRule) -> np.ndarray:
+    """Tell which rows (K, size) are finite numbers that satisfy a rule."""
+    sound: Any = satisfying(rows, rule).all(axis=1)
+    if rule.of_body:
+        with np.errstate(over="ignore", invalid="ignore"):
+            sound = sound & (2 * rows.max(axis=1) <= rows.sum(axis=1) * ROUNDING)
+    return sound
 
 
 def _counted(numbers: np.ndarray | None) -> str:

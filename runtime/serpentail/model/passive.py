@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 
-PARTS = ("spring", "damping", "stops")
 # tail coordinates (rad) that no motion reaches: stops there have no effect
 OUT_OF_REACH = 1e6
 ENDS = (("tail_stop_lower", -1), ("tail_stop_upper", 1))

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from serpentail_scene.layout import GROUPS
+from serpentail_scene.keys import GROUPS
 
 from ..basics.checks import shown
 from ..basics.short_repr import brief

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from ..basics.short_repr import cut
+from serpentail_scene.messages import one_line
 
 if TYPE_CHECKING:
     from .trajectory import Trajectory
@@ -104,7 +104,7 @@ def how_made(info: dict[str, Any]) -> str:
 
 def framed(lines: list[str]) -> str:
     """Return lines as the text of one object, each cut to the width."""
-    return "<" + "\n  ".join(cut(line, WIDTH) for line in lines) + ">"
+    return "<" + "\n  ".join(one_line(line, WIDTH) for line in lines) + ">"
 
 
 def _touched(motion: "Trajectory") -> str:

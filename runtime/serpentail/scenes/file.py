@@ -5,6 +5,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from serpentail_scene.keys import KEYS
 from serpentail_scene.units import in_unit
 
 from ..basics.checks import Refusals, refusal, shown
@@ -30,7 +31,6 @@ NEEDS = {
     "sweep": "a table [sweep.over]",
 }
 UNSIZED: Mapping[str, float] = {}  # of a body that is not scaled
-UNSAID = {"base": "free", "weightless": False}  # manifests leave these out
 
 
 def read_scene(path: str | Path, error: type[Exception]) -> tuple[dict[str, Any], Path]:
@@ -63,8 +63,9 @@ def model_of(scene: Mapping, path: Path, folder: str | Path | None, parameters: 
     if folder is None:
         return model_from(*built(scene, path.stem, parameters))
     made = read_folder(Path(folder)).manifest["scene"]
-    for key in MADE_OF:
-        if key in scene and not _same(_in_radians(key, scene[key]), made.get(key, UNSAID.get(key))):
+    for key in [key for key in MADE_OF if key in scene]:
+        default = KEYS[key].default  # manifests leave some out
+        if not _same(_in_radians(key, scene[key]), made.get(key, default)):
             raise ModelError(
                 f"{folder} has {key} = {made.get(key)!r}, {path} has {shown(scene[key])}: generate "
                 "it again, or leave the folder out"

@@ -3,6 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from serpentail_scene.keys import Key, one_word
+
 from ..basics.checks import Refusals, needed
 from ..basics.errors import IdentificationError
 from ..identification.identify import identify
@@ -10,9 +12,34 @@ from ..identification.marker_files import read_markers
 from ..identification.placement import Marker
 from ..identification.result import Identification
 from ..identification.torques import TorquePrior
+from ..identification.tracks import AXES, UNITS, ZEROS
 from .file import UNSIZED, model_of, read_scene, size_of, subtable, values_of
-from .identify_keys import IDENTIFY
 
+# the keys of a table [[identify.marker]], and of [identify]
+MARKER = Key(
+    keys={
+        "name": Key(form={"type": "string"}),
+        "torso": Key("m", depth=1),
+        "tail": Key("1"),
+        "offset": Key("m", depth=1),
+    },
+    needs=("name",),
+)
+IDENTIFY = Key(
+    keys={
+        "estimate": Key(form={"type": "array", "items": {"type": "string"}}),
+        "marker": Key(each=MARKER),
+        "torques": Key(
+            keys={"std": Key("N m"), "time": Key("s")}, needs=("std", "time"), words=("none",)
+        ),
+        "noise": Key("m"),
+        "confidence": Key("1"),
+        "unit": one_word(*UNITS),
+        "axes": Key(form={"type": "string", "pattern": AXES}),
+        "zeros": one_word(*ZEROS),
+    },
+    needs=("marker",),
+)
 # functions that an identification calls besides the default ones of scenes
 NEEDS = ("forward_dynamics_derivatives", "forward_dynamics_parameter_derivatives")
 USES = ("forward_dynamics", "energy", "momentum", "tail_points", "mass_matrix", "bias_force")

@@ -1,49 +1,27 @@
-"""What the keys of a scene's tables hold: their units and shapes, from which the tables are read.
-
-The JSON Schema for editors is made of the same.
-"""
+"""Reads the tables of a scene by their keys, with all numbers in the keys' units."""
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
+from serpentail_scene.keys import Key
 from serpentail_scene.units import dimensions, in_unit
 
 from ..basics.checks import Refusals, needed, none_of, shown
 from ..basics.plausible_values import warn_of_unusual
 
-
-@dataclass(frozen=True)
-class Key:
-    """The values that a key may have: numbers in a unit, a table of keys, or another form.
-
-    unit: of the numbers; "1" for pure numbers, "" for no unit; several units: one for each entry of
-    an array, the last one for all further entries. depth: largest depth of nested arrays. usual:
-    whether to warn of values that no animal has. keys: of a table, with the required ones. kinds:
-    keys by the table's ``kind``. each: keys of the tables in an array. words: texts that are
-    allowed instead. form: JSON Schema of any other form.
-    """
-
-    unit: str | Sequence[str] = ""
-    depth: int = 0
-    usual: bool = True
-    keys: Mapping[str, "Key"] = field(default_factory=dict)
-    needs: tuple[str, ...] = ()
-    kinds: Mapping[str, "Key"] = field(default_factory=dict)
-    each: "Key | None" = None
-    words: tuple[str, ...] = ()
-    form: Mapping[str, Any] = field(default_factory=dict)
-
-    @property
-    def is_table(self) -> bool:
-        """Tell whether a table belongs here."""
-        return bool(self.keys or self.kinds)
-
-
-def one_word(*words: str) -> Key:
-    """Return the key of one of these words."""
-    return Key(form={"enum": list(words)})
+SWEEP = Key(  # of a scene's table [sweep]
+    keys={
+        "run": Key(form={"enum": ["simulate", "plan", "identify"]}),
+        "over": Key(form={"type": "object"}),
+        "points": Key(form={"type": "integer", "minimum": 1}),
+        "seed": Key(form={"type": "integer", "minimum": 0}),
+        "outputs": Key(form={"type": "array", "items": {"type": "string"}}),
+        "limit": Key(form={"type": "number", "exclusiveMinimum": 0}),
+        "store": Key(form={"type": "string"}),
+    },
+    needs=("over",),
+)
 
 
 def read(table: Mapping, key: Key, where: str, refused: Refusals, part: str = "") -> dict:

@@ -4,9 +4,9 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from serpentail_scene.messages import one_line, shown
 from serpentail_scene.source import tables_in
 
-from ..basics.checks import one_line, shown
 from ..basics.errors import SimulationError
 
 DEEPEST = 8  # names in a path

@@ -4,16 +4,37 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from serpentail_scene.keys import Key
+
 from ..basics.checks import Refusals, needed, refusal
 from ..basics.errors import SimulationError
 from ..model.model import Model
-from ..sequence.phase import Phase, Tracking
+from ..sequence.phase import AIRBORNE, BEFORE, GIVEN, LANDING, Phase, Tracking
 from ..simulation.controllers.controller import Controller
+from ..simulation.ground import KINDS
 from .controllers import controller_of, reference_of
 from .file import size_of, values_of
-from .phase_keys import PHASE
-from .plan import arguments_but_start
+from .plan import PLAN, arguments_but_start
+from .simulate_keys import LAWS_OF_ONE, METRES, MOVES, REFERENCE, SECONDS
 
+EVENT = {"type": "array", "prefixItems": [{"enum": list(KINDS)}, {"type": "string"}]}
+UNTIL = {"anyOf": [{"enum": [AIRBORNE, LANDING]}, {"type": "array", "items": EVENT}]}
+WITHOUT_START = {name: key for name, key in PLAN.keys.items() if name not in GIVEN}
+PHASE = Key(
+    keys={
+        "name": Key(form={"type": "string"}),
+        "duration": SECONDS,
+        "until": Key(form=UNTIL),
+        "clearance": METRES,
+        "controller": Key(kinds=LAWS_OF_ONE),
+        "reference": Key(keys=REFERENCE),
+        "plan": Key(keys=WITHOUT_START, each=Key(keys=WITHOUT_START)),
+        "tracking": Key(keys={"kp": Key("1/s^2"), "kd": Key("1/s"), "early": SECONDS}),
+        "moves": Key(each=Key(keys=MOVES | {BEFORE: SECONDS})),
+    },
+    needs=("name", "duration"),
+)
+PHASES = Key(each=PHASE)
 INSTEAD = {  # keys of [simulate] that a scene with phases has elsewhere
     "duration": "each phase has its own",
     "reference": "give it to a phase",

@@ -1,8 +1,9 @@
 """The keys of a scene's table [simulate]."""
 
+from serpentail_scene.keys import Key, one_word
+
 from ..simulation.controllers.schedules import BLENDS, MOVE
 from ..simulation.methods import SETTINGS
-from .keys import Key, one_word
 
 SECONDS, METRES, ANGLE = Key("s"), Key("m"), Key("rad")
 RATE, PURE, FLAG = Key("rad/s"), Key("1"), Key(form={"type": "boolean"})

@@ -11,7 +11,7 @@ from serpentail_scene.layout import QUATERNION
 
 from ..basics.checks import finite_array, number, real_array, refusal, refuse_not_finite
 from ..basics.errors import SimulationError, StateError
-from ..model.lazy import kept
+from ..model.lazy import lazy_property
 from ..model.model import Model
 
 MOST_SAMPLES = 10_000_000  # of all runs: more are a mistake, and would fill the memory
@@ -75,7 +75,7 @@ class Start:
         """Time between outputs."""
         return (self.end - self.start) / self.intervals
 
-    @kept
+    @lazy_property
     def times(self) -> np.ndarray:
         """Output times (intervals + 1,)."""
         times = np.arange(self.intervals + 1) * self.interval + self.start

@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from serpentail_scene.parameters import PARTS
+
 from ..basics.errors import ExtraMissing, SerpentailError
 from ..basics.extras import needed
 from ..model.model import Model
-from ..model.passive import PARTS, idle
+from ..model.passive import idle
 from . import (
     airborne_laws,
     call_laws,

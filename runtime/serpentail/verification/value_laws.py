@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 
 from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_V, VELOCITY
+from serpentail_scene.parameters import PARTS
 
 from ..basics.attitude import rotation_matrix
 from ..model.model import Model
 from ..model.parameters import total_mass
-from ..model.passive import PARTS
 from ..motion.trajectory import Trajectory
 from ..simulation.controllers.schedules import Legs
 from ..simulation.simulate import simulate

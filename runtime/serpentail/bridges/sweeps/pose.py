@@ -15,10 +15,10 @@ from ...building.options import ParameterOptions
 from ...model.model import Model
 from ...model.parameters import independent
 from ...scenes.file import MADE_OF, read_scene, subtable
-from ...scenes.identify_keys import IDENTIFY
+from ...scenes.identify import IDENTIFY
 from ...scenes.keys import Key, read
 from ...scenes.overrides import changed
-from ...scenes.plan_keys import PLAN
+from ...scenes.plan import PLAN
 from ...scenes.simulate_keys import SIMULATE
 from .axis import as_json, plain
 from .job import DATA, STARTS, Job

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...basics.checks import one_line
+from serpentail_scene.messages import one_line
+
 from ...basics.errors import SweepError
 from ...basics.extras import needed
 from ...basics.short_repr import brief

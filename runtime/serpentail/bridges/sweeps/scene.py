@@ -7,8 +7,7 @@ from typing import Any
 from ...basics.checks import Refusals, none_of, refusal
 from ...basics.errors import SweepError
 from ...scenes.file import read_scene, subtable
-from ...scenes.keys import read
-from ...scenes.sweep_keys import SWEEP
+from ...scenes.keys import SWEEP, read
 from .axis import Grid, Spread, grid, latin, random, sobol
 from .job import RUNS
 

@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...basics.checks import one_line
+from serpentail_scene.messages import one_line
+
 from ...basics.errors import SweepError
 from ...basics.extras import needed
 from ...basics.files import replacing

@@ -11,7 +11,7 @@ import numpy as np
 
 from serpentail_scene.layout import OMEGA, TAIL_V, VELOCITY
 
-from ...model.lazy import kept
+from ...model.lazy import lazy_property
 from ...model.model import Model
 from ...model.parameters import total_mass
 from ..design import Design, refuse_unused
@@ -113,7 +113,7 @@ class Node:
     paths: tuple[int, ...]
     start: StartRows | None = None
 
-    @kept
+    @lazy_property
     def derivatives(self) -> NodeDerivatives:
         """Exact derivatives, which programs on all meshes share."""
         return NodeDerivatives(self)

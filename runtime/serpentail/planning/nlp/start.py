@@ -12,7 +12,7 @@ import numpy as np
 
 from serpentail_scene.layout import OMEGA, VELOCITY
 
-from ...model.lazy import kept
+from ...model.lazy import lazy_property
 from ...model.model import Model
 from .body import BodyFunctions
 from .coordinates import COM_ENTRIES, IDENTITY_POSE, Attitude, rotated
@@ -104,7 +104,7 @@ class StartRows:
         """Places (n,) of x in w."""
         return np.arange(self.function.size1_in(0))
 
-    @kept
+    @lazy_property
     def jacobian(self) -> "ca.Function":
         """Derivatives (rows, n)."""
         import casadi as ca
@@ -112,7 +112,7 @@ class StartRows:
         x = self.function.sx_in(0)
         return ca.Function("jacobian", [x], [ca.jacobian(self.function(x), x)])
 
-    @kept
+    @lazy_property
     def hessian(self) -> "ca.Function":
         """The Hessian of mu^T rows."""
         import casadi as ca

@@ -1,1 +1,0 @@
-"""The methods of a model, in groups: each calls a compiled function."""
