@@ -4,7 +4,7 @@ table.
 
 from serpentail_scene.signatures.table import SIGNATURES
 
-from . import contact, fixed_base, pfl
+from . import contact, pfl
 from .airborne import curvature as airborne
 from .derivatives import by_parameters, hessian, jacobians
 from .differentiable import FUNCTIONS
@@ -27,7 +27,7 @@ CATALOGUE = {name: _FOUND[name] for name, s in SIGNATURES.items() if s.outputs}
 
 def function_of(name: str, tail: Tail) -> Function:
     """Return a function of a tail, with the arguments that it has for that tail."""
-    return (fixed_base.FUNCTIONS if tail.fixed else CATALOGUE)[name].of(tail)
+    return CATALOGUE[name].of(tail)
 
 
 SYMBOLIC = {name for name in CATALOGUE if SIGNATURES[name].symbolic}  # in the CasADi module

@@ -116,6 +116,17 @@ def names(refs: Iterable[Ref]) -> set[str]:
     return {ref.array.name for ref in refs}
 
 
+def read_names(body: Body) -> set[str]:
+    """Return the names of the arrays that statements read, or hand to other programs."""
+    found: set[str] = set()
+    for statement, _ in statements(body):
+        if isinstance(statement, Call):
+            found |= {array.name for _, array in statement.arguments}
+        else:
+            found |= names(reads(statement))
+    return found
+
+
 def rewritten(body: Body, rewrite: Callable[[Statement], Iterable[Statement]]) -> Body:
     """Return a loop nest with each statement replaced by those that ``rewrite`` returns.
 

@@ -15,7 +15,7 @@ from ..derivatives.directions import Directions
 from ..derivatives.hessian import tangents_of_gradient
 from ..draft import Draft
 from ..function import Assembly
-from ..layout import block, coordinate, tail_v
+from ..layout import block, coordinate
 from .balance import (
     QUATERNION,
     TURN,
@@ -125,7 +125,7 @@ def store_crossed(b: Balance, slopes: Slopes, found: Curvatures) -> tuple[Array,
     reads = {"move": move, "turn": turn}
     draft.step(airborne.torso_weights, b.center, reads, move=move, turn=turn)
     with draft.loop("k", nt) as k:
-        weight = tail_v(by_q["v_dot"], k)
+        weight = tail.coordinate_v(by_q["v_dot"], k)
         reads = b.of_tail(k) | {"weight": weight, "move": move, "turn": turn}
         draft.step(airborne.tail_weight, reads, weight=weight)
     draft.solve(b.inertia, turn)
@@ -138,7 +138,10 @@ def store_crossed(b: Balance, slopes: Slopes, found: Curvatures) -> tuple[Array,
             add = "sum_" if first else "sum"
             draft.step(airborne.crossed, reads, **{add: crossed.part(d, 1)})
         with draft.loop("k", nt) as k:
-            reads = {"weight": tail_v(by_q["v_dot"], k), "change": slopes.tail.lane(k, d, 1)}
+            reads = {
+                "weight": tail.coordinate_v(by_q["v_dot"], k),
+                "change": slopes.tail.lane(k, d, 1),
+            }
             draft.step(airborne.crossed_by_rate, reads, sum_=crossed.part(d, 1))
     add_drift(b, slopes, found, crossed)
 
@@ -146,7 +149,7 @@ def store_crossed(b: Balance, slopes: Slopes, found: Curvatures) -> tuple[Array,
     draft.fill(by_torque.part(0, nt), 0)
     with draft.loop("l", nt) as other, draft.loop("k", nt) as k:
         change = slopes.by_torque.lane(k, other, 1)
-        reads = {"weight": tail_v(by_q["v_dot"], k), "change": change}
+        reads = {"weight": tail.coordinate_v(by_q["v_dot"], k), "change": change}
         draft.step(airborne.crossed_by_rate, reads, sum_=by_torque.part(other, 1))
     return crossed, by_torque
 

@@ -12,9 +12,9 @@ from ...mechanics import airborne_power, mount, torso
 from ..derivatives.differentiated import POWER, U_VIRTUAL, A
 from ..draft import Draft
 from ..function import Function
-from ..layout import block, segment_v
+from ..layout import block
 from ..passive import add_passive_power
-from ..scope import State, Vectors
+from ..scope import Vectors
 from ..sweeps.pieces import across, each_piece, mechanism
 
 DRIFT = Argument("drift", (3,), "velocity of B relative to the COM, torso axes")
@@ -27,7 +27,7 @@ def assemble_power(draft: Draft, arrays: dict[str, Array]) -> None:
     outward.
     """
     v_dot, multiplier, power = arrays["v_dot"], arrays["multiplier"], arrays["power"][0]
-    state = State(arrays["q"], arrays["v"])
+    state = draft.state(arrays["q"], arrays["v"])
     segments = mechanism(draft).prepare(draft, state, False)
 
     # the torso
@@ -60,7 +60,7 @@ def assemble_power(draft: Draft, arrays: dict[str, Array]) -> None:
 
     # from the mount to the tip
     for i, g in each_piece(draft):
-        rates = segments.motion(i, v_dot), {"virtual_rates": segment_v(multiplier, i)}
+        rates = segments.motion(i, v_dot), {"virtual_rates": draft.tail.segment_v(multiplier, i)}
         step = mechanism(draft).power_and_momentum
         draft.step(step, segments.at(i, g), *rates, carried, power_=power, **carried)
     add_passive_power(draft, state, multiplier, power)

@@ -15,7 +15,7 @@ from ..derivatives.differentiated import CORE
 from ..derivatives.directions import Directions
 from ..draft import Draft
 from ..function import assemble
-from ..layout import block, coordinate, tail_v
+from ..layout import block, coordinate
 from ..sweeps.inertia import column_of
 from .balance import (
     TURN,
@@ -88,7 +88,11 @@ def store_slopes(b: Balance, motion: Motion) -> Slopes:
     reads = {"force": block(rows, VELOCITY), "moment": block(rows, OMEGA)}
     draft.step(airborne.torso_load, b.center.only("com"), reads, net=net, turn_load=turn_load)
     with draft.loop("k", tail.nt) as k:
-        reads = b.of_tail(k) | {"inertial": tail_v(rows, k), "net": net, "turn_load": turn_load}
+        reads = b.of_tail(k) | {
+            "inertial": tail.coordinate_v(rows, k),
+            "net": net,
+            "turn_load": turn_load,
+        }
         target = tail_slopes.part(k, 1)
         step = airborne.torque_without_torso
         draft.step(step, b.center.only("inverse_mass"), reads, load=target)

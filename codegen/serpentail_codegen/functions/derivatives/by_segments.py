@@ -21,9 +21,9 @@ from ...mechanics import link, rotations, segment_slopes, torso, translation
 from ...mechanics.lower import derive
 from ..draft import Draft
 from ..function import Function, assemble
-from ..layout import block, coordinate, segment_v
+from ..layout import block, coordinate
 from ..passive import add_passive_slopes, net_torques
-from ..scope import Motion, State, Vectors
+from ..scope import Motion, Vectors
 from ..sweeps.pieces import mechanism
 from ..sweeps.segments import Freed, forward_dynamics
 from ..tails.mechanism import Segments
@@ -65,7 +65,7 @@ class Slopes:
 def derivatives_by_segments(draft: Draft, arrays: dict[str, Array]) -> None:
     """Jacobians of v_dot by q, v and tau."""
     tail, nv = draft.tail, draft.tail.nv
-    state, v_dot = State(arrays["q"], arrays["v"]), draft.array("acceleration", nv)
+    state, v_dot = draft.state(arrays["q"], arrays["v"]), draft.array("acceleration", nv)
     unloaded = draft.constant("unloaded", [0] * 6)
     torques = net_torques(draft, state, arrays["tau"])
     freed = forward_dynamics(draft, state, unloaded, torques, v_dot, again=True)
@@ -167,7 +167,7 @@ class Links:
 
 def assemble_segment_slopes(draft: Draft, arrays: dict[str, Array]) -> None:
     """Slopes of every segment by its own directions, link by link."""
-    state, v_dot, total = State(arrays["q"], arrays["v"]), arrays["v_dot"], draft.tail.total
+    state, v_dot, total = draft.state(arrays["q"], arrays["v"]), arrays["v_dot"], draft.tail.total
     segments = mechanism(draft).prepare(draft, state, False)
     slopes = Slopes.declared(draft, "output")
     wrench, d_wrench = draft.array("wrench", 6, total), draft.wide("d_wrench", 6 * total, OWN)
@@ -233,7 +233,7 @@ class Changes:
         with draft.loop("i", draft.tail.segments) as i:
             reads = self.freed.elimination(i) | {"base": base}
             reads["free"] = free.part(PER_SEGMENT * i, PER_SEGMENT)
-            writes = {"accelerations": segment_v(x, i), "base": base}
+            writes = {"accelerations": draft.tail.segment_v(x, i), "base": base}
             draft.step(segment_slopes.responding, passes.tip_of(i), reads, **writes)
 
     def _outward(self, start: Motion) -> Array:

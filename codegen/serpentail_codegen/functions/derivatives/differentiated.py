@@ -10,7 +10,7 @@ from ...ir.program import Array, Ref
 from ..draft import Draft
 from ..dynamics import inertial_forces
 from ..function import Function
-from ..layout import block, segment_v
+from ..layout import block
 from ..passive import add_passive_forces, add_passive_power
 from ..scope import Motion, State, Vectors
 from ..sweeps.momentum import gather_moment
@@ -25,27 +25,27 @@ FIRST_MOMENT = Argument("moment", (3,), "first moment about B, torso axes (kg m)
 
 def assemble_core(draft: Draft, arrays: dict[str, Array]) -> None:
     """H v_dot + C with all vectors in torso axes: it depends on no attitude and no gravity."""
-    state = State(arrays["q"], arrays["v"])
+    state = draft.state(arrays["q"], arrays["v"])
     core_forces(draft, state, state.omega, arrays)
-    add_passive_forces(draft, state, lambda i: segment_v(arrays["force"], i))
+    add_passive_forces(draft, state, lambda i: draft.tail.segment_v(arrays["force"], i))
 
 
 def assemble_inertia(draft: Draft, arrays: dict[str, Array]) -> None:
     """The core at rest: H v_dot in torso axes."""
-    core_forces(draft, State(arrays["q"]), draft.zero(3), arrays)
+    core_forces(draft, draft.state(arrays["q"]), draft.zero(3), arrays)
 
 
 def core_forces(draft: Draft, state: State, omega: Ref, arrays: dict[str, Array]) -> None:
     """Store H v_dot + C in torso axes."""
     v_dot = arrays["v_dot"]
     segments = mechanism(draft).prepare(draft, state, False)
-    motion = Motion(omega, block(v_dot, OMEGA), arrays["a"][0])
+    motion = Motion(omega, draft.of_torso(v_dot, OMEGA), arrays["a"][0])
     inertial_forces(draft, segments, motion, v_dot, arrays["force"])
 
 
 def assemble_first_moment(draft: Draft, arrays: dict[str, Array]) -> None:
     """First moment of the animal."""
-    segments = mechanism(draft).prepare(draft, State(arrays["q"]), False)
+    segments = mechanism(draft).prepare(draft, draft.state(arrays["q"]), False)
     moment = gather_moment(draft, segments)
     draft.copy(arrays["moment"][0], moment["h"])
 
@@ -55,7 +55,7 @@ def assemble_virtual_power(draft: Draft, arrays: dict[str, Array]) -> None:
     tip.
     """
     v_dot, multiplier = arrays["v_dot"], arrays["multiplier"]
-    state = State(arrays["q"], arrays["v"])
+    state = draft.state(arrays["q"], arrays["v"])
     segments = mechanism(draft).prepare(draft, state, False)
 
     # the torso moves by v and v_dot, and virtually by the multiplier

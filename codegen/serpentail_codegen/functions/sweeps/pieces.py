@@ -29,7 +29,9 @@ def mechanism(draft: Draft) -> Mechanism:
 
 
 def attitude(draft: Draft, state: State) -> Ref:
-    """Store the rotation matrix of the torso."""
+    """Store the rotation matrix of the torso; that of a fixed base is a constant."""
+    if draft.tail.fixed:
+        return draft.fixed("identity", IDENTITY)
     reads = {"quaternion": state.quaternion}
     return draft.store(rotations.quaternion_rotation, reads, R=9)["R"]
 
@@ -97,11 +99,11 @@ def torso_pose(
     draft: Draft, R: Ref | None = None, origin: Ref | None = None, name: str = "link"
 ) -> Pose:
     """Return the pose of the tail mount, to be carried along the tail: from B in torso axes, or
-    from an origin in world axes if the attitude R is given.
+    from an origin in world axes if the attitude R is given.  On a fixed base both are the same.
     """
     pose = Pose(draft.vector(f"R_{name}", 9), draft.vector(f"P_{name}", 3))
     axes = mount_axes(draft)
-    if R:
+    if R and not draft.tail.fixed:
         draft.copy(pose.R, R)
         start = origin or draft.fixed("origin", [0, 0, 0])
         draft.step(torso.mount_position, {"R": R, "p": start}, P=pose.P)

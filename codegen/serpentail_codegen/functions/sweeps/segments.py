@@ -15,7 +15,7 @@ from ...ir.tape import Number
 from ...mechanics import free_segment, link, link_chain, rotations, torso
 from ...mechanics.link_columns import torso_bias
 from ..draft import Draft
-from ..layout import block, coordinates, segment_v
+from ..layout import block, coordinates
 from ..scope import State, Vectors
 from ..tails.articulated import link_properties
 from ..tails.mechanism import simplified
@@ -51,7 +51,7 @@ def forward_dynamics(
     draft.copy(base.part(3, 3), block(v_dot, OMEGA))
     with draft.loop("i", m) as i:
         reads = {"shares": passes.elimination[i], "coasting": passes.coasting[i], "base": base[0]}
-        writes = {"accelerations": segment_v(v_dot, i), "base": base[0]}
+        writes = {"accelerations": draft.tail.segment_v(v_dot, i), "base": base[0]}
         draft.step(free_segment.outward, passes.tip_of(i), reads, **writes)
     return Freed(passes, inertia, *freed)
 

@@ -1,16 +1,17 @@
 """Sweeps of wrenches: motion from the torso to the tip, forces back, and their power."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from serpentail_scene.layout import OMEGA, VELOCITY
 
 from ...ir.program import Array, Index, Ref
 from ...mechanics import mount, torso
 from ..draft import Draft
-from ..layout import block, segment_v
-from ..scope import Motion, Vectors
+from ..layout import block
+from ..scope import Motion, State, Vectors
 from ..tails.mechanism import Segments, Wrenches
-from .pieces import across, each_piece, each_segment, mechanism, pieces_of
+from .pieces import across, attitude, each_piece, each_segment, mechanism, pieces_of
 
 
 def forward_wrenches(
@@ -60,13 +61,25 @@ def gather_wrenches(
 
 def core_bias(draft: Draft, segments: Segments, bias: Array) -> None:
     """C without gravity and translation: force and moment at B in torso axes, then the tail's
-    forces.
+    forces; on a fixed base those alone, with gravity.
+    """
+    motion = torso_without_acceleration(draft, segments.state)
+    wrenches = forward_wrenches(draft, segments, motion, None)
+    total = gather_wrenches(draft, segments, wrenches, lambda i: draft.tail.segment_v(bias, i))
+    if not draft.tail.fixed:
+        torso_wrench(draft, motion, total, bias)
+
+
+def torso_without_acceleration(draft: Draft, state: State) -> Motion:
+    """Return the motion of a torso that falls freely, without gravity in its own axes; a fixed base
+    does not fall, and gravity is an acceleration of it.
     """
     zero = draft.zero(3)
-    motion = Motion(segments.state.omega, zero, zero)
-    wrenches = forward_wrenches(draft, segments, motion, None)
-    total = gather_wrenches(draft, segments, wrenches, lambda i: segment_v(bias, i))
-    torso_wrench(draft, motion, total, bias)
+    motion = Motion(state.omega, zero, zero)
+    if not draft.tail.fixed:
+        return motion
+    reads = {"R": attitude(draft, state), "p_ddot": zero}
+    return replace(motion, a=draft.store(torso.torso_acceleration, reads, a=3)["a"])
 
 
 def torso_wrench(draft: Draft, motion: Motion, total: Vectors, force: Array) -> None:
@@ -111,6 +124,6 @@ def virtual_power(
 
     # from the mount to the tip
     for i, g in each_piece(draft):
-        rates = segments.motion(i, v_dot), {"virtual_rates": segment_v(multiplier, i)}
+        rates = segments.motion(i, v_dot), {"virtual_rates": draft.tail.segment_v(multiplier, i)}
         step = mechanism(draft).power
         draft.step(step, segments.at(i, g), *rates, carried, power_=power, **carried)
