@@ -7,9 +7,7 @@ from ..scope import Vectors
 
 
 def lane(vector: Ref, i: Index) -> Ref:
-    """Return the part of segment i: a lane of a wide vector, or an entry of an array."""
-    if not vector.lanes:
-        return vector.array[i]
+    """Return the part of segment i: a lane of a wide vector."""
     return vector.array.down(vector.offset, i, vector.size)
 
 
