@@ -17,7 +17,7 @@ from tests.references.parameters import random_states
 from tests.support import zoo
 from tests.support.rows import row
 
-LAWS = ["ground", "box", "smooth", "paper"]  # all laws of friction on one tail
+LAWS = ["ground", "smooth", "paper"]  # all laws of friction on one tail
 TAILS = ["ground_m2_n2", "ground_arcs", "ground_mixed"]
 UPRIGHT = np.array([0, 0, 0, 1.0, 0, 0, 0, 0, 0])
 

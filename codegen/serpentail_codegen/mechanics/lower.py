@@ -79,6 +79,8 @@ class Recorder:
     def _power(self, base: sympy.Basic, exponent: sympy.Basic) -> int:
         if exponent == sympy.Rational(1, 2):
             return self.tape.sqrt(self.lower(base))
+        if exponent == sympy.Rational(-1, 2):
+            return self.tape.div(self.tape.const(1), self.lower(sympy.sqrt(base)))
         if not exponent.is_Integer:
             raise TypeError(f"no rule lowers the exponent {exponent}")
         product = self._chain(self.tape.mul, [base] * abs(int(exponent)))

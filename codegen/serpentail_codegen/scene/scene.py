@@ -14,7 +14,7 @@ from .variant import EQUAL, Shape
 
 KINDS = ("articulated", "continuum", "mixed")
 GROUPS = ("feet", "tail", "torso")  # of contact points, in their order
-FRICTION = ("cone", "box", "smooth", "paper")
+FRICTION = ("cone", "smooth", "paper")
 BASES = ("free", "fixed")  # of the tail: a torso that moves, or one that never does
 TARGETS = ("c", "casadi")  # languages to emit, in their order
 # a model with such a name would hide the system's header
