@@ -4,9 +4,11 @@ A ``Program`` is a list of arrays and a tree of statements; everything here is f
 ``interpret.Run`` defines the meaning of the statements.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import get_args
+from functools import cache
+from typing import Any, get_args
 
 from .algebra import Number
 from .step import Step
@@ -187,7 +189,7 @@ class Loop:
     start: Index
     stop: Index
     downward: bool
-    body: tuple["Statement", ...]
+    body: "Body"
 
 
 @dataclass(frozen=True)
@@ -195,7 +197,7 @@ class When:
     """Run the body where a scalar is positive."""
 
     scalar: Ref
-    body: tuple["Statement", ...]
+    body: "Body"
 
 
 @dataclass(frozen=True)
@@ -260,9 +262,28 @@ class Call:
     arguments: tuple[tuple[str, Array], ...]
 
 
+Body = tuple["Statement", ...]
 LinearEquations = Factor | Solve | FactorPair | SolvePair
 Statement = Apply | Fill | Unit | Copy | Loop | When | LinearEquations | Guard | Call
 STATEMENTS: tuple[type, ...] = get_args(Statement)
+
+
+@cache
+def _method_name(name: str) -> str:
+    """Return the name of a class in the style of a method."""
+    return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
+
+
+def rule_of(visitor: object, statement: Statement, does: str) -> Callable[..., Any]:
+    """Return the method of a visitor that is named like a statement: ``solve_pair`` of SolvePair.
+
+    does: what the visitor's methods do, for the error if it has none.
+    """
+    name = type(statement).__name__
+    rule = getattr(visitor, _method_name(name), None)
+    if rule is None:
+        raise TypeError(f"no rule {does} {name}")
+    return rule
 
 
 @dataclass(frozen=True)
@@ -272,7 +293,7 @@ class Program:
     name: str
     doc: str
     arrays: tuple[Array, ...]
-    body: tuple["Statement", ...]
+    body: "Body"
 
     def of_role(self, role: str) -> tuple[Array, ...]:
         """Return the arrays of a role, in the order in which they were declared."""
@@ -280,7 +301,7 @@ class Program:
 
 
 def statements(
-    body: tuple[Statement, ...],
+    body: Body,
 ) -> Iterator[tuple[Statement, tuple[Loop | When, ...]]]:
     """Yield every innermost statement with the loops and conditions around it, outermost first."""
     for statement in body:
