@@ -8,7 +8,7 @@ the moment about the COM that is left for omega_dot, ``net`` the force.
 
 from sympy import Matrix, eye
 
-from .shapes import M33, V1, V3, V4, V6
+from .shapes import M33, V1, V3, V4, V6, V3x4
 
 # ---- the torso from the tail ---------------------------------------------------------------------
 
@@ -171,9 +171,9 @@ def weighted(let, weight: V1, by_omega: V3) -> dict:
     return {"gradient": -weight[0] * by_omega}
 
 
-def by_quaternion(let, row: V3, turn_0: V3, turn_1: V3, turn_2: V3, turn_3: V3) -> dict:
+def by_quaternion(let, row: V3, turn: V3x4) -> dict:
     """Slopes by the quaternion's numbers from those by the momentum in torso axes."""
-    return {"row": Matrix([row.dot(turn) for turn in (turn_0, turn_1, turn_2, turn_3)])}
+    return {"row": Matrix([row.dot(column) for column in turn])}
 
 
 # ---- curvature -----------------------------------------------------------------------------------
