@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail_codegen.functions.differentiable import FUNCTIONS
+from serpentail_codegen.functions.derivatives.differentiated import FUNCTIONS
 from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.scene.variant import Shape

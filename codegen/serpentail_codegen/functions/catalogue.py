@@ -7,9 +7,9 @@ from serpentail_scene.signatures.table import SIGNATURES
 from . import contact, pfl
 from .airborne import curvature as airborne
 from .derivatives import by_parameters, hessian, jacobians
-from .differentiable import FUNCTIONS
+from .derivatives.differentiated import FUNCTIONS
 from .function import Function, signed
-from .implicit import functions as implicit
+from .implicit import factor, solve
 from .tail import Tail
 
 _FOUND = FUNCTIONS | signed(
@@ -18,7 +18,7 @@ _FOUND = FUNCTIONS | signed(
     | hessian.ASSEMBLIES
     | contact.ASSEMBLIES
     | pfl.ASSEMBLIES
-    | implicit.ASSEMBLIES
+    | {"implicit_factor": factor.assemble_factor, "implicit_solve": solve.assemble_solve}
     | airborne.ASSEMBLIES
 )
 # A signature without outputs stands for other functions and has no assembly of its own.

@@ -10,7 +10,7 @@ from serpentail_scene.layout import OMEGA, PER_SEGMENT, TORSO_NQ, TORSO_NV, VELO
 
 from ...ir.program import Array, Index, Ref
 from ...mechanics import airborne, rotations
-from ..derivatives.differentiated import VIRTUAL_POWER
+from ..derivatives.differentiated import POWER_AND_MOMENTUM, VIRTUAL_POWER
 from ..derivatives.directions import Directions
 from ..derivatives.hessian import tangents_of_gradient
 from ..draft import Draft
@@ -25,7 +25,6 @@ from .balance import (
     at_coordinates,
     at_rates,
 )
-from .power import POWER_AND_MOMENTUM
 from .slopes import Slopes, assemble_derivatives
 
 BY_Q = ("q", "v", "v_dot", "a", "drift", "slide")

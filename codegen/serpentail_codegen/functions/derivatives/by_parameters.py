@@ -2,11 +2,10 @@
 
 from ...autodiff.forward import tangent_program
 from ...ir.program import Array
-from ..differentiable import FUNCTIONS
 from ..draft import Draft
 from ..function import Function, assemble
 from ..tail import struct_parameters
-from .differentiated import CORE
+from .differentiated import CORE, FUNCTIONS
 from .jacobians import forward_dynamics_first, minus
 
 

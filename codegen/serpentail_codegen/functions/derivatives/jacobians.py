@@ -12,7 +12,6 @@ from ...autodiff.reverse import adjoint_program
 from ...ir.program import Array, Index, Ref
 from ...mechanics import rotation_derivatives as turns
 from ...mechanics import rotations, torso, translation
-from ..differentiable import FUNCTIONS
 from ..draft import Draft
 from ..dynamics import assemble_forward_dynamics
 from ..factored import FactoredDynamics, Loads
@@ -21,7 +20,7 @@ from ..layout import block
 from ..scope import Vectors
 from ..sweeps.pieces import attitude
 from .by_segments import derivatives_by_segments
-from .differentiated import CORE, VIRTUAL_POWER
+from .differentiated import CORE, FUNCTIONS, VIRTUAL_POWER
 from .directions import Directions
 from .torso_axes import TorsoAxes, acceleration_at, torso_axes, turned_back
 

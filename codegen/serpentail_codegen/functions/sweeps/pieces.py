@@ -13,8 +13,11 @@ from ...mechanics import mount, rotations, torso
 from ...scene.variant import Stretch
 from ..draft import Draft
 from ..scope import Pose, State
+from ..tails.articulated import ARTICULATED
+from ..tails.continuum import CONTINUUM
 from ..tails.mechanism import Mechanism
-from ..tails.of_scene import mechanism_of
+from ..tails.mixed import MIXED
+from ..tails.polar import POLAR
 
 IDENTITY = (1, 0, 0, 0, 1, 0, 0, 0, 1)
 
@@ -25,7 +28,11 @@ def mechanism(draft: Draft) -> Mechanism:
     In a mixed tail these are the steps of the segments that the open loop is over; outside of such
     loops, those that describe all segments.
     """
-    return mechanism_of(draft.tail, draft.stretch.kind if draft.stretch else "")
+    if draft.tail.polar:
+        return POLAR
+    if draft.tail.kind == "mixed":
+        return MIXED[draft.stretch.kind if draft.stretch else ""]
+    return {"articulated": ARTICULATED, "continuum": CONTINUUM}[draft.tail.kind]
 
 
 def attitude(draft: Draft, state: State) -> Ref:
