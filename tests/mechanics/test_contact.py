@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail_codegen.functions.differentiable import FUNCTIONS
+from serpentail_codegen.functions.derivatives.differentiated import FUNCTIONS
 from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.targets.c.loops import in_loops

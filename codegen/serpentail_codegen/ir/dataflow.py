@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import fields, replace
-from functools import singledispatch
 from typing import Any
 
 from . import program as ir
@@ -21,74 +20,39 @@ def overlap(ref: ir.Ref, other: ir.Ref) -> bool:
     return first <= other_last and other_first <= last
 
 
-@singledispatch
 def reads(statement: ir.Statement) -> tuple[ir.Ref, ...]:
     """Return what a statement reads, including targets that it adds to or overwrites in place."""
+    match statement:
+        case ir.Apply():
+            targets = zip(statement.writes, statement.adds, strict=True)
+            return (*statement.reads, *(ref for ref, adds in targets if adds))
+        case ir.Copy():
+            return (statement.source, statement.target) if statement.adds else (statement.source,)
+        case ir.Fill() | ir.Unit():
+            return ()
+        case ir.Factor() | ir.FactorPair():
+            return (statement.matrix[0],)
+        case ir.Solve() | ir.SolvePair():
+            return (statement.matrix[0], statement.x)
+        case ir.Guard():
+            return (statement.scalar,)
     raise TypeError(f"no rule says what {type(statement).__name__} reads")
 
 
-@reads.register
-def _(statement: ir.Apply) -> tuple[ir.Ref, ...]:
-    sums = [ref for ref, adds in zip(statement.writes, statement.adds, strict=True) if adds]
-    return (*statement.reads, *sums)
-
-
-@reads.register
-def _(statement: ir.Copy) -> tuple[ir.Ref, ...]:
-    if statement.adds:
-        return (statement.source, statement.target)
-    return (statement.source,)
-
-
-@reads.register
-def _(statement: ir.Fill | ir.Unit) -> tuple[ir.Ref, ...]:
-    return ()
-
-
-@reads.register
-def _(statement: ir.Factor | ir.FactorPair) -> tuple[ir.Ref, ...]:
-    return (statement.matrix[0],)
-
-
-@reads.register
-def _(statement: ir.Solve | ir.SolvePair) -> tuple[ir.Ref, ...]:
-    return (statement.matrix[0], statement.x)
-
-
-@reads.register
-def _(statement: ir.Guard) -> tuple[ir.Ref, ...]:
-    return (statement.scalar,)
-
-
-@singledispatch
 def writes(statement: ir.Statement) -> tuple[ir.Ref, ...]:
     """Return what a statement writes."""
+    match statement:
+        case ir.Apply():
+            return statement.writes
+        case ir.Copy() | ir.Fill() | ir.Unit():
+            return (statement.target,)
+        case ir.Factor() | ir.FactorPair():
+            return (statement.matrix[0],)
+        case ir.Solve() | ir.SolvePair():
+            return (statement.x,)
+        case ir.Guard():
+            return ()
     raise TypeError(f"no rule says what {type(statement).__name__} writes")
-
-
-@writes.register
-def _(statement: ir.Apply) -> tuple[ir.Ref, ...]:
-    return statement.writes
-
-
-@writes.register
-def _(statement: ir.Copy | ir.Fill | ir.Unit) -> tuple[ir.Ref, ...]:
-    return (statement.target,)
-
-
-@writes.register
-def _(statement: ir.Factor | ir.FactorPair) -> tuple[ir.Ref, ...]:
-    return (statement.matrix[0],)
-
-
-@writes.register
-def _(statement: ir.Solve | ir.SolvePair) -> tuple[ir.Ref, ...]:
-    return (statement.x,)
-
-
-@writes.register
-def _(statement: ir.Guard) -> tuple[ir.Ref, ...]:
-    return ()
 
 
 def names(refs: Iterable[ir.Ref]) -> set[str]:

@@ -72,7 +72,7 @@ class Balance:
         """
         with self.draft.loop("k", self.draft.tail.nt) as k:
             reads = {"gain": self.gain[k], "rate": self.draft.tail.coordinate_v(rates, k)}
-            self.draft.step(airborne.turned_back_by, reads, turn_=turn)
+            self.draft.step(airborne.taken_back, reads, part_=turn)
         self.shift(turn, shift, rates)
         if net:
             mass = self.center.only("inverse_mass")
@@ -138,8 +138,8 @@ def balance(draft: Draft, arrays: dict[str, Array]) -> Balance:
         )
         draft.copy(gain[k], coupling[k])
         draft.solve(inertia, gain[k])
-        reads = {"coupling": coupling[k], "rate": tail.coordinate_v(v, k)}
-        draft.step(airborne.momentum_left, reads, momentum_=omega)
+        reads = {"gain": coupling[k], "rate": tail.coordinate_v(v, k)}
+        draft.step(airborne.taken_back, reads, part_=omega)
         with draft.loop("l", k + 1) as other:
             reads = {"column": column_of(columns, k), "other": column_of(columns, other)}
             reads |= {"coupling": coupling[k], "gain": gain[other]}
@@ -183,8 +183,8 @@ def store_rates(b: Balance, motion: Motion, y: Array) -> None:
     """Store the rates of x, then omega."""
     draft, tail = b.draft, b.draft.tail
     first, second = at_coordinates(tail), at_rates(tail)
-    reads = {"quaternion": b.quaternion, "omega": b.omega}
-    draft.step(airborne.quaternion_of_turning, reads, rate=block(y, QUATERNION))
+    reads = {"quaternion": b.quaternion, "turn": b.omega}
+    draft.step(rotations.turned_quaternion, reads, rate=block(y, QUATERNION))
     draft.copy(y.part(first, tail.nt), tail.all_v(b.v))
     draft.copy(y.part(second, tail.nt), tail.all_v(motion.v_dot))
     draft.copy(y.part(second + tail.nt, TURN), b.omega)

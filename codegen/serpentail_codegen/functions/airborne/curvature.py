@@ -169,8 +169,8 @@ def add_drift(b: Balance, slopes: Slopes, found: Curvatures, crossed: Array) -> 
         number = coordinate(i) + k
         lane = directions.of_q(i) + k
         b.shift(slopes.omega.down(0, lane, TURN), shift)
-        momentum = {"momentum": found.by_q["slide"].down(0, number, 3)}
-        draft.step(airborne.recoil, mass, momentum, shift_=shift)
+        momentum = {"net": found.by_q["slide"].down(0, number, 3)}
+        draft.step(airborne.pushed, mass, momentum, shift_=shift)
         draft.step(airborne.crossed, weight, sum_=crossed.part(lane, 1))
 
         lane = directions.of_v(i) + k

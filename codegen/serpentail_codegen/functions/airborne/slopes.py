@@ -10,7 +10,7 @@ from serpentail_scene.layout import OMEGA, PER_SEGMENT, TORSO_NV, VELOCITY
 
 from ...autodiff.forward import tangent_program
 from ...ir.program import Array, Index, Ref
-from ...mechanics import airborne
+from ...mechanics import airborne, rotations
 from ..derivatives.differentiated import CORE
 from ..derivatives.directions import Directions
 from ..draft import Draft
@@ -126,8 +126,8 @@ def store_omega(b: Balance, directions: Directions, rows: Array, omega: Array) -
         }
         target = omega.down(0, directions.of_q(i) + k, TURN)
         draft.step(airborne.momentum_slope, b.center, reads, forces, momentum=target)
-        one = {"coupling": b.coupling[number], "rate": draft.fixed("one", [1])}
-        draft.step(airborne.momentum_left, one, momentum=omega.down(0, rate, TURN))
+        one = {"gain": b.coupling[number], "rate": draft.fixed("one", [1])}
+        draft.step(airborne.taken_back, one, part=omega.down(0, rate, TURN))
     draft.solve(b.inertia, omega.part(0, TURN))
 
 
@@ -170,7 +170,7 @@ def store_jacobian(b: Balance, slopes: Slopes, J: Array) -> None:
     # of the quaternion's rate
     turning = {"quaternion": b.quaternion}
     with draft.loop("k", tau) as k:
-        reads = turning | {"omega": J.part(k + size * tau, TURN, size)}
-        draft.step(airborne.quaternion_of_turning, reads, rate=J.part(k, 4, size))
+        reads = turning | {"turn": J.part(k + size * tau, TURN, size)}
+        draft.step(rotations.turned_quaternion, reads, rate=J.part(k, 4, size))
     rows = {f"row_{k}_": J.part(k * size, 4) for k in range(4)}
     draft.step(airborne.turning_by_quaternion, {"omega": b.omega}, **rows)

@@ -7,8 +7,8 @@ from ...functions.tail import Tail, struct_parameters
 from ...ir.cost import applied, branches
 from ...ir.program import Program
 from ...passes.narrow_directions import directions_in_turn, has_directions, places_lanes
+from ...passes.structural_zeros import without_still
 from ...passes.unrolled_ldl import unrolled_ldl
-from ...passes.zero_tangents import without_still
 from ...scene.scene import Scene
 from .loops import in_loops
 from .routine import CFunction
