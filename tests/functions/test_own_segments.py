@@ -14,7 +14,7 @@ from serpentail_codegen.functions.draft import Draft
 from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.sweeps.pieces import each_segment, mechanism
 from serpentail_codegen.functions.tail import Tail
-from serpentail_codegen.scene.variant import Run, Shape
+from serpentail_codegen.scene.variant import SegmentRun, Shape
 from tests.functions.test_columns import arguments, assert_same, outputs
 from tests.references.metrics import block_error, force_error, mass_matrix_error
 from tests.support import zoo
@@ -88,8 +88,8 @@ def test_sweeps_in_lanes_give_the_same_acceleration(counts):
 def test_stretches_number_the_pieces_of_their_kind_and_have_its_steps():
     shape = Shape((2, 5, 5, 3), ("articulated", "continuum", "continuum", "articulated"), 5, 2)
     tail = Tail(4, 5, "mixed", shape=shape)
-    assert tail.runs("articulated") == (Run(0, 1, 0, 2), Run(3, 4, 4, 7, 2, 10, 2))
-    assert tail.runs("continuum") == (Run(1, 3, 2, 4, 2, 2, 1),)
+    assert tail.runs("articulated") == (SegmentRun(0, 1, 0, 2), SegmentRun(3, 4, 4, 7, 2, 10, 2))
+    assert tail.runs("continuum") == (SegmentRun(1, 3, 2, 4, 2, 2, 1),)
     assert (tail.pieces, tail.total) == (7, 15)
     counted = Shape((3, 3, 5), ("articulated", "articulated", "continuum"), 6, 1)
     draft = Draft("x", "", tail=Tail(3, 5, "mixed", shape=counted))

@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Iterator
 from dataclasses import replace
 
 from ..ir import program as ir
-from ..ir.dataflow import forward_slice, inner_arrays, pruned, writes
+from ..ir.dataflow import forward_slice, inner_arrays, pruned, rule_of, writes
 from .angles import SinesAndCosinesArray, angle_inputs, kinds, sines_and_cosines_arrays
 from .step import tangent
 
@@ -98,7 +98,7 @@ class _Tangents:
         """Return the transformed loop nest."""
         out: list[ir.Statement] = []
         for statement in body:
-            rule = ir.rule_of(self, statement, "differentiates")
+            rule = rule_of(self, statement, "differentiates")
             out += rule(statement, loops)
         return tuple(out)
 

@@ -9,7 +9,15 @@ from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 
 from ..ir import program as ir
-from ..ir.dataflow import backward_slice, forward_slice, inner_arrays, overlap, pruned, writes
+from ..ir.dataflow import (
+    backward_slice,
+    forward_slice,
+    inner_arrays,
+    overlap,
+    pruned,
+    rule_of,
+    writes,
+)
 from .angles import SinesAndCosinesArray, angle_inputs, kinds, sines_and_cosines_arrays
 from .step import adjoint
 
@@ -124,7 +132,7 @@ class _Reversal:
         forward: list[ir.Statement] = []
         backward: list[ir.Statement] = []
         for statement in body:
-            rule = ir.rule_of(self, statement, "reverses")
+            rule = rule_of(self, statement, "reverses")
             there, back = rule(statement, loops)
             forward += there
             backward = [*back, *backward]

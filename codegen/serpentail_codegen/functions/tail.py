@@ -9,7 +9,7 @@ from ..ir.program import Array, Index, Ref, padded
 from ..scene.parameters import Parameter
 from ..scene.resolve import parameters_of
 from ..scene.scene import Scene
-from ..scene.variant import EQUAL, Run, Shape, Stretch, runs_of, stretches_of
+from ..scene.variant import EQUAL, SegmentRun, Shape, Stretch, runs_of, stretches_of
 from .layout import LOAD
 
 SPRING = 18  # numbers of a point's linearised contact
@@ -38,7 +38,7 @@ class Tail(Sizes):
         """Consecutive segments of one kind with equally many links."""
         return stretches_of(self.segments, self.links, self.kind, self.shape)
 
-    def runs(self, kind: str) -> tuple[Run, ...]:
+    def runs(self, kind: str) -> tuple[SegmentRun, ...]:
         """Consecutive segments of one kind, links or arcs; in most tails all of them."""
         return runs_of(self.stretches, kind)
 

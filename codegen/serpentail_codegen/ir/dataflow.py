@@ -1,7 +1,9 @@
 """Dependences in a program, and programs rewritten: pruned, inlined, on other arrays."""
 
+import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import fields, replace
+from functools import cache
 from typing import Any
 
 from . import program as ir
@@ -58,6 +60,24 @@ def writes(statement: ir.Statement) -> tuple[ir.Ref, ...]:
 def names(refs: Iterable[ir.Ref]) -> set[str]:
     """Return the names of the arrays that references point into."""
     return {ref.array.name for ref in refs}
+
+
+@cache
+def _method_name(name: str) -> str:
+    """Return the name of a class in the style of a method."""
+    return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
+
+
+def rule_of(visitor: object, statement: ir.Statement, does: str) -> Callable[..., Any]:
+    """Return the method of a visitor that is named like a statement: ``solve_pair`` of SolvePair.
+
+    does: what the visitor's methods do, for the error if it has none.
+    """
+    name = type(statement).__name__
+    rule = getattr(visitor, _method_name(name), None)
+    if rule is None:
+        raise TypeError(f"no rule {does} {name}")
+    return rule
 
 
 def read_names(body: ir.Body) -> set[str]:

@@ -11,7 +11,7 @@ from typing import Any
 
 from . import program as ir
 from .algebra import Algebra, Number, positive_in_lanes
-from .dataflow import inlined
+from .dataflow import inlined, rule_of
 from .ldl import ldl_factor, ldl_solve, pair_factor, pair_solve
 from .step import Step
 from .tape import Tape, replay
@@ -91,7 +91,7 @@ class Run:
     def body(self, body: ir.Body, at: dict[str, int]) -> None:
         """Run statements in order."""
         for statement in body:
-            rule = ir.rule_of(self, statement, "runs")
+            rule = rule_of(self, statement, "runs")
             rule(statement, at)
 
     # What references mean

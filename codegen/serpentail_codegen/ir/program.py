@@ -4,11 +4,9 @@ A ``Program`` is a list of arrays and a tree of statements; everything here is f
 ``interpret.Run`` defines the meaning of the statements.
 """
 
-import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache
-from typing import Any, get_args
+from typing import get_args
 
 from .algebra import Number
 from .step import Step
@@ -266,24 +264,6 @@ Body = tuple["Statement", ...]
 LinearEquations = Factor | Solve | FactorPair | SolvePair
 Statement = Apply | Fill | Unit | Copy | Loop | When | LinearEquations | Guard | Call
 STATEMENTS: tuple[type, ...] = get_args(Statement)
-
-
-@cache
-def _method_name(name: str) -> str:
-    """Return the name of a class in the style of a method."""
-    return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
-
-
-def rule_of(visitor: object, statement: Statement, does: str) -> Callable[..., Any]:
-    """Return the method of a visitor that is named like a statement: ``solve_pair`` of SolvePair.
-
-    does: what the visitor's methods do, for the error if it has none.
-    """
-    name = type(statement).__name__
-    rule = getattr(visitor, _method_name(name), None)
-    if rule is None:
-        raise TypeError(f"no rule {does} {name}")
-    return rule
 
 
 @dataclass(frozen=True)

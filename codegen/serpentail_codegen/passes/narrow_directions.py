@@ -10,7 +10,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 from ..ir import program as ir
-from ..ir.dataflow import inlined, names, reads, writes
+from ..ir.dataflow import inlined, names, reads, rule_of, writes
 from ..ir.step import Step
 from .dead_fills import without_unread_fills
 from .fuse_steps import fused
@@ -67,7 +67,7 @@ class _Turns:
                 inner = self.body(statement.body, (*variables, statement.var))
                 out.append(replace(statement, body=inner))
             elif any(ref.array.lanes for ref in (*reads(statement), *writes(statement))):
-                rule = ir.rule_of(self, statement, "narrows")
+                rule = rule_of(self, statement, "narrows")
                 self.variables = variables
                 out += rule(statement)
             elif isinstance(statement, ir.Apply):

@@ -89,7 +89,7 @@ def stretches_of(segments: int, links: int, kind: str, shape: Shape) -> tuple[St
 
 
 @dataclass(frozen=True)
-class Run:
+class SegmentRun:
     """Segments ``first`` to ``stop`` - 1 of one kind, and their pieces.
 
     other_pieces, other_points, other_segments: numbers of the other kind before them.
@@ -104,7 +104,7 @@ class Run:
     other_segments: int = 0
 
 
-def runs_of(stretches: tuple[Stretch, ...], kind: str) -> tuple[Run, ...]:
+def runs_of(stretches: tuple[Stretch, ...], kind: str) -> tuple[SegmentRun, ...]:
     """Return the runs of segments of a kind, each as long as possible."""
     runs, points, before = [], 0, 0
     for own, members in groupby(stretches, lambda stretch: stretch.kind):
@@ -112,7 +112,7 @@ def runs_of(stretches: tuple[Stretch, ...], kind: str) -> tuple[Run, ...]:
         first, last = found[0], found[-1]
         if own == kind:
             pieces = first.first_piece, last.pieces_before(last.stop)
-            runs.append(Run(first.first, last.stop, *pieces, first.others, points, before))
+            runs.append(SegmentRun(first.first, last.stop, *pieces, first.others, points, before))
         else:
             points += last.points_before(last.stop) - first.first_point
             before += last.stop - first.first

@@ -91,7 +91,7 @@ class Balance:
 
 
 @dataclass(frozen=True)
-class Motion:
+class Accelerations:
     """Accelerations of an airborne state: ``v_dot``, and ``a`` of B less gravity, torso axes."""
 
     v_dot: Array
@@ -159,7 +159,7 @@ def balance(draft: Draft, arrays: dict[str, Array]) -> Balance:
     return Balance(draft, q, v, quaternion, momentum, inertia, M, *tail_momenta, center, bias)
 
 
-def second_derivatives(b: Balance, arrays: dict[str, Array]) -> Motion:
+def second_derivatives(b: Balance, arrays: dict[str, Array]) -> Accelerations:
     """Store omega_dot's load, and q_t_ddot."""
     draft, tail = b.draft, b.draft.tail
     v_dot, loads = draft.array("v_dot", tail.nv), draft.vectors(net=3)
@@ -176,10 +176,10 @@ def second_derivatives(b: Balance, arrays: dict[str, Array]) -> Motion:
         mass = b.center.only("inverse_mass")
         draft.step(airborne.torque_without_torso, mass, loads, reads, load_=target)
     draft.solve(b.M, tail.all_v(v_dot))
-    return Motion(v_dot, loads["net"])
+    return Accelerations(v_dot, loads["net"])
 
 
-def store_rates(b: Balance, motion: Motion, y: Array) -> None:
+def store_rates(b: Balance, motion: Accelerations, y: Array) -> None:
     """Store the rates of x, then omega."""
     draft, tail = b.draft, b.draft.tail
     first, second = at_coordinates(tail), at_rates(tail)
@@ -190,7 +190,7 @@ def store_rates(b: Balance, motion: Motion, y: Array) -> None:
     draft.copy(y.part(second + tail.nt, TURN), b.omega)
 
 
-def assemble_rates(draft: Draft, arrays: dict[str, Array]) -> tuple[Balance, Motion]:
+def assemble_rates(draft: Draft, arrays: dict[str, Array]) -> tuple[Balance, Accelerations]:
     """Rates of an airborne state, and omega."""
     b = balance(draft, arrays)
     motion = second_derivatives(b, arrays)

@@ -19,13 +19,13 @@ from ..layout import block, coordinate
 from .balance import (
     QUATERNION,
     TURN,
+    Accelerations,
     Balance,
-    Motion,
     assemble_rates,
     at_coordinates,
     at_rates,
 )
-from .slopes import Slopes, assemble_derivatives
+from .slopes import AirborneSlopes, assemble_derivatives
 
 BY_Q = ("q", "v", "v_dot", "a", "drift", "slide")
 
@@ -61,7 +61,7 @@ def assemble_hessian(draft: Draft, arrays: dict[str, Array]) -> None:
     store_hessian(b, slopes, found, crossed, weights, arrays)
 
 
-def store_weights(b: Balance, slopes: Slopes, mu: Array) -> Weights:
+def store_weights(b: Balance, slopes: AirborneSlopes, mu: Array) -> Weights:
     """Store the multipliers: those of accelerations, M^-1 mu with the torso following, then those
     of omega.
     """
@@ -87,7 +87,9 @@ def store_weights(b: Balance, slopes: Slopes, mu: Array) -> Weights:
     return Weights(accelerating, turning)
 
 
-def curvatures(b: Balance, motion: Motion, slopes: Slopes, weights: Weights) -> Curvatures:
+def curvatures(
+    b: Balance, motion: Accelerations, slopes: AirborneSlopes, weights: Weights
+) -> Curvatures:
     """Differentiate the gradients of the weighted equations, by coordinates, and by omega and
     rates.
     """
@@ -112,7 +114,7 @@ def curvatures(b: Balance, motion: Motion, slopes: Slopes, weights: Weights) -> 
     return Curvatures(by_q, by_v["v"], of_q, of_v)
 
 
-def store_crossed(b: Balance, slopes: Slopes, found: Curvatures) -> tuple[Array, Array]:
+def store_crossed(b: Balance, slopes: AirborneSlopes, found: Curvatures) -> tuple[Array, Array]:
     """Return the mixed terms of pairs of a coordinate (lane) and any direction through
     accelerations and drift: along the directions of slopes, and along torques.
     """
@@ -153,7 +155,7 @@ def store_crossed(b: Balance, slopes: Slopes, found: Curvatures) -> tuple[Array,
     return crossed, by_torque
 
 
-def add_drift(b: Balance, slopes: Slopes, found: Curvatures, crossed: Array) -> None:
+def add_drift(b: Balance, slopes: AirborneSlopes, found: Curvatures, crossed: Array) -> None:
     """Add what the drift changes, weighted by the rigid motion's momentum."""
     draft, tail, directions = b.draft, b.draft.tail, slopes.directions
     shift, mass = draft.vector("drift_slope", 3), b.center.only("inverse_mass")
@@ -182,7 +184,7 @@ def add_drift(b: Balance, slopes: Slopes, found: Curvatures, crossed: Array) -> 
 
 def store_hessian(
     b: Balance,
-    slopes: Slopes,
+    slopes: AirborneSlopes,
     found: Curvatures,
     crossed: tuple[Array, Array],
     weights: Weights,

@@ -19,8 +19,8 @@ from ..layout import block, coordinate
 from ..sweeps.inertia import column_of
 from .balance import (
     TURN,
+    Accelerations,
     Balance,
-    Motion,
     assemble_rates,
     at_coordinates,
     at_rates,
@@ -28,7 +28,7 @@ from .balance import (
 
 
 @dataclass(frozen=True)
-class Slopes:
+class AirborneSlopes:
     """Derivatives of an airborne state's unknowns, row by row, along all directions.
 
     ``omega`` (3 rows); ``tail``: q_t_ddot (nt rows); ``loads``: net and turn_load (3 rows each).
@@ -52,7 +52,9 @@ class Slopes:
         return {f"turn_{k}": self.turns[k] for k in range(4)}
 
 
-def assemble_derivatives(draft: Draft, arrays: dict[str, Array]) -> tuple[Balance, Motion, Slopes]:
+def assemble_derivatives(
+    draft: Draft, arrays: dict[str, Array]
+) -> tuple[Balance, Accelerations, AirborneSlopes]:
     """Rates of an airborne state with their Jacobian."""
     b, motion = assemble_rates(draft, arrays)
     slopes = store_slopes(b, motion)
@@ -60,7 +62,7 @@ def assemble_derivatives(draft: Draft, arrays: dict[str, Array]) -> tuple[Balanc
     return b, motion, slopes
 
 
-def store_slopes(b: Balance, motion: Motion) -> Slopes:
+def store_slopes(b: Balance, motion: Accelerations) -> AirborneSlopes:
     """Differentiate the inertial forces at fixed accelerations, then solve."""
     draft, tail, directions = b.draft, b.draft.tail, Directions(b.draft.tail, ("omega",))
     lanes = directions.count
@@ -105,7 +107,7 @@ def store_slopes(b: Balance, motion: Motion) -> Slopes:
     columns = {f"column_{k}": turns[k] for k in range(4)}
     reads = {"quaternion": b.quaternion, "momentum": b.momentum}
     draft.step(airborne.turn_of_quaternion, reads, **columns)
-    return Slopes(directions, omega, tail_slopes, loads, by_omega, by_torque, turns, a)
+    return AirborneSlopes(directions, omega, tail_slopes, loads, by_omega, by_torque, turns, a)
 
 
 def store_omega(b: Balance, directions: Directions, rows: Array, omega: Array) -> None:
@@ -142,7 +144,7 @@ def chain(draft: Draft, rows: Array, omega: Array) -> Array:
     return by_omega
 
 
-def store_jacobian(b: Balance, slopes: Slopes, J: Array) -> None:
+def store_jacobian(b: Balance, slopes: AirborneSlopes, J: Array) -> None:
     """Store d(y)/d(x, tau), row by row."""
     draft, tail, directions = b.draft, b.draft.tail, slopes.directions
     size, nt = tail.airborne_arguments, tail.nt

@@ -36,7 +36,7 @@ FORCES = 6 + PER_SEGMENT  # wrench at the base, torques
 
 
 @dataclass(frozen=True)
-class Slopes:
+class SegmentSlopes:
     """Derivatives of every segment along its own directions: motion of the tip, wrench and
     torques.
     """
@@ -45,7 +45,7 @@ class Slopes:
     force: Array
 
     @classmethod
-    def declared(cls, draft: Draft, role: str) -> "Slopes":
+    def declared(cls, draft: Draft, role: str) -> "SegmentSlopes":
         """Declare the arrays."""
         sizes = {"tip": 9 * draft.tail.segments, "force": FORCES * draft.tail.segments}
         return cls(*(draft.declare(Array(n, role, s, lanes=OWN)) for n, s in sizes.items()))
@@ -75,7 +75,7 @@ def derivatives_by_segments(draft: Draft, arrays: dict[str, Array]) -> None:
     a = draft.vector("a_torso", 3)
     draft.step(torso.torso_acceleration, reads, a=a)
     motion = Motion(state.omega, block(v_dot, OMEGA), a)
-    slopes = Slopes.declared(draft, "local")
+    slopes = SegmentSlopes.declared(draft, "local")
     arguments = {"q": arrays["q"], "v": arrays["v"], "v_dot": v_dot, "a_torso": a.array}
     draft.call(assemble(SLOPES, tail), tip=slopes.tip, force=slopes.force, **arguments)
 
@@ -106,12 +106,12 @@ def moved(function, *active: str) -> Step:
 
 
 @dataclass(frozen=True)
-class Links:
+class LinkTangents:
     """Differentiates the links of every segment: their wrenches along all of its own directions."""
 
     draft: Draft
     segments: Segments
-    slopes: Slopes
+    slopes: SegmentSlopes
     wrench: Array
     d_wrench: Array
     own: dict[str, Ref]
@@ -169,7 +169,7 @@ def assemble_segment_slopes(draft: Draft, arrays: dict[str, Array]) -> None:
     """Slopes of every segment by its own directions, link by link."""
     state, v_dot, total = draft.state(arrays["q"], arrays["v"]), arrays["v_dot"], draft.tail.total
     segments = mechanism(draft).prepare(draft, state, False)
-    slopes = Slopes.declared(draft, "output")
+    slopes = SegmentSlopes.declared(draft, "output")
     wrench, d_wrench = draft.array("wrench", 6, total), draft.wide("d_wrench", 6 * total, OWN)
 
     # directions of a segment's own: omega of its base, angles, rates
@@ -177,7 +177,7 @@ def assemble_segment_slopes(draft: Draft, arrays: dict[str, Array]) -> None:
     for name, first in (("w", 0), ("angles", ANGLES), ("rates", RATES)):
         own[name] = draft.wide(f"d_{name}_own", 3 if name == "w" else PER_SEGMENT, OWN)[0]
         draft.unit(own[name], first)
-    links = Links(draft, segments, slopes, wrench, d_wrench, own)
+    links = LinkTangents(draft, segments, slopes, wrench, d_wrench, own)
     links.outward(Motion(state.omega, block(v_dot, OMEGA), arrays["a_torso"][0]), v_dot)
     links.inward()
     add_passive_slopes(draft, state, own, slopes.torque)
@@ -201,7 +201,7 @@ class Changes:
 
     draft: Draft
     directions: Directions
-    slopes: Slopes
+    slopes: SegmentSlopes
     freed: Freed
     lanes: int
 

@@ -100,7 +100,7 @@ def add_gains(draft: Draft, f: Factors, weights: dict[str, Ref]) -> None:
 
 
 @dataclass(frozen=True)
-class Ground:
+class ContactLinearisation:
     """What the linearisation of a point reads: the torso, weights and bristles, and the contact
     law.
     """
@@ -128,7 +128,7 @@ def add_contacts(
     points = gather_points(draft, state, R, arrays, segments)
     law = derive(stiffness.linearised_contact, friction=draft.tail.friction)
     weights = Vectors({**weight, **drag})
-    ground = Ground(state.torso(R), weights, arrays["bristles"], law, points)
+    ground = ContactLinearisation(state.torso(R), weights, arrays["bristles"], law, points)
     for group in [name for name in draft.tail.contacts if name != "tail"]:
         with draft.loop("k", draft.tail.groups[group]) as k:
             number = k + points.first[group]
@@ -139,7 +139,7 @@ def add_contacts(
         add_tail_contacts(draft, f, ground)
 
 
-def keep_point(draft: Draft, f: Factors, ground: Ground, number: Index) -> None:
+def keep_point(draft: Draft, f: Factors, ground: ContactLinearisation, number: Index) -> None:
     """Store arm and depth of a point, and zero stiffness."""
     arm = ground.points.arms[number]
     draft.copy(f("arm", number), arm)
@@ -147,7 +147,7 @@ def keep_point(draft: Draft, f: Factors, ground: Ground, number: Index) -> None:
     draft.fill(f("spring", number), 0)
 
 
-def stiffen(draft: Draft, f: Factors, ground: Ground, number: Index) -> None:
+def stiffen(draft: Draft, f: Factors, ground: ContactLinearisation, number: Index) -> None:
     """Linearise a point in the ground, and add its stiffness to the torso's block of S."""
     motion, spring = ground.points.motion(number), {"spring": f("spring", number)}
     bristle = {"bristle": ground.bristles.part(2 * number, 2)}
@@ -156,7 +156,7 @@ def stiffen(draft: Draft, f: Factors, ground: Ground, number: Index) -> None:
     draft.step(stiffness.stiffened_torso, ground.torso, motion, spring, **rows)
 
 
-def add_tail_contacts(draft: Draft, f: Factors, ground: Ground) -> None:
+def add_tail_contacts(draft: Draft, f: Factors, ground: ContactLinearisation) -> None:
     """Add tail points like those of the torso, with their columns of the tail's coordinates."""
     tail, points = draft.tail, ground.points
     S, force = draft.array("S_segment", 12, tail.segments), draft.vector("force_column", 3)

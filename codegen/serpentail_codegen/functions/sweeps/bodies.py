@@ -53,7 +53,7 @@ class Freed:
 
 
 @dataclass(frozen=True)
-class Body:
+class ArticulatedBody:
     """Everything beyond the base of a segment as one body: its wrench is A a + b for the motion a
     of the base.
     """

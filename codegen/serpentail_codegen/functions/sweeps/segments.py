@@ -16,7 +16,7 @@ from ..layout import block, coordinates
 from ..scope import State, Vectors
 from ..tails.articulated import link_properties
 from ..tails.mechanism import simplified
-from .bodies import Body, Freed, Passes, lane
+from .bodies import ArticulatedBody, Freed, Passes, lane
 from .pieces import IDENTITY
 
 UNKNOWNS = 8  # motion of a segment's base, and two coordinates
@@ -132,14 +132,14 @@ def _bias(draft: Draft, state: State, links: Vectors, w: Ref) -> Vectors:
 
 def _inward_pass(
     draft: Draft, passes: Passes, inertia: Vectors, bias: Vectors, torques: Array
-) -> Body:
+) -> ArticulatedBody:
     """Sweep from the tip to the mount, eliminate the coordinates, and return what is beyond the
     mount.
     """
     K, T = draft.wide("K", UNKNOWNS, UNKNOWNS), draft.wide("T", 6, UNKNOWNS)
     b, load = draft.wide("b", 1, UNKNOWNS), draft.wide("load", 1, UNKNOWNS)
     pivots = draft.vector("pivots", 2)
-    body = Body(draft.wide("A", 6, UNKNOWNS), draft.wide("b_base", 1, UNKNOWNS))
+    body = ArticulatedBody(draft.wide("A", 6, UNKNOWNS), draft.wide("b_base", 1, UNKNOWNS))
 
     def begin(i: Index) -> None:
         """Start with the segment alone: its inertia, loads, and the acceleration of its tip by
@@ -190,7 +190,7 @@ def _inward_pass(
 
 
 def _at_torso(
-    draft: Draft, state: State, body: Body, load: Array, v_dot: Array
+    draft: Draft, state: State, body: ArticulatedBody, load: Array, v_dot: Array
 ) -> tuple[tuple[Array, Ref], Ref]:
     """Compute the accelerations of the torso; return its inertia and attitude, and the acceleration
     of the mount.

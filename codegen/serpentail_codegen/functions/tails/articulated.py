@@ -5,7 +5,7 @@ from fractions import Fraction
 
 from ...ir.program import Array, Ref
 from ...mechanics import airborne_power, link
-from ...scene.variant import Run
+from ...scene.variant import SegmentRun
 from ..draft import Draft
 from ..scope import Instead, Motion, State, Vectors
 from .mechanism import Mechanism, Place, Segments, simplified
@@ -22,7 +22,7 @@ def own_links(draft: Draft) -> Array:
     return array
 
 
-def fill_links(draft: Draft, array: Array, others: Callable[[Run], int]) -> None:
+def fill_links(draft: Draft, array: Array, others: Callable[[SegmentRun], int]) -> None:
     """Store the properties of every link; ``others``: entries of the array before, of arcs."""
     names = ("link_masses", "link_lengths", "link_centers", "link_inertias")
     for run in draft.tail.runs("articulated"):
