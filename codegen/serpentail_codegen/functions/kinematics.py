@@ -6,7 +6,7 @@ from ..ir.program import Array, Index, Ref
 from ..mechanics import loads, torso
 from .draft import Draft
 from .layout import coordinate
-from .sweeps.inertia import column_of, forward_roots, gather_inertia, segment_roots
+from .sweeps.inertia import column_of, columns_and_inertia
 from .sweeps.pieces import (
     attitude,
     each_point,
@@ -76,10 +76,7 @@ def assemble_center_of_mass(draft: Draft, arrays: dict[str, Array]) -> None:
 
     # mass, first moment, and the momentum that each tail coordinate gives, in torso axes
     R = attitude(draft, state)
-    segments = mechanism(draft).prepare(draft, state, True)
-    columns, roots = draft.array("columns", 12, tail.segments), segment_roots(draft)
-    forward_roots(draft, segments, torso_pose(draft), roots)
-    composite = gather_inertia(draft, segments, roots, columns)
+    _, columns, composite = columns_and_inertia(draft, state)
 
     # the motion of the torso, then the contribution of the tail
     rows = {f"J_{name}": J.part(axis * tail.nv, TORSO_NV) for axis, name in enumerate("xyz")}

@@ -8,8 +8,8 @@ from .draft import Draft
 from .layout import block, coordinates
 from .passive import add_passive_forces
 from .scope import State, Vectors
-from .sweeps.inertia import column_of, forward_roots, gather_inertia, segment_roots
-from .sweeps.pieces import attitude, mechanism, torso_pose
+from .sweeps.inertia import column_of, columns_and_inertia
+from .sweeps.pieces import attitude, mechanism
 from .sweeps.wrenches import forward_wrenches, gather_wrenches, torso_without_acceleration
 from .tails.mechanism import Segments
 
@@ -29,10 +29,7 @@ def assemble_pfl(draft: Draft, arrays: dict[str, Array]) -> None:
     v_dot = arrays.get("v_dot") or draft.array("v_dot", tail.nv)
 
     # composite inertia, and the momentum columns of the tail coordinates
-    segments = mechanism(draft).prepare(draft, state, True)
-    columns, roots = draft.array("columns", 12, tail.segments), segment_roots(draft)
-    forward_roots(draft, segments, torso_pose(draft), roots)
-    composite = gather_inertia(draft, segments, roots, columns)
+    segments, columns, composite = columns_and_inertia(draft, state)
 
     # torques for a torso at rest, then the torso's acceleration, and the torques that it adds
     with draft.loop("k", tail.nt) as k:
