@@ -92,9 +92,7 @@ class Draft(Builder):
         self.apply(step, refs, **writes)
 
     def _refs(self, step: str, declared: set[str], reads: Iterable[Reads]) -> dict[str, Ref]:
-        """Return what a step reads by name; refuse names that are unknown, given twice or those of
-        parameters.
-        """
+        """Return what a step reads by name; refuse unknown names, repeated ones and parameters."""
         refs: dict[str, Ref] = {}
         for source in reads:
             instead = isinstance(source, Instead)

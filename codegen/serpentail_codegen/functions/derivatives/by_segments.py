@@ -237,9 +237,7 @@ class Changes:
             draft.step(segment_slopes.responding, passes.tip_of(i), reads, **writes)
 
     def _outward(self, start: Motion) -> Array:
-        """Carry the motion to the tip at fixed second derivatives; return the loads that it
-        requires.
-        """
+        """Carry the motion to the tip at fixed second derivatives; return the loads it requires."""
         draft, directions = self.draft, self.directions
         motion = draft.wide("d_motion", 9, self.lanes)
         loads = draft.wide("d_loads", FORCES * draft.tail.segments, self.lanes)

@@ -66,9 +66,7 @@ def factored_dynamics_by_columns(
 def _gather(
     draft: Draft, segments: Segments, wrenches: Wrenches, F_columns: Ref, rows: Array
 ) -> tuple[Vectors, Array]:
-    """Sweep from the tip to the mount; return ``mass, h, I``, and the contribution of each
-    segment's joints to its own block.
-    """
+    """Sweep to the mount; return ``mass, h, I``, and what joints add to their own blocks."""
     tail, lanes = draft.tail, rows.lanes
     at, own_joints = draft.wide("at", lanes, lanes), draft.array("own", 2, tail.segments)
     draft.unit(at.part(0, lanes), 0)
@@ -126,9 +124,7 @@ def _own_blocks(
     columns: Array,
     entry: Callable[..., Ref],
 ) -> None:
-    """Store the rows in ``A``: blocks of two segments unchanged, blocks of one segment
-    completed.
-    """
+    """Store the rows in ``A``; blocks of one segment are completed."""
     with draft.loop("i", draft.tail.segments) as i:
         pitch, yaw = coordinate(i), coordinate(i, 1)
         reads = {"own": own_joints[i], "columns": columns_of(columns, i)}

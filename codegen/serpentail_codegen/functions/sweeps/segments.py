@@ -108,9 +108,7 @@ def _own_inertia(draft: Draft, links: Vectors, passes: Passes) -> Vectors:
 
 
 def _bias(draft: Draft, state: State, links: Vectors, w: Ref) -> Vectors:
-    """Compute the loads that velocities alone cause in each segment, ``F_next`` and ``torque``, and
-    the accelerations of its tip by velocities alone, ``w_dot`` and ``a``.
-    """
+    """Compute loads and tip accelerations of each segment that velocities alone cause."""
     # from the base to the tip
     motion = {"w": w, "w_dot": _wide(draft, "w_dot", 3, 0), "a": _wide(draft, "a", 3, 0)}
     joint = {name: _wide(draft, name, 3) for name in ("a_joint", "swing")}
@@ -133,9 +131,7 @@ def _bias(draft: Draft, state: State, links: Vectors, w: Ref) -> Vectors:
 def _inward_pass(
     draft: Draft, passes: Passes, inertia: Vectors, bias: Vectors, torques: Array
 ) -> ArticulatedBody:
-    """Sweep from the tip to the mount, eliminate the coordinates, and return what is beyond the
-    mount.
-    """
+    """Eliminate the coordinates from the tip to the mount; return all beyond the mount."""
     K, T = draft.wide("K", UNKNOWNS, UNKNOWNS), draft.wide("T", 6, UNKNOWNS)
     b, load = draft.wide("b", 1, UNKNOWNS), draft.wide("load", 1, UNKNOWNS)
     pivots = draft.vector("pivots", 2)
@@ -192,9 +188,7 @@ def _inward_pass(
 def _at_torso(
     draft: Draft, state: State, body: ArticulatedBody, load: Array, v_dot: Array
 ) -> tuple[tuple[Array, Ref], Ref]:
-    """Compute the accelerations of the torso; return its inertia and attitude, and the acceleration
-    of the mount.
-    """
+    """Accelerate the torso; return its inertia and attitude, and how the mount accelerates."""
     H, rhs = draft.array("H", UNKNOWNS, 6), draft.array("rhs", 6)
     zero, omega = draft.zero(3), state.omega
     F, a_mount = draft.vector("F_tail", 6), draft.vector("a_mount", 3)
