@@ -79,7 +79,7 @@ def normal_force(let, depth, rate, K_n, D_n):
     """max(K_n z^(3/2) + D_n K_n z^(1/2) z_dot, 0) (Eq. 36); the text's z^3/2 is z^(3/2)."""
     root = let("root", sqrt(guarded(let, depth, depth)))
     push = let("push", K_n[0] * root * (depth + D_n[0] * rate))
-    pressing = let("pressing", Piecewise((push, push > 0), (0, True)))
+    pressing = let("pressing", Piecewise((0, push < 0), (push, True)))  # a NaN stays one
     return let("f_n", Piecewise((pressing, depth > 0), (0, True)))
 
 
