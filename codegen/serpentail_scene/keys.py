@@ -92,7 +92,7 @@ KEYS = {
     "emission": SceneKey("auto", one_of(["auto", "straight", "loops", "lanes", "segments"])),
     "profile": SceneKey("fast", one_of(["fast", "reproducible"])),
     "contacts": SceneKey((), CONTACTS),
-    "friction": SceneKey("cone", one_of(["cone", "box", "smooth", "paper"])),
+    "friction": SceneKey("cone", one_of(["cone", "smooth", "paper"])),
     "targets": SceneKey(TARGETS, TARGET_NAMES),
     # motions to plan and to simulate, and more that the runtime checks
     "plan": SceneKey({}, table("plan")),

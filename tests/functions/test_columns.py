@@ -1,16 +1,12 @@
-"""Sweeps in lanes, by segments and by doubling, and eliminations written out: they mean what the
-plain programs mean, and are chosen where they are faster.
+"""Sweeps in lanes and by segments, and eliminations written out: they mean what the plain programs
+mean, and are chosen where they are faster.
 """
 
-from types import SimpleNamespace
-
-import mpmath
 import numpy as np
 import pytest
 
 from serpentail_codegen.functions.catalogue import CATALOGUE
 from serpentail_codegen.functions.function import assemble
-from serpentail_codegen.functions.sweeps.doubling import is_doubled
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.dataflow import inlined
 from serpentail_codegen.ir.interpret import Numbers, Run
@@ -91,44 +87,17 @@ def test_every_pivot_is_guarded():
     assert signs(segments, tail_mass=[-1.0], link_inertia=[-1.0] * 3)[:2] == [False] * 2
 
 
-def in_digits(program, given, digits=40):
-    """v_dot of a run in that many digits, of numbers and of arrays of them."""
-    context = mpmath.mp.clone()
-    context.dps = digits
-    exact = {name: [context.mpf(x) for x in values] for name, values in given.items()}
-    names = ("sin", "cos", "sqrt")
-    functions = {name: np.frompyfunc(getattr(context, name), 1, 1) for name in names}
-    numbers = Numbers(SimpleNamespace(**functions), context.mpf)
-    return Run(program, numbers, exact).values["v_dot"]
-
-
-@pytest.mark.parametrize("size", [(1, 128), (1, 171), (2, 96)], ids=str)
-def test_chains_of_links_mean_what_links_mean_to_40_digits(size):
-    tail = Tail(*size)
-    plain, doubled = (assemble(CATALOGUE[FUNCTION], tail, form) for form in ("lanes", "segments"))
-    assert is_doubled(tail) and plain != doubled
-    given = arguments(plain)
-    for bend in (0.0, 0.05, 1.3):
-        given["q"][7:] = [bend, -bend / 3, bend / 2, bend][: 2 * tail.segments]
-        expected, found = (in_digits(program, given) for program in (plain, doubled))
-        error = max(abs(x - y) for x, y in zip(found, expected, strict=True))
-        assert error <= 1e-30 * max(abs(x) for x in expected), bend
-
-
 def test_forms_are_chosen_where_they_are_faster():
-    doubled = [(1, 96), (1, 127), (2, 96), (8, 256)]
-    for size in (*doubled, (1, 32), (1, 95), (2, 64), (8, 64)):
-        assert is_doubled(Tail(*size)) == (size in doubled), size
     table = {
         "straight": [(1, 9), (3, 2), (4, 1)],
-        "lanes": [(1, 10), (1, 64), (2, 15), (3, 4), (4, 3), (7, 1)],
-        "segments": [(1, 96), (2, 16), (4, 4), (8, 1)],  # (1, 96) is doubled
+        "lanes": [(1, 10), (1, 96), (2, 15), (3, 4), (4, 3), (7, 1)],
+        "segments": [(2, 16), (4, 4), (8, 1)],
     }
     for form, sizes in table.items():
         for size in sizes:
             with row(form, size):
                 assert fastest(CATALOGUE[FUNCTION], Tail(*size))[0] == form
-    assert {2 * m * m * n for m, n in table["segments"][1:]} == {RULE["segments_from"]}
+    assert {2 * m * m * n for m, n in table["segments"]} == {RULE["segments_from"]}
     for size, form in (((1, 64), "lanes"), ((3, 4), "lanes"), ((4, 4), "segments")):
         assert fastest(CATALOGUE["forward_dynamics_derivatives"], Tail(*size))[0] == form, size
     assert fastest(CATALOGUE["mass_matrix"], Tail(1, 96))[0] == "loops"

@@ -3,7 +3,7 @@
 import pytest
 
 from serpentail_codegen.functions.draft import Draft
-from serpentail_codegen.functions.scope import Instead, State, Vectors
+from serpentail_codegen.functions.scope import Instead, Vectors
 from serpentail_codegen.functions.tail import Tail, struct_parameters
 from serpentail_codegen.ir.program import Apply, statements
 from serpentail_codegen.mechanics import contact, rotations, torso
@@ -92,7 +92,7 @@ def test_a_constant_is_declared_once():
 
 def test_without_a_velocity_there_is_no_rate():
     draft, _ = draft_with()
-    state = State(draft.array("q", draft.tail.nq))
+    state = draft.state(draft.array("q", draft.tail.nq))
     assert state.angles(0).size == 2
     for read in (lambda: state.rates(0), lambda: state.omega, lambda: state.torso(state.q[0])):
         with pytest.raises(ValueError, match="no v "):

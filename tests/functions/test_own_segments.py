@@ -9,7 +9,7 @@ import serpentail as st
 from serpentail.bridges.containers.contents import contents
 from serpentail.show.animal import animal_of
 from serpentail.verification.report import laws
-from serpentail_codegen.functions.differentiable import FUNCTIONS
+from serpentail_codegen.functions.derivatives.differentiated import FUNCTIONS
 from serpentail_codegen.functions.draft import Draft
 from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.sweeps.pieces import each_segment, mechanism

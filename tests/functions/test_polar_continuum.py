@@ -10,7 +10,7 @@ import pytest
 import sympy
 
 import serpentail as st
-from serpentail_codegen.functions.differentiable import FUNCTIONS
+from serpentail_codegen.functions.derivatives.differentiated import FUNCTIONS
 from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.interpret import Numbers, Run

@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail_codegen.functions.sweeps.doubling import is_doubled
-from serpentail_codegen.functions.tail import Tail
 from tests.references.exact_chain import ExactChain
 from tests.references.metrics import block_error, equilibrated_condition
 from tests.references.parameters import KINDS, TABLE_1, random_states
@@ -16,8 +14,6 @@ from tests.support.rows import row
 FUNCTION = "forward_dynamics"
 # rad at every joint: turns that lie on one another
 COILS = ((0.7, 0.4), (1.5, -0.2))
-# rad a joint: turns that lie on one another; rad a segment: an arc, a roll, nothing
-BENDS = {"coiled": (0.11, 0.04), "arc": (1.0, 0.3), "rolled": (3.0, -2.0), "straight": (0.0, 0.0)}
 
 
 def states(segments):
@@ -63,15 +59,3 @@ def long_model(segments, links):
     model = st.load(model_folder(segments, links, functions=[FUNCTION]))
     assert model.manifest["functions"][FUNCTION]["emission"] == "segments"
     return model
-
-
-@pytest.mark.parametrize("size", [(1, 96), pytest.param((3, 144), marks=pytest.mark.slow)], ids=str)
-def test_doubled_segments_are_exact_too(size):
-    """Only long segments are doubled."""
-    model, exact = long_model(*size), ExactChain(TABLE_1, *size)
-    assert is_doubled(Tail(*size))
-    for kind, bend in BENDS.items():
-        q, *others = (x[0] for x in random_states(size[0], 11, 1, "random"))
-        q[7:] = np.tile(bend, size[0]) / (1 if kind == "coiled" else size[1])
-        limit = 5e-15 * (1 + size[0] * size[1] / 256)
-        assert_exact(model, exact, kind, (q, *others), limit)

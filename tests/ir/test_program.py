@@ -9,7 +9,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from serpentail_codegen.functions.differentiable import FUNCTIONS
+from serpentail_codegen.functions.derivatives.differentiated import FUNCTIONS
 from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.builder import Builder, narrowed

@@ -11,7 +11,7 @@ import pytest
 
 from serpentail_codegen.autodiff.forward import tangent_program
 from serpentail_codegen.autodiff.reverse import adjoint_program
-from serpentail_codegen.functions.differentiable import FUNCTIONS
+from serpentail_codegen.functions.derivatives.differentiated import FUNCTIONS
 from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir import program as ir

@@ -12,7 +12,7 @@ import sympy
 from sympy import Matrix, Rational, diag, eye, zeros
 from sympy.algebras.quaternion import Quaternion
 
-from serpentail_codegen.functions.differentiable import FUNCTIONS
+from serpentail_codegen.functions.derivatives.differentiated import FUNCTIONS
 from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.interpret import Numbers, Run

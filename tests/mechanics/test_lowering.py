@@ -9,7 +9,7 @@ import pytest
 import sympy
 from sympy import Matrix, Rational
 
-from serpentail_codegen.functions.differentiable import FUNCTIONS
+from serpentail_codegen.functions.derivatives.differentiated import FUNCTIONS
 from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.ir.builder import Builder

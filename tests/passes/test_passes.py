@@ -21,7 +21,7 @@ from serpentail_codegen.passes import schedule
 from serpentail_codegen.passes.dead_fills import without_unread_fills
 from serpentail_codegen.passes.fuse_steps import fit, fused, joined
 from serpentail_codegen.passes.narrow_directions import directions_in_turn
-from serpentail_codegen.passes.zero_tangents import without_still
+from serpentail_codegen.passes.structural_zeros import without_still
 from tests.support.rows import row
 
 ZERO, ONE, TWO = map(ir.as_index, range(3))

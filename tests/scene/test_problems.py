@@ -121,7 +121,7 @@ def test_keys_of_the_ground_and_of_a_base_that_do_not_fit(refuse_rows):
     polar, fixed = arc + 'coordinates = "polar"\n', VALID + 'base = "fixed"\n'
     refuse_rows(
         [
-            (VALID + 'friction = "box"\n', "friction", feet),
+            (VALID + 'friction = "smooth"\n', "friction", feet),
             (VALID + 'functions = ["contact_points"]\n', "functions", feet),
             (VALID + 'functions = ["leg_points"]\n', "functions", feet),
             (tail + 'functions = ["leg_points"]\n', "functions", "needs feet"),

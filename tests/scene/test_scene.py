@@ -56,7 +56,7 @@ BODIES = {"scale": 1.6}, {"mass": 3.0}, {"scale": 0.5, "torso": BOX}, {"scale": 
 WRITTEN = [
     *({"links": 7, "real": "float", "emission": "loops", "parameters": each} for each in EXACT),
     *({"links": 3, "body": each} | more for each in BODIES for more in ({}, {"taper": CONE})),
-    {"links": 3, "contacts": ["feet", "tail"], "friction": "box", "parameters": TILTED},
+    {"links": 3, "contacts": ["feet", "tail"], "friction": "smooth", "parameters": TILTED},
     {"links": 2, "parameters": {"tail_stiffness": 0.01, "tail_damping": 1e-4}},
     {"segments": 1, "links": 2, "parameters": {"link_masses": [1, 2], "link_lengths": [1, 2]}},
     {"segments": [{"links": 2}, {"links": 3}], "taper": CONE},
@@ -110,8 +110,8 @@ def test_contacts_bring_their_parameters_and_functions(read):
         tail = read(VALID + 'contacts = ["tail", "torso"]\n' + more)
         assert points & set(tail.functions) == {"contact_points"}
         assert points <= set(read(STANCE + more).functions)
-    tail = read(VALID + 'contacts = ["tail"]\nfriction = "box"\n')
-    assert "mu" in tail.parameters and "hip" not in tail.parameters and tail.friction == "box"
+    tail = read(VALID + 'contacts = ["tail"]\nfriction = "smooth"\n')
+    assert "mu" in tail.parameters and "hip" not in tail.parameters and tail.friction == "smooth"
     flight = read(VALID)
     assert flight.contacts == () and not {"contacts", "friction"} & set(scene_to_dict(flight))
 

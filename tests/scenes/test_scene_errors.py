@@ -180,7 +180,7 @@ def test_a_folder_of_another_scene_is_refused(scene):
     folder = zoo.folder("feet_tail")
     rows = [("contacts", '["feet"]'), ("links", "2"), ("segments", "2"), ("kind", '"continuum"')]
     rows += [("links", '3\nbase = "fixed"'), ("links", "3\nweightless = true")]
-    rows += [("links", '3\nfriction = "box"'), ("links", "3\ntaper = 1")]
+    rows += [("links", '3\nfriction = "smooth"'), ("links", "3\ntaper = 1")]
     for key, value in rows:
         name = value.split("\n")[-1].split(" = ")[0] if "\n" in value else key
         with row(key, value), pytest.raises(st.ModelError, match=rf"has {name} = "):

@@ -104,7 +104,6 @@ ZOO: dict[str, dict[str, Any]] = {
     "ground_mixed": _own("mixed", MIXED, **GROUND),
     "feet": _links(1, 3, contacts=["feet"]),
     "feet_tail": _links(1, 3, contacts=["feet", "tail"]),
-    "box": _links(1, 3, friction="box", **GROUND),
     "smooth": _links(1, 3, friction="smooth", **GROUND),
     "paper": _links(1, 3, friction="paper", **GROUND),
     # a torso that never moves

@@ -6,39 +6,26 @@ scalar of ``d_x`` has one number for each direction; without, it is the derivati
 
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import replace
-from typing import Any
 
-from ..ir.dataflow import forward_slice, inner_arrays, pruned, writes
-from ..ir.program import (
-    Apply,
-    Array,
-    Copy,
-    Fill,
-    Guard,
-    Index,
-    Loop,
-    Program,
-    Ref,
-    Statement,
-    statements,
-)
+from ..ir import program as ir
+from ..ir.dataflow import forward_slice, inner_arrays, pruned, rule_of, writes
 from .angles import SinesAndCosinesArray, angle_inputs, kinds, sines_and_cosines_arrays
 from .step import tangent
 
-Bound = Callable[[tuple[Loop, ...]], Index | None]
+Bound = Callable[[tuple[ir.Loop, ...]], ir.Index | None]
 
 
-def all_lanes(loops: tuple[Loop, ...]) -> None:
+def all_lanes(loops: tuple[ir.Loop, ...]) -> None:
     """Set no bound: every lane is needed in all loops."""
 
 
 def tangent_program(
-    program: Program,
+    program: ir.Program,
     active: Collection[str],
     lanes: int = 0,
     bound: Bound = all_lanes,
     kept: Collection[str] = (),
-) -> Program:
+) -> ir.Program:
     """Return the program that takes ``d_<input>`` of the active inputs to ``d_<output>``.
 
     ``lanes`` is the number of directions, 0 for one direction in narrow scalars; ``bound`` tells
@@ -50,14 +37,14 @@ def tangent_program(
         name: array for name, array in sines_and_cosines_arrays(program).items() if name in moving
     }
     companions = {
-        a.name: Array(f"d_{a.name}", _role(a), a.size, a.count, lanes=lanes)
+        a.name: ir.Array(f"d_{a.name}", _role(a), a.size, a.count, lanes=lanes)
         for a in program.arrays
         if a.name in moving - by_angles.keys()
     }
 
     # lanes that a statement leaves out are zero from the start
     body = _Tangents(companions, by_angles, bound).body(program.body, ())
-    fills = tuple(Fill(ref, (0,) * ref.size) for ref in _partly_written(body))
+    fills = tuple(ir.Fill(ref, (0,) * ref.size) for ref in _partly_written(body))
 
     own = inner_arrays(program)
     own = tuple(replace(a, role="output") if a.name in kept else a for a in own)
@@ -68,16 +55,16 @@ def tangent_program(
     return pruned(replace(program, name=name, arrays=arrays, body=fills + body))
 
 
-def _role(array: Array) -> str:
+def _role(array: ir.Array) -> str:
     """Return the role of an array's tangents; the tangents of parameters are inputs."""
     return "input" if array.role == "parameters" else array.role
 
 
-def _partly_written(body: tuple[Statement, ...]) -> list[Ref]:
+def _partly_written(body: ir.Body) -> list[ir.Ref]:
     """Return the wide arrays of which some statement writes only a part of the lanes."""
-    arrays: dict[str, Array] = {}
-    for statement, _ in statements(body):
-        if isinstance(statement, Apply) and statement.columns:
+    arrays: dict[str, ir.Array] = {}
+    for statement, _ in ir.statements(body):
+        if isinstance(statement, ir.Apply) and statement.columns:
             for ref in writes(statement):
                 if ref.array.lanes:
                     arrays[ref.array.name] = ref.array
@@ -92,55 +79,49 @@ class _Tangents:
     """
 
     def __init__(
-        self, companions: dict[str, Array], by_angles: dict[str, SinesAndCosinesArray], bound: Bound
+        self,
+        companions: dict[str, ir.Array],
+        by_angles: dict[str, SinesAndCosinesArray],
+        bound: Bound,
     ):
         self.companions, self.by_angles, self.bound = companions, by_angles, bound
-        self.rules: dict[type, Callable[[Any, tuple[Loop, ...]], Iterator[Statement]]] = {
-            Apply: self.apply,
-            Copy: self.copy,
-            Fill: self.fill,
-            Guard: self.guard,
-            Loop: self.loop,
-        }
 
-    def moves(self, ref: Ref) -> bool:
+    def moves(self, ref: ir.Ref) -> bool:
         """Tell if the scalars of a reference have tangents."""
         return ref.array.name in self.companions
 
-    def of(self, ref: Ref) -> Ref:
+    def of(self, ref: ir.Ref) -> ir.Ref:
         """Return the tangents of a reference."""
         return replace(ref, array=self.companions[ref.array.name])
 
-    def body(self, body: tuple[Statement, ...], loops: tuple[Loop, ...]) -> tuple[Statement, ...]:
+    def body(self, body: ir.Body, loops: tuple[ir.Loop, ...]) -> ir.Body:
         """Return the transformed loop nest."""
-        out: list[Statement] = []
+        out: list[ir.Statement] = []
         for statement in body:
-            rule = self.rules.get(type(statement))
-            if rule is None:
-                raise TypeError(f"no rule differentiates {type(statement).__name__}")
+            rule = rule_of(self, statement, "differentiates")
             out += rule(statement, loops)
         return tuple(out)
 
-    def loop(self, loop: Loop, loops: tuple[Loop, ...]) -> Iterator[Statement]:
+    def loop(self, loop: ir.Loop, loops: tuple[ir.Loop, ...]) -> Iterator[ir.Statement]:
         """Yield a loop over the transformed body."""
         yield replace(loop, body=self.body(loop.body, (*loops, loop)))
 
-    def guard(self, guard: Guard, loops: tuple[Loop, ...]) -> Iterator[Statement]:
+    def guard(self, guard: ir.Guard, loops: tuple[ir.Loop, ...]) -> Iterator[ir.Statement]:
         """Yield a guard as it is."""
         yield guard
 
-    def fill(self, fill: Fill, loops: tuple[Loop, ...]) -> Iterator[Statement]:
+    def fill(self, fill: ir.Fill, loops: tuple[ir.Loop, ...]) -> Iterator[ir.Statement]:
         """Yield a fill, and forget the tangents of what it overwrites."""
         yield fill
         yield from self.cleared(fill.target)
 
-    def cleared(self, *targets: Ref) -> Iterator[Statement]:
+    def cleared(self, *targets: ir.Ref) -> Iterator[ir.Statement]:
         """Yield what sets the tangents of overwritten scalars to zero."""
         for target in targets:
             if self.moves(target):
-                yield Fill(self.of(target), (0,) * target.size)
+                yield ir.Fill(self.of(target), (0,) * target.size)
 
-    def copy(self, copy: Copy, loops: tuple[Loop, ...]) -> Iterator[Statement]:
+    def copy(self, copy: ir.Copy, loops: tuple[ir.Loop, ...]) -> Iterator[ir.Statement]:
         """Yield a copy, and that of the tangents."""
         yield copy
         if self.moves(copy.target) and self.moves(copy.source):
@@ -148,7 +129,7 @@ class _Tangents:
         elif not copy.adds:
             yield from self.cleared(copy.target)
 
-    def apply(self, call: Apply, loops: tuple[Loop, ...]) -> Iterator[Statement]:
+    def apply(self, call: ir.Apply, loops: tuple[ir.Loop, ...]) -> Iterator[ir.Statement]:
         """Yield a step with its tangents."""
         values = call.inputs()
         active = {name for name, ref in values.items() if self.moves(ref)}
@@ -168,5 +149,5 @@ class _Tangents:
         for name in active:
             values[f"d_{name}"] = self.of(values[name])
         targets = (*call.writes, *map(self.of, call.writes))
-        both = Apply.named(step, values, targets, call.adds * 2)
+        both = ir.Apply.named(step, values, targets, call.adds * 2)
         yield replace(both, columns=self.bound(loops))

@@ -5,35 +5,30 @@ changes with x.  A value that is overwritten before the backward run needs it is
 each iteration of its loops.
 """
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
-from typing import Any
 
-from ..ir.dataflow import backward_slice, forward_slice, inner_arrays, overlap, pruned, writes
-from ..ir.program import (
-    Apply,
-    Array,
-    Copy,
-    Fill,
-    Guard,
-    Index,
-    Loop,
-    Program,
-    Ref,
-    Statement,
-    When,
-    as_index,
-    statements,
+from ..ir import program as ir
+from ..ir.dataflow import (
+    backward_slice,
+    forward_slice,
+    inner_arrays,
+    overlap,
+    pruned,
+    rule_of,
+    writes,
 )
 from .angles import SinesAndCosinesArray, angle_inputs, kinds, sines_and_cosines_arrays
 from .step import adjoint
 
-Loops = tuple[Loop, ...]
+Loops = tuple[ir.Loop, ...]
 # the statements that run forward, and those that run backward
-BothWays = tuple[list[Statement], list[Statement]]
+BothWays = tuple[list[ir.Statement], list[ir.Statement]]
 
 
-def adjoint_program(program: Program, wanted: Collection[str], given: Collection[str]) -> Program:
+def adjoint_program(
+    program: ir.Program, wanted: Collection[str], given: Collection[str]
+) -> ir.Program:
     """Return the program from ``b_<output>`` of given outputs to ``b_<input>`` of wanted inputs."""
     # what lies between the wanted inputs and the given outputs has adjoints, or its angles have
     matters = forward_slice(program.body, wanted) & backward_slice(program.body, given)
@@ -48,9 +43,9 @@ def adjoint_program(program: Program, wanted: Collection[str], given: Collection
     # adjoints start from the weights of the outputs, and end as those of the inputs
     weights = {a.name: _adjoints(a, "input") for a in ends if a.name in given}
     results = {a.name: _adjoints(a, "output") for a in ends if a.name in wanted}
-    zeros = [Fill(b.whole(), (0,) * b.length) for b in companions.values()]
-    start = [Copy(companions[name].whole(), weight.whole()) for name, weight in weights.items()]
-    end = [Copy(result.whole(), companions[name].whole()) for name, result in results.items()]
+    zeros = [ir.Fill(b.whole(), (0,) * b.length) for b in companions.values()]
+    start = [ir.Copy(companions[name].whole(), weight.whole()) for name, weight in weights.items()]
+    end = [ir.Copy(result.whole(), companions[name].whole()) for name, result in results.items()]
 
     reversal = _Reversal(program, companions, by_angles)
     forward, backward = reversal.body(program.body, ())
@@ -70,27 +65,27 @@ def adjoint_program(program: Program, wanted: Collection[str], given: Collection
     )
 
 
-def _adjoints(array: Array, role: str, suffix: str = "") -> Array:
-    return Array(f"b_{array.name}{suffix}", role, array.size, array.count)
+def _adjoints(array: ir.Array, role: str, suffix: str = "") -> ir.Array:
+    return ir.Array(f"b_{array.name}{suffix}", role, array.size, array.count)
 
 
-def iterations(loops: Loops) -> tuple[Index, int]:
+def iterations(loops: Loops) -> tuple[ir.Index, int]:
     """Return the number of the current iteration of nested loops, and how many there are."""
-    number, count = as_index(0), 1
+    number, count = ir.as_index(0), 1
     for loop in reversed(loops):
         if loop.start.terms or loop.stop.terms:
             raise ValueError(f"loop {loop.var} is no rectangle: its iterations cannot be numbered")
         first = loop.start.offset
-        number = number + count * (Index(((loop.var, 1),)) + -first)
+        number = number + count * (ir.Index(((loop.var, 1),)) + -first)
         count *= loop.stop.offset - first
     return number, count
 
 
-def _apart(ref: Ref, loops: tuple[Loop | When, ...]) -> bool:
+def _apart(ref: ir.Ref, loops: tuple[ir.Loop | ir.When, ...]) -> bool:
     """Tell if a reference means a different place in every iteration of the loops."""
     strides = {var: abs(factor) for var, factor in ref.offset.terms}
     span = ref.size * ref.stride  # of the places meant in all iterations of the inner loops
-    rectangles = [loop for loop in loops if isinstance(loop, Loop)]
+    rectangles = [loop for loop in loops if isinstance(loop, ir.Loop)]
     for loop in sorted(rectangles, key=lambda loop: strides.get(loop.var, 0)):
         stride = strides.get(loop.var, 0)
         if stride < span or loop.start.terms or loop.stop.terms:
@@ -108,52 +103,42 @@ class _Reversal:
     kept: copies of values that are overwritten before the backward run needs them.
     """
 
-    program: Program
-    companions: dict[str, Array]
+    program: ir.Program
+    companions: dict[str, ir.Array]
     by_angles: dict[str, SinesAndCosinesArray]
-    kept: list[Array] = field(default_factory=list)
+    kept: list[ir.Array] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.rules: dict[type, Callable[[Any, Loops], BothWays]] = {
-            Apply: self.apply,
-            Copy: self.copy,
-            Fill: self.fill,
-            Guard: self.guard,
-            Loop: self.loop,
-        }
-
         # arrays that hold different values at different times
         writers: dict[str, int] = {}
         self.overwritten: set[str] = set()
-        for statement, loops in statements(self.program.body):
+        for statement, loops in ir.statements(self.program.body):
             for ref in writes(statement):
                 name = ref.array.name
                 writers[name] = writers.get(name, 0) + 1
                 if writers[name] > 1 or not _apart(ref, loops):
                     self.overwritten.add(name)
 
-    def of(self, ref: Ref) -> Ref:
+    def of(self, ref: ir.Ref) -> ir.Ref:
         """Return the adjoints of a reference."""
         return replace(ref, array=self.companions[ref.array.name])
 
-    def matters(self, ref: Ref) -> bool:
+    def matters(self, ref: ir.Ref) -> bool:
         """Tell if the scalars of a reference have adjoints."""
         return ref.array.name in self.companions
 
-    def body(self, body: tuple[Statement, ...], loops: Loops) -> BothWays:
+    def body(self, body: ir.Body, loops: Loops) -> BothWays:
         """Return statements with what they keep, and their reverse, the last one first."""
-        forward: list[Statement] = []
-        backward: list[Statement] = []
+        forward: list[ir.Statement] = []
+        backward: list[ir.Statement] = []
         for statement in body:
-            rule = self.rules.get(type(statement))
-            if rule is None:
-                raise TypeError(f"no rule reverses {type(statement).__name__}")
+            rule = rule_of(self, statement, "reverses")
             there, back = rule(statement, loops)
             forward += there
             backward = [*back, *backward]
         return forward, backward
 
-    def loop(self, loop: Loop, loops: Loops) -> BothWays:
+    def loop(self, loop: ir.Loop, loops: Loops) -> BothWays:
         """Return a loop, and one that runs the other way."""
         there, back = self.body(loop.body, (*loops, loop))
         forward = replace(loop, body=tuple(there))
@@ -161,32 +146,32 @@ class _Reversal:
             return [forward], []
         return [forward], [replace(loop, body=tuple(back), downward=not loop.downward)]
 
-    def guard(self, guard: Guard, loops: Loops) -> BothWays:
+    def guard(self, guard: ir.Guard, loops: Loops) -> BothWays:
         """Return a guard, which has no reverse."""
         return [guard], []
 
-    def fill(self, fill: Fill, loops: Loops) -> BothWays:
+    def fill(self, fill: ir.Fill, loops: Loops) -> BothWays:
         """Return a fill and its reverse."""
         return [fill], self.cleared(fill.target)
 
-    def cleared(self, *targets: Ref) -> list[Statement]:
+    def cleared(self, *targets: ir.Ref) -> list[ir.Statement]:
         """Return the statements that forget the adjoints of what was overwritten."""
         return [
-            Fill(self.of(ref), (0,) * ref.size)
+            ir.Fill(self.of(ref), (0,) * ref.size)
             for ref in targets
             if self.matters(ref) and ref.array.name in self.overwritten
         ]
 
-    def copy(self, copy: Copy, loops: Loops) -> BothWays:
+    def copy(self, copy: ir.Copy, loops: Loops) -> BothWays:
         """Return a copy and its reverse."""
-        back: list[Statement] = []
+        back: list[ir.Statement] = []
         if self.matters(copy.target) and self.matters(copy.source):
-            back.append(Copy(self.of(copy.source), self.of(copy.target), adds=True))
+            back.append(ir.Copy(self.of(copy.source), self.of(copy.target), adds=True))
         if not copy.adds:
             back += self.cleared(copy.target)
         return [copy], back
 
-    def apply(self, call: Apply, loops: Loops) -> BothWays:
+    def apply(self, call: ir.Apply, loops: Loops) -> BothWays:
         """Return a step, keeping what its reverse reads, and its reverse."""
         inputs, stored = call.inputs(), call.stored()
         angles = angle_inputs(self.by_angles, inputs)
@@ -198,7 +183,7 @@ class _Reversal:
 
         # it reads the adjoints of outputs, and values as they were before the step
         values = inputs | {f"b_{name}": self.of(ref) for name, ref in outputs.items()}
-        keeps: list[Statement] = []
+        keeps: list[ir.Statement] = []
         for name, _ in step.inputs:
             if name in inputs and inputs[name].array.name in self.overwritten:
                 copy = self.keep(inputs[name], loops)
@@ -212,18 +197,18 @@ class _Reversal:
         targets = [sources[name] for name, _ in step.outputs]
         _check_overlaps(call, stored, targets)
         adds = [ref not in stored for ref in targets]
-        back = Apply.named(step, values, map(self.of, targets), adds)
+        back = ir.Apply.named(step, values, map(self.of, targets), adds)
         return [*keeps, call], [back, *self.cleared(*(ref for ref in stored if ref not in targets))]
 
-    def keep(self, ref: Ref, loops: Loops) -> Copy:
+    def keep(self, ref: ir.Ref, loops: Loops) -> ir.Copy:
         """Return the copy of a value that will be overwritten."""
         number, count = iterations(loops)
-        array = Array(f"kept_{len(self.kept)}_{ref.array.name}", "local", ref.size, count)
+        array = ir.Array(f"kept_{len(self.kept)}_{ref.array.name}", "local", ref.size, count)
         self.kept.append(array)
-        return Copy(array[number], ref)
+        return ir.Copy(array[number], ref)
 
 
-def _check_overlaps(call: Apply, stored: list[Ref], targets: list[Ref]) -> None:
+def _check_overlaps(call: ir.Apply, stored: list[ir.Ref], targets: list[ir.Ref]) -> None:
     """Refuse a step that overwrites a part of what it reads, or what it reads under two names."""
     for ref in stored:
         overlaps = sum(overlap(ref, target) for target in targets)

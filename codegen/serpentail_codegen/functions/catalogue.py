@@ -4,12 +4,12 @@ table.
 
 from serpentail_scene.signatures.table import SIGNATURES
 
-from . import contact, fixed_base, pfl
+from . import contact, pfl
 from .airborne import curvature as airborne
 from .derivatives import by_parameters, hessian, jacobians
-from .differentiable import FUNCTIONS
+from .derivatives.differentiated import FUNCTIONS
 from .function import Function, signed
-from .implicit import functions as implicit
+from .implicit import factor, solve
 from .tail import Tail
 
 _FOUND = FUNCTIONS | signed(
@@ -18,7 +18,7 @@ _FOUND = FUNCTIONS | signed(
     | hessian.ASSEMBLIES
     | contact.ASSEMBLIES
     | pfl.ASSEMBLIES
-    | implicit.ASSEMBLIES
+    | {"implicit_factor": factor.assemble_factor, "implicit_solve": solve.assemble_solve}
     | airborne.ASSEMBLIES
 )
 # A signature without outputs stands for other functions and has no assembly of its own.
@@ -27,7 +27,7 @@ CATALOGUE = {name: _FOUND[name] for name, s in SIGNATURES.items() if s.outputs}
 
 def function_of(name: str, tail: Tail) -> Function:
     """Return a function of a tail, with the arguments that it has for that tail."""
-    return (fixed_base.FUNCTIONS if tail.fixed else CATALOGUE)[name].of(tail)
+    return CATALOGUE[name].of(tail)
 
 
 SYMBOLIC = {name for name in CATALOGUE if SIGNATURES[name].symbolic}  # in the CasADi module

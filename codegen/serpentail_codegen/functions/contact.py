@@ -117,7 +117,7 @@ def place_tail(draft: Draft, torso: Torso, samples: Segments, points: Points) ->
 
 def assemble_contact_points(draft: Draft, arrays: dict[str, Array]) -> None:
     """Places and velocities of all points."""
-    state = State(arrays["q"], arrays["v"])
+    state = draft.state(arrays["q"], arrays["v"])
     R = attitude(draft, state)
     points = gather_points(draft, state, R, arrays)
     with draft.loop("k", draft.tail.points) as k:
@@ -128,7 +128,7 @@ def assemble_contact_points(draft: Draft, arrays: dict[str, Array]) -> None:
 
 def assemble_leg_points(draft: Draft, arrays: dict[str, Array]) -> None:
     """Hip, D, knee, A, M and T of the right leg, then of the left, in the world (Eqs. 5 to 9)."""
-    state, angles = State(arrays["q"]), arrays["angles"]
+    state, angles = draft.state(arrays["q"]), arrays["angles"]
     R = attitude(draft, state)
     sides, joints = draft.constant("sides", [1, -1]), draft.array("joints_of_leg", 3, 6)
     with draft.loop("l", 2) as side:
@@ -214,14 +214,14 @@ def balance_powers(draft: Draft, torso: Torso, points: Points, arrays: dict[str,
 
 def assemble_contact_dynamics(draft: Draft, arrays: dict[str, Array]) -> None:
     """v_dot from Eq. 1, H v_dot + C = [0; tau] + J^T f, with the ground's forces."""
-    state = State(arrays["q"], arrays["v"])
+    state = draft.state(arrays["q"], arrays["v"])
     if draft.dynamics == "segments":
         R = attitude(draft, state)
         accelerate_by_segments(draft, arrays, *contact_load(draft, state, R, arrays))
         return
     factored = factored_dynamics(draft, arrays["q"], arrays["v"])
     applied, torques = contact_load(draft, state, factored.R, arrays)
-    factored.solve(draft, factored.loads(applied, torques), arrays["v_dot"])
+    factored.solve(factored.loads(applied, torques), arrays["v_dot"])
 
 
 ASSEMBLIES = {

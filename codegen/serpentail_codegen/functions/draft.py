@@ -3,21 +3,24 @@ step.
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 from serpentail_scene.parameters import Parameter
 from serpentail_scene.signatures.table import SIGNATURES
 
+from ..ir import dataflow
 from ..ir.builder import Builder, narrowed
-from ..ir.program import Index, Ref
+from ..ir.program import Array, Index, Program, Ref
 from ..ir.step import Step, specialised
 from ..ir.tape import Number
 from ..mechanics.lower import declared_shapes, derive
 from ..scene.variant import Stretch
-from .scope import Instead, Scope, Vectors
+from .layout import block
+from .scope import Instead, Scope, State, Vectors
 from .tail import Tail
 
+AT_REST = ("identity", "still", "zero_1", "zero_3")  # constants that have one value by each name
 Reads = Scope | Mapping[str, Ref]
 
 
@@ -40,7 +43,17 @@ class Draft(Builder):
     def declare_parameters(self, parameters: Iterable[Parameter]) -> None:
         """Declare the parameter struct: steps find its numbers by their names."""
         refs = {p.name: self.array(p.name, p.size, role="parameters")[0] for p in parameters}
+        if self.tail.fixed:  # a base without mass, so that the steps of the torso serve it, too
+            refs |= {"torso_mass": self.zero(1), "torso_inertia": self.zero(3)}
         self.parameters = MappingProxyType(refs)
+
+    def state(self, q: Array, v: Array | None = None) -> State:
+        """Return a state; leave out the velocity if it is not used."""
+        return State(self.tail, q, v, self.zero(3) if self.tail.fixed else None)
+
+    def of_torso(self, array: Array, part: slice) -> Ref:
+        """Return the torso's part of a velocity or an acceleration, zeros on a fixed base."""
+        return self.zero(3) if self.tail.fixed else block(array, part)
 
     def entry(self, name: str, k: Index, size: int) -> Ref:
         """Return the numbers of piece k, for a parameter with numbers for each piece."""
@@ -62,6 +75,9 @@ class Draft(Builder):
         declared = set(dict(step.inputs) if function is step else declared_shapes(function))
         refs = self._refs(step.name, declared, reads)
 
+        if self.tail.fixed:
+            step = _folded(step, refs)
+
         # a declared input may be missing if only unwanted outputs need it
         wanted = narrowed(step, {name.rstrip("_") for name in writes})
         for name, _ in wanted.inputs:
@@ -76,9 +92,7 @@ class Draft(Builder):
         self.apply(step, refs, **writes)
 
     def _refs(self, step: str, declared: set[str], reads: Iterable[Reads]) -> dict[str, Ref]:
-        """Return what a step reads by name; refuse names that are unknown, given twice or those of
-        parameters.
-        """
+        """Return what a step reads by name; refuse unknown names, repeated ones and parameters."""
         refs: dict[str, Ref] = {}
         for source in reads:
             instead = isinstance(source, Instead)
@@ -127,3 +141,24 @@ class Draft(Builder):
     def zero(self, size: int) -> Ref:
         """Return zeros."""
         return self.fixed(f"zero_{size}", [0] * size)
+
+    def finish(self) -> Program:
+        """Return the recorded program; what folded into steps is left out."""
+        program = super().finish()
+        if not self.tail.fixed:
+            return program
+        used = dataflow.read_names(program.body)
+        kept = (a for a in program.arrays if a.role != "constant" or a.name in used)
+        return replace(program, arrays=tuple(kept))
+
+
+def _folded(step: Step, refs: Mapping[str, Ref]) -> Step:
+    """Return a step with what a fixed base keeps constant: its attitude, and all zeros."""
+    constants = {
+        name: refs[name].array.values
+        for name, _ in step.inputs
+        if name in refs and refs[name].array.name in AT_REST
+    }
+    if not constants:
+        return step
+    return specialised(step, "_".join([step.name, "at_rest", *constants]), **constants)

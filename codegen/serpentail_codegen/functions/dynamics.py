@@ -11,7 +11,7 @@ from ..mechanics import rotations, torso
 from .draft import Draft
 from .factored import FactoredDynamics, factored_dynamics
 from .function import Assembly, Function, assemble
-from .layout import block, segment_v
+from .layout import block
 from .passive import add_elastic_energy, add_passive_forces, net_torques
 from .scope import Motion, State, Vectors
 from .sweeps.inertia import column_of, tail_inertia
@@ -26,18 +26,18 @@ from .tails.mechanism import Segments
 
 
 def assemble_mass_matrix(draft: Draft, arrays: dict[str, Array], world: bool = False) -> None:
-    """H (Eq. 2), both triangles."""
-    fill_mass_matrix(draft, State(arrays["q"]), arrays["H"], draft.tail.nv, world)
+    """H (Eq. 2), both triangles; on a fixed base its rows and columns of the tail (Eq. 16)."""
+    fill_mass_matrix(draft, draft.state(arrays["q"]), arrays["H"], draft.tail.nv, world)
 
 
 def fill_mass_matrix(
     draft: Draft, state: State, H: Array, row: int, world: bool = False
 ) -> tuple[Segments, Ref]:
     """H (Eq. 2), both triangles; its rows are ``row`` apart.  Returns segments and attitude."""
-    tail, R = draft.tail, attitude(draft, state)
+    tail, R, before = draft.tail, attitude(draft, state), draft.tail.torso_nv
 
     def H_tail(k: Index, other: Index, size: int = 1) -> Ref:
-        return H.part((TORSO_NV + k) * row + TORSO_NV + other, size)
+        return H.part((before + k) * row + before + other, size)
 
     columns = draft.array("columns", 12, tail.segments)
     along = R if world else None
@@ -49,37 +49,40 @@ def fill_mass_matrix(
         inertia = composite.only("h", "I")
         draft.step(rotations.world_composite, axes, inertia, **inertia)
         axes = {"R": draft.fixed("identity", IDENTITY)}
-    base = {f"H_{r}": H.part(r * row, TORSO_NV) for r in range(TORSO_NV)}
-    draft.step(torso.mass_matrix_base, axes, composite, **base)
+    if not tail.fixed:
+        base = {f"H_{r}": H.part(r * row, TORSO_NV) for r in range(TORSO_NV)}
+        draft.step(torso.mass_matrix_base, axes, composite, **base)
 
     # coupling of torso and tail, and the upper triangle of the tail
     with draft.loop("k", tail.nt) as k:
-        lower = H.part((TORSO_NV + k) * row, TORSO_NV)
-        upper = H.part(TORSO_NV + k, TORSO_NV, stride=row)
-        column = {"column": column_of(columns, k)}
-        draft.step(torso.mass_matrix_column, axes, column, H_row=lower, H_column=upper)
+        if not tail.fixed:
+            lower = H.part((TORSO_NV + k) * row, TORSO_NV)
+            upper = H.part(TORSO_NV + k, TORSO_NV, stride=row)
+            column = {"column": column_of(columns, k)}
+            draft.step(torso.mass_matrix_column, axes, column, H_row=lower, H_column=upper)
         with draft.loop("l", k) as other:
-            mirrored = H.part((TORSO_NV + other) * row + TORSO_NV + k, 1)
-            draft.copy(mirrored, H_tail(k, other))
+            draft.copy(H_tail(other, k), H_tail(k, other))
     return segments, R
 
 
 def assemble_inverse_dynamics(draft: Draft, arrays: dict[str, Array], world: bool = False) -> None:
     """H v_dot + C by Newton and Euler (Eq. 4); C (Eq. 3) without ``v_dot`` among the arguments."""
     force, v_dot = arrays["force"], arrays.get("v_dot")
-    state = State(arrays["q"], arrays["v"])
+    state = draft.state(arrays["q"], arrays["v"])
     unmoved = draft.fixed("still", [0, 0, 0])
     R = attitude(draft, state)
     segments = mechanism(draft).prepare(draft, state, False)
 
     # gravity is an acceleration of the torso
-    p_ddot = block(v_dot, VELOCITY) if v_dot else unmoved
+    p_ddot = draft.of_torso(v_dot, VELOCITY) if v_dot else unmoved
     a = draft.store(torso.torso_acceleration, {"R": R, "p_ddot": p_ddot}, a=3)["a"]
-    motion = Motion(state.omega, block(v_dot, OMEGA) if v_dot else unmoved, a)
+    motion = Motion(state.omega, draft.of_torso(v_dot, OMEGA) if v_dot else unmoved, a)
     inertial_forces(draft, segments, motion, v_dot, force)
-    add_passive_forces(draft, state, lambda i: segment_v(force, i))
+    add_passive_forces(draft, state, lambda i: draft.tail.segment_v(force, i))
 
     # forces on p_dot act in world axes
+    if draft.tail.fixed:
+        return
     for part in (VELOCITY, OMEGA) if world else (VELOCITY,):
         vector = block(force, part)
         draft.step(rotations.world_vector, {"R": R, "vector": vector}, vector=vector)
@@ -92,8 +95,9 @@ def inertial_forces(
     axes.
     """
     wrenches = forward_wrenches(draft, segments, motion, v_dot)
-    total = gather_wrenches(draft, segments, wrenches, lambda i: segment_v(force, i))
-    torso_wrench(draft, motion, total, force)
+    total = gather_wrenches(draft, segments, wrenches, lambda i: draft.tail.segment_v(force, i))
+    if not draft.tail.fixed:
+        torso_wrench(draft, motion, total, force)
 
 
 # ---- forward dynamics ----------------------------------------------------------------------------
@@ -105,7 +109,7 @@ def assemble_forward_dynamics(draft: Draft, arrays: dict[str, Array]) -> Factore
     """
     factored = factored_dynamics(draft, arrays["q"], arrays["v"])
     applied, torques = applied_load(draft, arrays, factored.R)
-    factored.solve(draft, factored.loads(applied, torques), arrays["v_dot"])
+    factored.solve(factored.loads(applied, torques), arrays["v_dot"])
     return factored
 
 
@@ -114,7 +118,7 @@ def assemble_acceleration(draft: Draft, arrays: dict[str, Array]) -> None:
     if draft.dynamics != "segments":
         assemble_forward_dynamics(draft, arrays)
         return
-    R = attitude(draft, State(arrays["q"]))
+    R = attitude(draft, draft.state(arrays["q"]))
     accelerate_by_segments(draft, arrays, *applied_load(draft, arrays, R))
 
 
@@ -132,7 +136,7 @@ def accelerate_by_segments(
 
 def assemble_segment_dynamics(draft: Draft, arrays: dict[str, Array]) -> None:
     """v_dot from loads at B and torques, by segments."""
-    state = State(arrays["q"], arrays["v"])
+    state = draft.state(arrays["q"], arrays["v"])
     forward_dynamics(draft, state, arrays["at_torso"], arrays["torques"], arrays["v_dot"])
 
 
@@ -140,12 +144,12 @@ def applied_load(draft: Draft, arrays: dict[str, Array], R: Ref) -> tuple[Vector
     """Return ``load_force, load_moment`` of external loads at B in torso axes, and the torques of
     actuators and loads minus those of the passive tail.
     """
-    tau = net_torques(draft, State(arrays["q"], arrays["v"]), arrays["tau"])
+    tau = net_torques(draft, draft.state(arrays["q"], arrays["v"]), arrays["tau"])
     if "f_ext" not in arrays:
         unloaded = draft.fixed("unloaded", [0, 0, 0])
         return Vectors(dict.fromkeys(("load_force", "load_moment"), unloaded)), tau
     torques = copied_torques(draft, tau)
-    state = State(arrays["q"])
+    state = draft.state(arrays["q"])
     return gather_loads(draft, state, R, arrays["f_ext"], torques), torques
 
 
@@ -162,7 +166,7 @@ def copied_torques(draft: Draft, tau: Array) -> Array:
 
 def assemble_momentum(draft: Draft, arrays: dict[str, Array]) -> None:
     """Momentum, and angular momentum about the COM; the sweep uses the motion relative to B."""
-    state = State(arrays["q"], arrays["v"])
+    state = draft.state(arrays["q"], arrays["v"])
     unmoved = draft.fixed("still", [0, 0, 0])
     R = attitude(draft, state)
     momentum = gather_momentum(draft, state, R, unmoved)
@@ -172,7 +176,7 @@ def assemble_momentum(draft: Draft, arrays: dict[str, Array]) -> None:
 
 def assemble_energy(draft: Draft, arrays: dict[str, Array]) -> None:
     """Kinetic energy link by link, potential energy of the COM's height and of the passive tail."""
-    state = State(arrays["q"], arrays["v"])
+    state = draft.state(arrays["q"], arrays["v"])
     R = attitude(draft, state)
     moment = gather_kinetic(draft, state, R, arrays["kinetic"][0])
     potential = arrays["potential"][0]

@@ -14,6 +14,22 @@ from .tail import Tail, struct_parameters
 Assembly = Callable[[Draft, dict[str, Array]], object]
 
 
+# what arguments mean on a fixed base: they are those of the tail alone
+FIXED_MEANINGS = {
+    "q": "tail coordinates (rad)",
+    "v": "rates of the tail coordinates (rad/s)",
+    "v_dot": "accelerations of the tail coordinates (rad/s^2)",
+    "force": "generalised forces on the tail coordinates (N m)",
+    "linear": "linear momentum of the tail (kg m/s, world)",
+    "angular": "angular momentum of the tail about its own centre of mass (kg m^2/s, world)",
+    "position": "position of the tail's centre of mass (m, world)",
+    "velocity": "velocity of the tail's centre of mass, J v (m/s, world)",
+    "J": "Jacobian of the tail's centre of mass, world",
+    "r_q": "right-hand side for q",
+    "k_q": "solution for q",
+}
+
+
 @dataclass(frozen=True)
 class Function:
     """A function of a model, or one that other functions call: name, arguments, and assembly."""
@@ -26,8 +42,15 @@ class Function:
 
     def of(self, tail: Tail) -> "Function":
         """Return this function with those of its arguments that are not empty for this tail."""
-        inputs = tuple(a for a in self.inputs if a.length(tail))
-        outputs = tuple(a for a in self.outputs if a.length(tail))
+        meanings = FIXED_MEANINGS if tail.fixed else {}
+        inputs, outputs = (
+            tuple(
+                replace(a, meaning=meanings.get(a.name, a.meaning))
+                for a in arguments
+                if a.length(tail)
+            )
+            for arguments in (self.inputs, self.outputs)
+        )
         return replace(self, inputs=inputs, outputs=outputs)
 
 
@@ -48,6 +71,8 @@ def assemble(function: Function, tail: Tail, dynamics: str = "composite") -> Pro
     functions that it does not apply to stay the same.
     """
     dynamics = dynamics if tail.kind == "articulated" else "composite"
+    if tail.fixed:
+        dynamics = "composite"
     if dynamics == "segments" and not tail.uniform:
         dynamics = "lanes"  # dynamics by segments needs equal segments of equal links
     draft = Draft(function.name, function.doc, tail=tail, dynamics=dynamics)

@@ -5,9 +5,8 @@ from serpentail_scene.layout import OMEGA, TORSO_NV
 from ..ir.program import Array, Index, Ref
 from ..mechanics import loads, torso
 from .draft import Draft
-from .layout import coordinate, tail_v
-from .scope import State
-from .sweeps.inertia import column_of, forward_roots, gather_inertia, segment_roots
+from .layout import coordinate
+from .sweeps.inertia import column_of, columns_and_inertia
 from .sweeps.pieces import (
     attitude,
     each_point,
@@ -20,7 +19,7 @@ from .sweeps.pieces import (
 
 def assemble_tail_points(draft: Draft, arrays: dict[str, Array]) -> None:
     """The joints and the tip (Eqs. 14, 15), or equally spaced samples of every segment."""
-    points, state = arrays["points"], State(arrays["q"])
+    points, state = arrays["points"], draft.state(arrays["q"])
     R = attitude(draft, state)
     samples = mechanism(draft).prepare_samples(draft, state, None)
     pose = torso_pose(draft, R, state.position)
@@ -35,7 +34,7 @@ def assemble_tail_point_jacobians(draft: Draft, arrays: dict[str, Array]) -> Non
 
     Arms start at B, so that distance from the origin costs no accuracy.
     """
-    J, tail, state = arrays["J"], draft.tail, State(arrays["q"])
+    J, tail, state = arrays["J"], draft.tail, draft.state(arrays["q"])
     R = attitude(draft, state)
     samples = mechanism(draft).prepare_samples(draft, state, None)
     S = draft.array("S", 12, tail.segments)
@@ -73,23 +72,27 @@ def assemble_center_of_mass(draft: Draft, arrays: dict[str, Array]) -> None:
     the mass.
     """
     tail, J, velocity = draft.tail, arrays["J"], arrays["velocity"][0]
-    state = State(arrays["q"], arrays["v"])
+    state = draft.state(arrays["q"], arrays["v"])
 
     # mass, first moment, and the momentum that each tail coordinate gives, in torso axes
     R = attitude(draft, state)
-    segments = mechanism(draft).prepare(draft, state, True)
-    columns, roots = draft.array("columns", 12, tail.segments), segment_roots(draft)
-    forward_roots(draft, segments, torso_pose(draft), roots)
-    composite = gather_inertia(draft, segments, roots, columns)
+    _, columns, composite = columns_and_inertia(draft, state)
 
     # the motion of the torso, then the contribution of the tail
     rows = {f"J_{name}": J.part(axis * tail.nv, TORSO_NV) for axis, name in enumerate("xyz")}
+    if tail.fixed:
+        rows, moment = {}, composite.only("mass", "h")
+        draft.step(torso.torso_moment, moment, **moment)
     motion = {"position": arrays["position"][0], "velocity": velocity}
     mass = draft.vectors(inverse_mass=1)
     draft.step(torso.com_at_base, state.torso(R), composite, **mass, **motion, **rows)
     with draft.loop("k", tail.nt) as k:
-        reads = {"R": R, "column": column_of(columns, k), "rate": tail_v(arrays["v"], k)}
-        writes = {"J_column": J.part(TORSO_NV + k, 3, stride=tail.nv), "velocity_": velocity}
+        reads = {
+            "R": R,
+            "column": column_of(columns, k),
+            "rate": tail.coordinate_v(arrays["v"], k),
+        }
+        writes = {"J_column": J.part(tail.torso_nv + k, 3, stride=tail.nv), "velocity_": velocity}
         draft.step(torso.com_of_coordinate, mass, reads, **writes)
 
 

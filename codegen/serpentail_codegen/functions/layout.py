@@ -1,8 +1,10 @@
-"""Parts of arrays in the layout of q, v and tau, as steps read them."""
+"""Parts of arrays in the layout of q, v and tau, as steps read them; `Tail` has those that a fixed
+base moves.
+"""
 
 from typing import TypeVar
 
-from serpentail_scene.layout import PER_SEGMENT, TORSO_NQ, TORSO_NV
+from serpentail_scene.layout import PER_SEGMENT
 
 from ..ir.program import Array, Index, Ref
 
@@ -24,18 +26,3 @@ def coordinate(i: Number, which: int = 0) -> Number:
 def coordinates(array: Array, i: Index | int) -> Ref:
     """Return the part of torques, or of an array like them, that belongs to segment i."""
     return array.part(PER_SEGMENT * i, PER_SEGMENT)
-
-
-def segment_q(q: Array, i: Index | int) -> Ref:
-    """Return the coordinates of segment i."""
-    return q.part(TORSO_NQ + PER_SEGMENT * i, PER_SEGMENT)
-
-
-def segment_v(v: Array, i: Index | int) -> Ref:
-    """Return the rates, accelerations or forces of segment i."""
-    return v.part(TORSO_NV + PER_SEGMENT * i, PER_SEGMENT)
-
-
-def tail_v(v: Array, k: Index | int) -> Ref:
-    """Return the rate, acceleration or force of tail coordinate k."""
-    return v.part(TORSO_NV + k, 1)

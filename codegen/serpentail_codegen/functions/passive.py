@@ -13,7 +13,7 @@ from ..ir.program import Array, Index, Ref
 from ..mechanics import passive
 from ..mechanics.lower import declared_shapes, derive
 from .draft import Draft
-from .layout import coordinates, segment_v
+from .layout import coordinates
 from .scope import Instead, State, Vectors
 from .tails.mechanism import StepFunction
 
@@ -61,7 +61,7 @@ def add_passive_power(draft: Draft, state: State, multiplier: Array, power: Ref)
     """Add the power of the passive parts, when the tail moves with a multiplier."""
     if draft.tail.passive:
         with each_passive_force(draft, state) as (i, passive_force):
-            reads = {"passive": passive_force, "virtual_rates": segment_v(multiplier, i)}
+            reads = {"passive": passive_force, "virtual_rates": draft.tail.segment_v(multiplier, i)}
             draft.step(passive.virtual_power, reads, power_=power)
 
 

@@ -5,12 +5,12 @@ from serpentail_scene.layout import OMEGA, VELOCITY
 from ..ir.program import Array, padded
 from ..mechanics import rotations, torso, translation
 from .draft import Draft
-from .layout import block, coordinates, tail_v
+from .layout import block, coordinates
 from .passive import add_passive_forces
-from .scope import Motion, State, Vectors
-from .sweeps.inertia import column_of, forward_roots, gather_inertia, segment_roots
-from .sweeps.pieces import attitude, mechanism, torso_pose
-from .sweeps.wrenches import forward_wrenches, gather_wrenches
+from .scope import State, Vectors
+from .sweeps.inertia import column_of, columns_and_inertia
+from .sweeps.pieces import attitude, mechanism
+from .sweeps.wrenches import forward_wrenches, gather_wrenches, torso_without_acceleration
 from .tails.mechanism import Segments
 
 
@@ -22,18 +22,18 @@ def assemble_pfl(draft: Draft, arrays: dict[str, Array]) -> None:
     nor on attitude. If ``v_dot`` is among the arguments, it receives all accelerations, so that no
     forward dynamics is needed.
     """
-    tail, tau, state = draft.tail, arrays["tau"], State(arrays["q"], arrays["v"])
+    tail, tau, state = draft.tail, arrays["tau"], draft.state(arrays["q"], arrays["v"])
+    if tail.fixed:
+        hold_base(draft, state, arrays)
+        return
     v_dot = arrays.get("v_dot") or draft.array("v_dot", tail.nv)
 
     # composite inertia, and the momentum columns of the tail coordinates
-    segments = mechanism(draft).prepare(draft, state, True)
-    columns, roots = draft.array("columns", 12, tail.segments), segment_roots(draft)
-    forward_roots(draft, segments, torso_pose(draft), roots)
-    composite = gather_inertia(draft, segments, roots, columns)
+    segments, columns, composite = columns_and_inertia(draft, state)
 
     # torques for a torso at rest, then the torso's acceleration, and the torques that it adds
     with draft.loop("k", tail.nt) as k:
-        draft.copy(tail_v(v_dot, k), arrays["accelerations"].part(k, 1))
+        draft.copy(tail.coordinate_v(v_dot, k), arrays["accelerations"].part(k, 1))
     wrench = tail_alone(draft, segments, v_dot, tau)
     motion = free_torso(draft, composite, wrench)
     add_passive_forces(draft, state, lambda i: coordinates(tau, i))
@@ -46,11 +46,20 @@ def assemble_pfl(draft: Draft, arrays: dict[str, Array]) -> None:
         draft.copy(block(v_dot, OMEGA), motion["w_dot"])
 
 
+def hold_base(draft: Draft, state: State, arrays: dict[str, Array]) -> None:
+    """Torques H v_dot + C: on a fixed base they give exactly the wanted accelerations."""
+    segments, v_dot = mechanism(draft).prepare(draft, state, False), arrays["accelerations"]
+    tail_alone(draft, segments, v_dot, arrays["tau"])
+    add_passive_forces(draft, state, lambda i: coordinates(arrays["tau"], i))
+    if "v_dot" in arrays:
+        draft.copy(draft.tail.all_v(arrays["v_dot"]), draft.tail.all_v(v_dot))
+
+
 def tail_alone(draft: Draft, segments: Segments, v_dot: Array, tau: Array) -> Vectors:
     """Compute ``force, moment`` at B and torques for ``v_dot`` of the tail while the torso does not
     accelerate.
     """
-    motion = Motion(segments.state.omega, draft.zero(3), draft.zero(3))
+    motion = torso_without_acceleration(draft, segments.state)
     wrenches = forward_wrenches(draft, segments, motion, v_dot)
     total = gather_wrenches(draft, segments, wrenches, lambda i: coordinates(tau, i))
     return draft.store(torso.torso_wrench, motion, total, force=3, moment=3)

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, VELOCITY
 
 from ..ir.program import Array, Index, Ref
-from .layout import block, segment_q, segment_v
+from .layout import block
+from .tail import Tail
 
 
 class Scope:
@@ -84,30 +85,35 @@ class Torso(Fields):
 
 @dataclass(frozen=True)
 class State:
-    """The arguments q and v of a function; v is missing if the function does not use it."""
+    """The arguments q and v of a function; v is missing if the function does not use it.
 
+    still: zeros in place of what a fixed base does not have: it rests at the world's origin.
+    """
+
+    tail: Tail
     q: Array
     v: Array | None = None
+    still: Ref | None = None
 
     @property
     def quaternion(self) -> Ref:
-        """Attitude of the torso."""
+        """Attitude of a torso that moves."""
         return block(self.q, QUATERNION)
 
     @property
     def position(self) -> Ref:
         """Position of B."""
-        return block(self.q, POSITION)
+        return self.still or block(self.q, POSITION)
 
     @property
     def velocity(self) -> Ref:
         """Velocity of B."""
-        return block(self._v, VELOCITY)
+        return self.still or block(self._v, VELOCITY)
 
     @property
     def omega(self) -> Ref:
         """Angular velocity of the torso."""
-        return block(self._v, OMEGA)
+        return self.still or block(self._v, OMEGA)
 
     @property
     def _v(self) -> Array:
@@ -121,8 +127,8 @@ class State:
 
     def angles(self, i: Index | int) -> Ref:
         """Return the coordinates of segment i."""
-        return segment_q(self.q, i)
+        return self.tail.segment_q(self.q, i)
 
     def rates(self, i: Index | int) -> Ref:
         """Return the rates of the coordinates of segment i."""
-        return segment_v(self._v, i)
+        return self.tail.segment_v(self._v, i)

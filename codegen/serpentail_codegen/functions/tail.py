@@ -3,10 +3,10 @@
 from dataclasses import dataclass, replace
 from math import pi
 
-from serpentail_scene.layout import TORSO_NQ, TORSO_NV, Sizes
+from serpentail_scene.layout import PER_SEGMENT, Sizes
 from serpentail_scene.parameters import Parameter
 
-from ..ir.program import Array, Ref, padded
+from ..ir.program import Array, Index, Ref, padded
 from ..scene.resolve import parameters_of
 from ..scene.scene import Scene
 from ..scene.variant import EQUAL, SegmentRun, Shape, Stretch, runs_of, stretches_of
@@ -54,18 +54,40 @@ class Tail(Sizes):
         """Tell if the torso never moves."""
         return self.shape.fixed
 
-    def all_q(self, q: Array) -> Ref:
-        """Return all tail coordinates."""
-        return q.part(TORSO_NQ, self.nt)
+    @property
+    def free(self) -> int:
+        """1 if the torso moves, 0 on a fixed base: a factor of shapes."""
+        return 0 if self.fixed else 1
 
-    def all_v(self, v: Array) -> Ref:
-        """Return the rates, accelerations or forces of all tail coordinates."""
-        return v.part(TORSO_NV, self.nt)
+    @property
+    def torso_nq(self) -> int:
+        """Numbers of q before those of the tail: 7, or 0 on a fixed base."""
+        return self.nq - self.nt
 
     @property
     def torso_nv(self) -> int:
-        """Numbers of a velocity before those of the tail."""
+        """Numbers of a velocity before those of the tail: 6, or 0 on a fixed base."""
         return self.nv - self.nt
+
+    def all_q(self, q: Array) -> Ref:
+        """Return all tail coordinates."""
+        return q.part(self.torso_nq, self.nt)
+
+    def all_v(self, v: Array) -> Ref:
+        """Return the rates, accelerations or forces of all tail coordinates."""
+        return v.part(self.torso_nv, self.nt)
+
+    def segment_q(self, q: Array, i: Index | int) -> Ref:
+        """Return the coordinates of segment i."""
+        return q.part(self.torso_nq + PER_SEGMENT * i, PER_SEGMENT)
+
+    def segment_v(self, v: Array, i: Index | int) -> Ref:
+        """Return the rates, accelerations or forces of segment i."""
+        return v.part(self.torso_nv + PER_SEGMENT * i, PER_SEGMENT)
+
+    def coordinate_v(self, v: Array, k: Index | int) -> Ref:
+        """Return the rate, acceleration or force of tail coordinate k."""
+        return v.part(self.torso_nv + k, 1)
 
     @property
     def total(self) -> int:
@@ -165,8 +187,8 @@ class Tail(Sizes):
 
     @property
     def rotational(self) -> int:
-        """Rows of H without translation."""
-        return 3 + self.nt
+        """Rows of H without translation: those of the tail alone on a fixed base."""
+        return 3 * self.free + self.nt
 
     @property
     def rotational_row(self) -> int:

@@ -5,27 +5,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cache
 
+from . import program as ir
 from .algebra import Number
-from .program import (
-    Apply,
-    Array,
-    Call,
-    Copy,
-    Factor,
-    FactorPair,
-    Fill,
-    Guard,
-    Index,
-    Loop,
-    Program,
-    Ref,
-    Solve,
-    SolvePair,
-    Statement,
-    Unit,
-    When,
-    as_index,
-)
 from .step import Step, compacted
 
 
@@ -38,35 +19,35 @@ class Builder:
 
     name: str
     doc: str
-    arrays: list[Array] = field(default_factory=list)
-    _bodies: list[list[Statement]] = field(default_factory=lambda: [[]])
-    _columns: Index | None = None
+    arrays: list[ir.Array] = field(default_factory=list)
+    _bodies: list[list[ir.Statement]] = field(default_factory=lambda: [[]])
+    _columns: ir.Index | None = None
 
-    def declare(self, array: Array) -> Array:
+    def declare(self, array: ir.Array) -> ir.Array:
         """Declare an array; local names are unique within a program."""
         if any(a.name == array.name for a in self.arrays):
             raise ValueError(f"array {array.name} is declared twice in {self.name}")
         self.arrays.append(array)
         return array
 
-    def array(self, name: str, size: int, count: int = 1, role: str = "local") -> Array:
+    def array(self, name: str, size: int, count: int = 1, role: str = "local") -> ir.Array:
         """Declare an array of scalars."""
-        return self.declare(Array(name, role, size, count))
+        return self.declare(ir.Array(name, role, size, count))
 
-    def wide(self, name: str, size: int, lanes: int) -> Array:
+    def wide(self, name: str, size: int, lanes: int) -> ir.Array:
         """Declare a local array whose scalars have so many lanes; narrow ones where they are 0."""
-        return self.declare(Array(name, "local", size, lanes=lanes))
+        return self.declare(ir.Array(name, "local", size, lanes=lanes))
 
-    def constant(self, name: str, values: Iterable[Number]) -> Array:
+    def constant(self, name: str, values: Iterable[Number]) -> ir.Array:
         """Declare an array whose values are known at generation."""
         numbers = tuple(values)
-        return self.declare(Array(name, "constant", len(numbers), values=numbers))
+        return self.declare(ir.Array(name, "constant", len(numbers), values=numbers))
 
-    def emit(self, statement: Statement) -> None:
+    def emit(self, statement: ir.Statement) -> None:
         """Append a statement to the innermost open loop."""
         self._bodies[-1].append(statement)
 
-    def apply(self, step: Step, reads: dict[str, Ref], **writes: Ref) -> None:
+    def apply(self, step: Step, reads: dict[str, ir.Ref], **writes: ir.Ref) -> None:
         """Apply a step to named vectors; outputs that are not named are dropped.
 
         A trailing underscore of an output's name adds to the target instead of storing.
@@ -74,7 +55,9 @@ class Builder:
         targets = {name.removesuffix("_"): (ref, name[-1] == "_") for name, ref in writes.items()}
         step = narrowed(step, set(targets))
         outputs = [targets[name] for name, _ in step.outputs]
-        call = Apply.named(step, reads, [ref for ref, _ in outputs], [adds for _, adds in outputs])
+        call = ir.Apply.named(
+            step, reads, [ref for ref, _ in outputs], [adds for _, adds in outputs]
+        )
         if any(ref.lanes for ref in call.writes):
             call = replace(call, columns=self._columns)
 
@@ -86,65 +69,65 @@ class Builder:
                 )
         self.emit(call)
 
-    def fill(self, target: Ref, *values: Number) -> None:
+    def fill(self, target: ir.Ref, *values: Number) -> None:
         """Store constants; one value is repeated."""
-        self.emit(Fill(target, values * target.size if len(values) == 1 else values))
+        self.emit(ir.Fill(target, values * target.size if len(values) == 1 else values))
 
-    def copy(self, target: Ref, source: Ref, adds: bool = False) -> None:
+    def copy(self, target: ir.Ref, source: ir.Ref, adds: bool = False) -> None:
         """Copy scalars, or add them."""
         if target.size != source.size:
             raise ValueError(
                 f"{self.name}: {source.size} scalars of {source.array.name} do not fit "
                 f"{target.array.name}"
             )
-        self.emit(Copy(target, source, adds))
+        self.emit(ir.Copy(target, source, adds))
 
-    def unit(self, target: Ref, first: Index | int) -> None:
+    def unit(self, target: ir.Ref, first: ir.Index | int) -> None:
         """Store unit vectors, the first of them 1 in lane ``first``."""
-        self.emit(Unit(target, as_index(first)))
+        self.emit(ir.Unit(target, ir.as_index(first)))
 
-    def factor(self, matrix: Array, size: int) -> None:
+    def factor(self, matrix: ir.Array, size: int) -> None:
         """Factor a matrix in place."""
-        self.emit(Factor(matrix, size))
+        self.emit(ir.Factor(matrix, size))
 
-    def solve(self, matrix: Array, x: Ref) -> None:
+    def solve(self, matrix: ir.Array, x: ir.Ref) -> None:
         """Solve in place with a factored matrix."""
-        self.emit(Solve(matrix, x))
+        self.emit(ir.Solve(matrix, x))
 
-    def factor_pair(self, matrix: Array, size: int) -> None:
+    def factor_pair(self, matrix: ir.Array, size: int) -> None:
         """Factor a pair of triangles in place."""
-        self.emit(FactorPair(matrix, size))
+        self.emit(ir.FactorPair(matrix, size))
 
-    def solve_pair(self, matrix: Array, x: Ref) -> None:
+    def solve_pair(self, matrix: ir.Array, x: ir.Ref) -> None:
         """Solve in place with a factored pair of triangles."""
-        self.emit(SolvePair(matrix, x))
+        self.emit(ir.SolvePair(matrix, x))
 
-    def guard(self, scalar: Ref, status: str, *protects: Ref) -> None:
+    def guard(self, scalar: ir.Ref, status: str, *protects: ir.Ref) -> None:
         """Give up with a status unless all scalars of a vector are positive."""
-        self.emit(Guard(scalar, status, protects))
+        self.emit(ir.Guard(scalar, status, protects))
 
-    def call(self, program: Program, **arguments: Array) -> None:
+    def call(self, program: ir.Program, **arguments: ir.Array) -> None:
         """Run another program on arrays of this one."""
         for array in program.of_role("input") + program.of_role("output"):
             if array.name not in arguments:
                 raise ValueError(
                     f"{program.name} in {self.name}: {array.role} {array.name} is not bound"
                 )
-        self.emit(Call(program, tuple(arguments.items())))
+        self.emit(ir.Call(program, tuple(arguments.items())))
 
     @contextmanager
     def loop(
-        self, var: str, count: Index | int, downward: bool = False, start: Index | int = 0
-    ) -> Iterator[Index]:
+        self, var: str, count: ir.Index | int, downward: bool = False, start: ir.Index | int = 0
+    ) -> Iterator[ir.Index]:
         """Open a loop from ``start`` to ``count``; yields its variable as an index."""
         self._bodies.append([])
-        yield Index(((var, 1),))
+        yield ir.Index(((var, 1),))
         body = tuple(self._bodies.pop())
-        if as_index(start) != as_index(count) and body:
-            self.emit(Loop(var, as_index(start), as_index(count), downward, body))
+        if ir.as_index(start) != ir.as_index(count) and body:
+            self.emit(ir.Loop(var, ir.as_index(start), ir.as_index(count), downward, body))
 
     @contextmanager
-    def first_lanes(self, count: Index) -> Iterator[None]:
+    def first_lanes(self, count: ir.Index) -> Iterator[None]:
         """Apply steps to so many lanes of what is wide; the others are zero, or nobody reads
         them.
         """
@@ -153,15 +136,15 @@ class Builder:
         self._columns = before
 
     @contextmanager
-    def when(self, scalar: Ref) -> Iterator[None]:
+    def when(self, scalar: ir.Ref) -> Iterator[None]:
         """Open what is run only where a scalar is positive; the body must not change it."""
         self._bodies.append([])
         yield
-        self.emit(When(scalar, tuple(self._bodies.pop())))
+        self.emit(ir.When(scalar, tuple(self._bodies.pop())))
 
-    def finish(self) -> Program:
+    def finish(self) -> ir.Program:
         """Return the recorded program."""
-        return Program(self.name, self.doc, tuple(self.arrays), tuple(self._bodies[0]))
+        return ir.Program(self.name, self.doc, tuple(self.arrays), tuple(self._bodies[0]))
 
 
 @cache

@@ -2,7 +2,7 @@
 
 from .dataflow import inlined
 from .interpret import Run
-from .program import Apply, Loop, Program, Statement, When, statements
+from .program import Apply, Body, Loop, Program, When, statements
 from .step import Step
 
 
@@ -62,7 +62,7 @@ def applied(program: Program) -> int:
     return _applied(inlined(program).body, {})
 
 
-def _applied(body: tuple[Statement, ...], at: dict[str, int]) -> int:
+def _applied(body: Body, at: dict[str, int]) -> int:
     count = 0
     for statement in body:
         if isinstance(statement, Loop):

@@ -1,35 +1,16 @@
 """Dependences in a program, and programs rewritten: pruned, inlined, on other arrays."""
 
+import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import fields, replace
-from functools import singledispatch
+from functools import cache
 from typing import Any
 
+from . import program as ir
 from .builder import narrowed
-from .program import (
-    Apply,
-    Array,
-    Call,
-    Copy,
-    Factor,
-    FactorPair,
-    Fill,
-    Guard,
-    Loop,
-    Program,
-    Ref,
-    Solve,
-    SolvePair,
-    Statement,
-    Unit,
-    When,
-    statements,
-)
-
-Body = tuple[Statement, ...]
 
 
-def overlap(ref: Ref, other: Ref) -> bool:
+def overlap(ref: ir.Ref, other: ir.Ref) -> bool:
     """Tell if two references may share a number."""
     if ref.array.name != other.array.name:
         return False
@@ -41,96 +22,90 @@ def overlap(ref: Ref, other: Ref) -> bool:
     return first <= other_last and other_first <= last
 
 
-@singledispatch
-def reads(statement: Statement) -> tuple[Ref, ...]:
+def reads(statement: ir.Statement) -> tuple[ir.Ref, ...]:
     """Return what a statement reads, including targets that it adds to or overwrites in place."""
+    match statement:
+        case ir.Apply():
+            targets = zip(statement.writes, statement.adds, strict=True)
+            return (*statement.reads, *(ref for ref, adds in targets if adds))
+        case ir.Copy():
+            return (statement.source, statement.target) if statement.adds else (statement.source,)
+        case ir.Fill() | ir.Unit():
+            return ()
+        case ir.Factor() | ir.FactorPair():
+            return (statement.matrix[0],)
+        case ir.Solve() | ir.SolvePair():
+            return (statement.matrix[0], statement.x)
+        case ir.Guard():
+            return (statement.scalar,)
     raise TypeError(f"no rule says what {type(statement).__name__} reads")
 
 
-@reads.register
-def _(statement: Apply) -> tuple[Ref, ...]:
-    sums = [ref for ref, adds in zip(statement.writes, statement.adds, strict=True) if adds]
-    return (*statement.reads, *sums)
-
-
-@reads.register
-def _(statement: Copy) -> tuple[Ref, ...]:
-    if statement.adds:
-        return (statement.source, statement.target)
-    return (statement.source,)
-
-
-@reads.register
-def _(statement: Fill | Unit) -> tuple[Ref, ...]:
-    return ()
-
-
-@reads.register
-def _(statement: Factor | FactorPair) -> tuple[Ref, ...]:
-    return (statement.matrix[0],)
-
-
-@reads.register
-def _(statement: Solve | SolvePair) -> tuple[Ref, ...]:
-    return (statement.matrix[0], statement.x)
-
-
-@reads.register
-def _(statement: Guard) -> tuple[Ref, ...]:
-    return (statement.scalar,)
-
-
-@singledispatch
-def writes(statement: Statement) -> tuple[Ref, ...]:
+def writes(statement: ir.Statement) -> tuple[ir.Ref, ...]:
     """Return what a statement writes."""
+    match statement:
+        case ir.Apply():
+            return statement.writes
+        case ir.Copy() | ir.Fill() | ir.Unit():
+            return (statement.target,)
+        case ir.Factor() | ir.FactorPair():
+            return (statement.matrix[0],)
+        case ir.Solve() | ir.SolvePair():
+            return (statement.x,)
+        case ir.Guard():
+            return ()
     raise TypeError(f"no rule says what {type(statement).__name__} writes")
 
 
-@writes.register
-def _(statement: Apply) -> tuple[Ref, ...]:
-    return statement.writes
-
-
-@writes.register
-def _(statement: Copy | Fill | Unit) -> tuple[Ref, ...]:
-    return (statement.target,)
-
-
-@writes.register
-def _(statement: Factor | FactorPair) -> tuple[Ref, ...]:
-    return (statement.matrix[0],)
-
-
-@writes.register
-def _(statement: Solve | SolvePair) -> tuple[Ref, ...]:
-    return (statement.x,)
-
-
-@writes.register
-def _(statement: Guard) -> tuple[Ref, ...]:
-    return ()
-
-
-def names(refs: Iterable[Ref]) -> set[str]:
+def names(refs: Iterable[ir.Ref]) -> set[str]:
     """Return the names of the arrays that references point into."""
     return {ref.array.name for ref in refs}
 
 
-def rewritten(body: Body, rewrite: Callable[[Statement], Iterable[Statement]]) -> Body:
+@cache
+def _method_name(name: str) -> str:
+    """Return the name of a class in the style of a method."""
+    return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
+
+
+def rule_of(visitor: object, statement: ir.Statement, does: str) -> Callable[..., Any]:
+    """Return the method of a visitor that is named like a statement: ``solve_pair`` of SolvePair.
+
+    does: what the visitor's methods do, for the error if it has none.
+    """
+    name = type(statement).__name__
+    rule = getattr(visitor, _method_name(name), None)
+    if rule is None:
+        raise TypeError(f"no rule {does} {name}")
+    return rule
+
+
+def read_names(body: ir.Body) -> set[str]:
+    """Return the names of the arrays that statements read, or hand to other programs."""
+    found: set[str] = set()
+    for statement, _ in ir.statements(body):
+        if isinstance(statement, ir.Call):
+            found |= {array.name for _, array in statement.arguments}
+        else:
+            found |= names(reads(statement))
+    return found
+
+
+def rewritten(body: ir.Body, rewrite: Callable[[ir.Statement], Iterable[ir.Statement]]) -> ir.Body:
     """Return a loop nest with each statement replaced by those that ``rewrite`` returns.
 
     A condition is rewritten without its body; loops that are empty then vanish.
     """
-    out: list[Statement] = []
+    out: list[ir.Statement] = []
     for statement in body:
-        if isinstance(statement, Loop):
+        if isinstance(statement, ir.Loop):
             inner = rewritten(statement.body, rewrite)
             if inner:
                 out.append(replace(statement, body=inner))
-        elif isinstance(statement, When):
+        elif isinstance(statement, ir.When):
             inner = rewritten(statement.body, rewrite)
             for head in rewrite(replace(statement, body=())):
-                assert isinstance(head, When), "a condition is rewritten as a condition"
+                assert isinstance(head, ir.When), "a condition is rewritten as a condition"
                 out.append(replace(head, body=inner))
         else:
             out += rewrite(statement)
@@ -138,44 +113,44 @@ def rewritten(body: Body, rewrite: Callable[[Statement], Iterable[Statement]]) -
 
 
 def _fixpoint(
-    body: Body, start: Collection[str], more: Callable[[Statement, set[str]], set[str]]
+    body: ir.Body, start: Collection[str], more: Callable[[ir.Statement, set[str]], set[str]]
 ) -> set[str]:
     """Return names with what each statement adds to them, until none adds any."""
     reached, before = set(start), -1
     while before < len(reached):
         before = len(reached)
-        for statement, _ in statements(body):
+        for statement, _ in ir.statements(body):
             reached |= more(statement, reached)
     return reached
 
 
-def forward_slice(body: Body, start: Collection[str]) -> set[str]:
+def forward_slice(body: ir.Body, start: Collection[str]) -> set[str]:
     """Return the arrays that may depend on the arrays ``start``, by name."""
 
-    def more(statement: Statement, reached: set[str]) -> set[str]:
+    def more(statement: ir.Statement, reached: set[str]) -> set[str]:
         return names(writes(statement)) if names(reads(statement)) & reached else set()
 
     return _fixpoint(body, start, more)
 
 
-def decided_slice(body: Body, start: Collection[str]) -> set[str]:
+def decided_slice(body: ir.Body, start: Collection[str]) -> set[str]:
     """Return what ``forward_slice`` does, and the arrays that conditions on these decide about."""
     reached, before = forward_slice(body, start), -1
     while before < len(reached):
         before = len(reached)
-        for statement, around in statements(body):
-            conditions = [outer.scalar for outer in around if isinstance(outer, When)]
+        for statement, around in ir.statements(body):
+            conditions = [outer.scalar for outer in around if isinstance(outer, ir.When)]
             if names(conditions) & reached:
                 reached |= names(writes(statement))
         reached = forward_slice(body, reached)
     return reached
 
 
-def backward_slice(body: Body, end: Collection[str]) -> set[str]:
+def backward_slice(body: ir.Body, end: Collection[str]) -> set[str]:
     """Return the arrays that the arrays ``end`` may depend on, by name."""
 
-    def more(statement: Statement, reached: set[str]) -> set[str]:
-        targets = statement.protects if isinstance(statement, Guard) else writes(statement)
+    def more(statement: ir.Statement, reached: set[str]) -> set[str]:
+        targets = statement.protects if isinstance(statement, ir.Guard) else writes(statement)
         if not names(targets) & reached:
             return set()
         return names(reads(_with_outputs(statement, reached)))
@@ -183,9 +158,9 @@ def backward_slice(body: Body, end: Collection[str]) -> set[str]:
     return _fixpoint(body, end, more)
 
 
-def _with_outputs(statement: Statement, needed: Collection[str]) -> Statement:
+def _with_outputs(statement: ir.Statement, needed: Collection[str]) -> ir.Statement:
     """Return an Apply without the outputs that go to unneeded arrays."""
-    if not isinstance(statement, Apply):
+    if not isinstance(statement, ir.Apply):
         return statement
     kept = [k for k, ref in enumerate(statement.writes) if ref.array.name in needed]
     if len(kept) == len(statement.writes):
@@ -193,11 +168,11 @@ def _with_outputs(statement: Statement, needed: Collection[str]) -> Statement:
     step = narrowed(statement.step, {statement.step.outputs[k][0] for k in kept})
     outputs = [statement.writes[k] for k in kept]
     sums = [statement.adds[k] for k in kept]
-    narrow = Apply.named(step, statement.inputs(), outputs, sums)
+    narrow = ir.Apply.named(step, statement.inputs(), outputs, sums)
     return replace(narrow, columns=statement.columns)
 
 
-def pruned(program: Program) -> Program:
+def pruned(program: ir.Program) -> ir.Program:
     """Return a program without the statements and arrays that no output needs.
 
     Statements are moved onto the arrays that are declared by the names of theirs.
@@ -205,8 +180,8 @@ def pruned(program: Program) -> Program:
     array = {a.name: a for a in program.arrays}
     needed = backward_slice(program.body, {a.name for a in program.of_role("output")})
 
-    def rewrite(statement: Statement) -> Iterator[Statement]:
-        if isinstance(statement, Guard):
+    def rewrite(statement: ir.Statement) -> Iterator[ir.Statement]:
+        if isinstance(statement, ir.Guard):
             protects = tuple(ref for ref in statement.protects if ref.array.name in needed)
             if protects:
                 yield with_arrays(replace(statement, protects=protects), array)
@@ -218,40 +193,40 @@ def pruned(program: Program) -> Program:
     return replace(program, arrays=tuple(a for a in program.arrays if a.name in kept), body=body)
 
 
-def inner_arrays(program: Program) -> tuple[Array, ...]:
+def inner_arrays(program: ir.Program) -> tuple[ir.Array, ...]:
     """Return a program's arrays as a part of another one: its outputs are local."""
     return tuple(replace(a, role="local") if a.role == "output" else a for a in program.arrays)
 
 
-def with_arrays(statement: Statement, array: Mapping[str, Array]) -> Statement:
+def with_arrays(statement: ir.Statement, array: Mapping[str, ir.Array]) -> ir.Statement:
     """Return a statement on other arrays, given by the names of its own."""
 
-    def moved(ref: Ref) -> Ref:
+    def moved(ref: ir.Ref) -> ir.Ref:
         return replace(ref, array=array[ref.array.name])
 
     changes: dict[str, Any] = {}
     for field in fields(statement):
         value = getattr(statement, field.name)
-        if isinstance(value, Ref):
+        if isinstance(value, ir.Ref):
             changes[field.name] = moved(value)
-        elif isinstance(value, Array):
+        elif isinstance(value, ir.Array):
             changes[field.name] = array[value.name]
         elif field.name in ("reads", "writes", "protects"):
             changes[field.name] = tuple(moved(ref) for ref in value)
     return replace(statement, **changes)
 
 
-def on_arrays(body: Body, array: Mapping[str, Array]) -> Body:
+def on_arrays(body: ir.Body, array: Mapping[str, ir.Array]) -> ir.Body:
     """Return a loop nest on other arrays, given by the names of its own."""
     return rewritten(body, lambda statement: (with_arrays(statement, array),))
 
 
-def inlined(program: Program) -> Program:
+def inlined(program: ir.Program) -> ir.Program:
     """Return a program with the programs that it calls written out, their own arrays renamed."""
     arrays = {a.name: a for a in program.arrays}
 
-    def rewrite(statement: Statement) -> Iterable[Statement]:
-        if not isinstance(statement, Call):
+    def rewrite(statement: ir.Statement) -> Iterable[ir.Statement]:
+        if not isinstance(statement, ir.Call):
             return (statement,)
         inner, arguments = inlined(statement.program), dict(statement.arguments)
         array = {}
@@ -263,7 +238,7 @@ def inlined(program: Program) -> Program:
     return replace(program, arrays=tuple(arrays.values()), body=body)
 
 
-def _adopted(array: Array, program: str, arrays: dict[str, Array]) -> Array:
+def _adopted(array: ir.Array, program: str, arrays: dict[str, ir.Array]) -> ir.Array:
     """Return an array of a called program: the shared parameter, or a new one of a new name."""
     if array.role == "parameters":
         return arrays[array.name]

@@ -9,27 +9,10 @@ from collections.abc import Callable, Iterable
 from fractions import Fraction
 from typing import Any
 
+from . import program as ir
 from .algebra import Algebra, Number, positive_in_lanes
-from .dataflow import inlined
+from .dataflow import inlined, rule_of
 from .ldl import ldl_factor, ldl_solve, pair_factor, pair_solve
-from .program import (
-    Apply,
-    Array,
-    Copy,
-    Factor,
-    FactorPair,
-    Fill,
-    Guard,
-    Loop,
-    Program,
-    Ref,
-    Solve,
-    SolvePair,
-    Statement,
-    Unit,
-    When,
-    padded,
-)
 from .step import Step
 from .tape import Tape, replay
 
@@ -92,27 +75,12 @@ class Run:
 
     values: the scalars of each array, by its name.
     guards: what must be positive, each with the status that is reported if it is not.
-    rules: what runs each type of statement, under given values of the loop variables.
     """
 
-    def __init__(self, program: Program, algebra: Algebra, arguments: dict[str, list]):
+    def __init__(self, program: ir.Program, algebra: Algebra, arguments: dict[str, list]):
         program = inlined(program)
         self.algebra = algebra
         self.guards: list[tuple[str, Any]] = []
-        self.rules: dict[type, Callable[[Any, dict[str, int]], None]] = {
-            Apply: self.apply,
-            Copy: self.copy,
-            Factor: self.factor,
-            FactorPair: self.factor_pair,
-            Fill: self.fill,
-            Guard: self.guard,
-            Loop: self.loop,
-            Solve: self.solve,
-            SolvePair: self.solve_pair,
-            Unit: self.unit,
-            When: self.when,
-        }
-
         self.values: dict[str, list] = {a.name: [None] * a.length for a in program.arrays}
         for array in program.of_role("constant"):
             self.values[array.name] = [algebra.const(value) for value in array.values]
@@ -120,22 +88,20 @@ class Run:
             self.values[name] = list(scalars)
         self.body(program.body, {})
 
-    def body(self, body: tuple[Statement, ...], at: dict[str, int]) -> None:
+    def body(self, body: ir.Body, at: dict[str, int]) -> None:
         """Run statements in order."""
         for statement in body:
-            rule = self.rules.get(type(statement))
-            if rule is None:
-                raise TypeError(f"no rule runs {type(statement).__name__}")
+            rule = rule_of(self, statement, "runs")
             rule(statement, at)
 
     # What references mean
 
-    def slots(self, ref: Ref, at: dict[str, int]) -> range:
+    def slots(self, ref: ir.Ref, at: dict[str, int]) -> range:
         """Return the positions of the scalars of a reference."""
         first = ref.offset.at(at)
         return range(first, first + ref.size * ref.stride, ref.stride)
 
-    def places(self, ref: Ref, at: dict[str, int]) -> list[tuple[int, int]]:
+    def places(self, ref: ir.Ref, at: dict[str, int]) -> list[tuple[int, int]]:
         """Return the scalars and lanes of a reference to lanes."""
         if ref.lane is None:
             raise ValueError(f"a reference to scalars of {ref.array.name} means no lanes")
@@ -144,14 +110,14 @@ class Run:
             return [(first + k, lane) for k in range(ref.size)]
         return [(first, lane + k) for k in range(ref.size)]
 
-    def read(self, ref: Ref, at: dict[str, int]) -> list:
+    def read(self, ref: ir.Ref, at: dict[str, int]) -> list:
         """Return the scalars of a reference."""
         array = self.values[ref.array.name]
         if ref.lane:
             return [self.algebra.lane(array[k], lane) for k, lane in self.places(ref, at)]
         return [array[k] for k in self.slots(ref, at)]
 
-    def write(self, ref: Ref, at: dict[str, int], scalars: Iterable) -> None:
+    def write(self, ref: ir.Ref, at: dict[str, int], scalars: Iterable) -> None:
         """Store scalars."""
         array = self.values[ref.array.name]
         if ref.lane:
@@ -161,7 +127,7 @@ class Run:
         for k, value in zip(self.slots(ref, at), scalars, strict=True):
             array[k] = value
 
-    def store(self, ref: Ref, at: dict[str, int], scalars: list, adds: bool) -> None:
+    def store(self, ref: ir.Ref, at: dict[str, int], scalars: list, adds: bool) -> None:
         """Store scalars, or add them to what is there."""
         if adds:
             pairs = zip(self.read(ref, at), scalars, strict=True)
@@ -170,13 +136,13 @@ class Run:
 
     # Loops and conditions
 
-    def loop(self, loop: Loop, at: dict[str, int]) -> None:
+    def loop(self, loop: ir.Loop, at: dict[str, int]) -> None:
         """Run a loop."""
         span = range(loop.start.at(at), loop.stop.at(at))
         for value in reversed(span) if loop.downward else span:
             self.body(loop.body, at | {loop.var: value})
 
-    def when(self, when: When, at: dict[str, int]) -> None:
+    def when(self, when: ir.When, at: dict[str, int]) -> None:
         """Run what a condition asks for."""
         condition = self.read(when.scalar, at)[0]
         positive = self.algebra.decide(condition)
@@ -185,7 +151,7 @@ class Run:
         elif positive:
             self.body(when.body, at)
 
-    def choose(self, when: When, at: dict[str, int], condition: Any) -> None:
+    def choose(self, when: ir.When, at: dict[str, int], condition: Any) -> None:
         """Run a conditional body, and select new or old values; the algebra cannot decide."""
         before = {name: list(scalars) for name, scalars in self.values.items()}
         guards = len(self.guards)
@@ -202,7 +168,7 @@ class Run:
 
     # Statements that store
 
-    def apply(self, call: Apply, at: dict[str, int]) -> None:
+    def apply(self, call: ir.Apply, at: dict[str, int]) -> None:
         """Run a step: read everything, then write everything."""
         scalars = [scalar for ref in call.reads for scalar in self.read(ref, at)]
         results = self.results(call.step, scalars)
@@ -216,51 +182,51 @@ class Run:
         nodes = replay(step.nodes, scalars, self.algebra)
         return [nodes[r] for r in step.results]
 
-    def fill(self, fill: Fill, at: dict[str, int]) -> None:
+    def fill(self, fill: ir.Fill, at: dict[str, int]) -> None:
         """Store constants."""
         self.write(fill.target, at, [self.algebra.const(value) for value in fill.values])
 
-    def unit(self, unit: Unit, at: dict[str, int]) -> None:
+    def unit(self, unit: ir.Unit, at: dict[str, int]) -> None:
         """Store unit vectors."""
         first, lanes = unit.first.at(at), unit.target.lanes
         vectors = [self.algebra.unit(first + k, lanes) for k in range(unit.target.size)]
         self.write(unit.target, at, vectors)
 
-    def copy(self, copy: Copy, at: dict[str, int]) -> None:
+    def copy(self, copy: ir.Copy, at: dict[str, int]) -> None:
         """Copy or add scalars."""
         self.store(copy.target, at, self.read(copy.source, at), copy.adds)
 
-    def guard(self, guard: Guard, at: dict[str, int]) -> None:
+    def guard(self, guard: ir.Guard, at: dict[str, int]) -> None:
         """Record what must be positive."""
         self.guards += [(guard.status, value) for value in self.read(guard.scalar, at)]
 
     # Linear equations
 
-    def triangle(self, matrix: Array, size: int, first: int = 0) -> list[list]:
+    def triangle(self, matrix: ir.Array, size: int, first: int = 0) -> list[list]:
         """Return the lower triangle that begins at row ``first`` of a matrix, row by row."""
-        scalars, stored = self.values[matrix.name], padded(size)
+        scalars, stored = self.values[matrix.name], ir.padded(size)
         starts = [(first + k) * stored for k in range(size)]
         return [scalars[start : start + k + 1] for k, start in enumerate(starts)]
 
-    def store_triangle(self, matrix: Array, rows: list[list], first: int = 0) -> None:
+    def store_triangle(self, matrix: ir.Array, rows: list[list], first: int = 0) -> None:
         """Store a lower triangle."""
-        stored = padded(len(rows))
+        stored = ir.padded(len(rows))
         for k, row in enumerate(rows):
             start = (first + k) * stored
             self.values[matrix.name][start : start + k + 1] = row
 
-    def factor(self, factor: Factor, at: dict[str, int]) -> None:
+    def factor(self, factor: ir.Factor, at: dict[str, int]) -> None:
         """Factor a symmetric matrix."""
         rows, pivots = ldl_factor(self.algebra, self.triangle(factor.matrix, factor.size))
         self.guards += [("NOT_POSITIVE_DEFINITE", pivot) for pivot in pivots]
         self.store_triangle(factor.matrix, rows)
 
-    def solve(self, solve: Solve, at: dict[str, int]) -> None:
+    def solve(self, solve: ir.Solve, at: dict[str, int]) -> None:
         """Solve with a factored matrix."""
         rows = self.triangle(solve.matrix, solve.x.size)
         self.write(solve.x, at, ldl_solve(self.algebra, rows, self.read(solve.x, at)))
 
-    def factor_pair(self, factor: FactorPair, at: dict[str, int]) -> None:
+    def factor_pair(self, factor: ir.FactorPair, at: dict[str, int]) -> None:
         """Factor a pair of triangles."""
         size = factor.size
         lower, upper = (self.triangle(factor.matrix, size, first) for first in (0, size))
@@ -269,7 +235,7 @@ class Run:
         self.store_triangle(factor.matrix, lower)
         self.store_triangle(factor.matrix, upper, size)
 
-    def solve_pair(self, solve: SolvePair, at: dict[str, int]) -> None:
+    def solve_pair(self, solve: ir.SolvePair, at: dict[str, int]) -> None:
         """Solve with a factored pair."""
         size = solve.x.size
         lower, upper = (self.triangle(solve.matrix, size, first) for first in (0, size))
@@ -277,7 +243,7 @@ class Run:
 
 
 def unroll(
-    program: Program, fixed: dict[str, list] | None = None
+    program: ir.Program, fixed: dict[str, list] | None = None
 ) -> tuple[Tape, dict[str, list[int]], list[tuple[str, int]]]:
     """Record a program as one straight line.
 

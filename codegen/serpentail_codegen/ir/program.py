@@ -187,7 +187,7 @@ class Loop:
     start: Index
     stop: Index
     downward: bool
-    body: tuple["Statement", ...]
+    body: "Body"
 
 
 @dataclass(frozen=True)
@@ -195,7 +195,7 @@ class When:
     """Run the body where a scalar is positive."""
 
     scalar: Ref
-    body: tuple["Statement", ...]
+    body: "Body"
 
 
 @dataclass(frozen=True)
@@ -260,6 +260,7 @@ class Call:
     arguments: tuple[tuple[str, Array], ...]
 
 
+Body = tuple["Statement", ...]
 LinearEquations = Factor | Solve | FactorPair | SolvePair
 Statement = Apply | Fill | Unit | Copy | Loop | When | LinearEquations | Guard | Call
 STATEMENTS: tuple[type, ...] = get_args(Statement)
@@ -272,7 +273,7 @@ class Program:
     name: str
     doc: str
     arrays: tuple[Array, ...]
-    body: tuple["Statement", ...]
+    body: "Body"
 
     def of_role(self, role: str) -> tuple[Array, ...]:
         """Return the arrays of a role, in the order in which they were declared."""
@@ -280,7 +281,7 @@ class Program:
 
 
 def statements(
-    body: tuple[Statement, ...],
+    body: Body,
 ) -> Iterator[tuple[Statement, tuple[Loop | When, ...]]]:
     """Yield every innermost statement with the loops and conditions around it, outermost first."""
     for statement in body:

@@ -8,7 +8,7 @@ the moment about the COM that is left for omega_dot, ``net`` the force.
 
 from sympy import Matrix, eye
 
-from .shapes import M33, V1, V3, V4, V6
+from .shapes import M33, V1, V3, V4, V6, V3x4
 
 # ---- the torso from the tail ---------------------------------------------------------------------
 
@@ -16,13 +16,6 @@ from .shapes import M33, V1, V3, V4, V6
 def momentum_in_torso(let, R: M33, angular: V3) -> dict:
     """The conserved angular momentum in torso axes, R^T h."""
     return {"momentum": R.T * angular}
-
-
-def momentum_left(let, coupling: V3, rate: V1) -> dict:
-    """The part of the angular momentum that a rate of the tail leaves for the torso: minus N_k
-    q_dot_k.
-    """
-    return {"momentum": -rate[0] * coupling}
 
 
 def pair_without_torso(
@@ -46,11 +39,11 @@ def torso_load(let, com: V3, force: V3, moment: V3) -> dict:
     return {"net": -force, "turn_load": com.cross(force) - moment}
 
 
-def turned_back_by(let, gain: V3, rate: V1) -> dict:
-    """Rotation of the torso by a rate, or a second derivative, of a tail coordinate: minus B_k
-    times it.
+def taken_back(let, gain: V3, rate: V1) -> dict:
+    """Part of a rotation of the torso, or of its momentum, that a rate of a tail coordinate takes:
+    minus B_k, or N_k, times it.
     """
-    return {"turn": -rate[0] * gain}
+    return {"part": -rate[0] * gain}
 
 
 def moved_back_by(let, inverse_mass: V1, column: V6, rate: V1) -> dict:
@@ -59,7 +52,7 @@ def moved_back_by(let, inverse_mass: V1, column: V6, rate: V1) -> dict:
 
 
 def pushed(let, inverse_mass: V1, net: V3) -> dict:
-    """Acceleration of the COM by a net force."""
+    """Acceleration of the COM by a net force; its velocity by a momentum."""
     return {"shift": inverse_mass[0] * net}
 
 
@@ -80,18 +73,6 @@ def turn_of_quaternion(let, quaternion: V4, momentum: V3) -> dict:
     twice = let("twice", 2 / quaternion.dot(quaternion))
     turns = Matrix([[-x, w, z, -y], [-y, -z, w, x], [-z, y, -x, w]])
     return {f"column_{k}": twice * momentum.cross(turns.col(k)) for k in range(4)}
-
-
-def quaternion_of_turning(let, quaternion: V4, omega: V3) -> dict:
-    """quaternion times (0, omega) / 2."""
-    w, x, y, z = quaternion
-    rate = [
-        -(x * omega[0] + y * omega[1] + z * omega[2]),
-        w * omega[0] + y * omega[2] - z * omega[1],
-        w * omega[1] + z * omega[0] - x * omega[2],
-        w * omega[2] + x * omega[1] - y * omega[0],
-    ]
-    return {"rate": Matrix(rate) / 2}
 
 
 def turning_by_quaternion(let, omega: V3) -> dict:
@@ -171,9 +152,9 @@ def weighted(let, weight: V1, by_omega: V3) -> dict:
     return {"gradient": -weight[0] * by_omega}
 
 
-def by_quaternion(let, row: V3, turn_0: V3, turn_1: V3, turn_2: V3, turn_3: V3) -> dict:
+def by_quaternion(let, row: V3, turn: V3x4) -> dict:
     """Slopes by the quaternion's numbers from those by the momentum in torso axes."""
-    return {"row": Matrix([row.dot(turn) for turn in (turn_0, turn_1, turn_2, turn_3)])}
+    return {"row": Matrix([row.dot(column) for column in turn])}
 
 
 # ---- curvature -----------------------------------------------------------------------------------
@@ -189,11 +170,6 @@ def torso_weights(let, inverse_mass: V1, com: V3, move: V3, turn: V3) -> dict:
 def tail_weight(let, weight: V1, move: V3, turn: V3, column: V6, gain: V3) -> dict:
     """Weight of the second derivative of a tail coordinate, with the torso following it."""
     return {"weight": [weight[0] - column[0:3, :].dot(move) - gain.dot(turn)]}
-
-
-def recoil(let, inverse_mass: V1, momentum: V3) -> dict:
-    """Motion of B that balances a momentum; the argument is minus that momentum."""
-    return {"shift": inverse_mass[0] * momentum}
 
 
 def crossed(let, weight: V3, change: V3) -> dict:

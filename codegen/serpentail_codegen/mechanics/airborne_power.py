@@ -6,11 +6,22 @@ Second derivatives of airborne motion are made from these.
 
 from sympy import Matrix
 
-from .arc import segment_velocity
-from .arc_inertia import segment_momentum
+from .arc import ArcTip, segment_velocity
+from .arc_inertia import ArcInertia, segment_momentum
 from .arc_wrench import segment_power
 from .link import link_angular_velocity, link_linear_velocity, link_momentum, link_power
-from .shapes import M33, V1, V2, V3, V4, V6, V8, V12, V16
+from .shapes import (
+    V1,
+    V2,
+    V3,
+    V4,
+    V6,
+    V8,
+    V16,
+    CoordinateMotion,
+    FrameMotion,
+    VirtualMotion,
+)
 
 
 def torso_momentum_power(
@@ -24,15 +35,10 @@ def torso_momentum_power(
 def link_power_and_momentum(
     let,
     joint: V4,
-    rates: V2,
-    accelerations: V2,
-    virtual_rates: V2,
+    moving: CoordinateMotion,
     link: V6,
-    w: V3,
-    w_dot: V3,
-    a: V3,
-    w_virtual: V3,
-    u_virtual: V3,
+    base: FrameMotion,
+    virtual: VirtualMotion,
     u: V3,
     w_rigid: V3,
     u_rigid: V3,
@@ -40,19 +46,7 @@ def link_power_and_momentum(
     """``link_power``, and the link's momentum times a virtual motion of the animal as one rigid
     body; the velocity ``u`` and that motion are carried on, too.
     """
-    power = link_power(
-        let,
-        joint,
-        rates,
-        accelerations,
-        virtual_rates,
-        link,
-        w,
-        w_dot,
-        a,
-        w_virtual,
-        u_virtual,
-    )
+    power = link_power(let, joint, moving, link, base, virtual)
     real = {k: let(k, x) for k, x in link_linear_velocity(let, joint, link, power["w"], u).items()}
     F = let("p", link_momentum(let, link, power["w"], real["u_joint"])["F"])
 
@@ -67,25 +61,14 @@ def link_power_and_momentum(
 def segment_power_and_momentum(
     let,
     angles: V2,
-    rates: V2,
-    accelerations: V2,
-    virtual_rates: V2,
+    moving: CoordinateMotion,
     shape: V16,
     section: V2,
     tip: V8,
-    E: M33,
-    r: V3,
-    bend: V12,
-    h_own: V3,
-    I_own: V6,
-    pitch_own: V6,
-    yaw_own: V6,
-    H_own: V3,
-    w: V3,
-    w_dot: V3,
-    a: V3,
-    w_virtual: V3,
-    u_virtual: V3,
+    end: ArcTip,
+    own: ArcInertia,
+    root: FrameMotion,
+    virtual: VirtualMotion,
     u: V3,
     w_rigid: V3,
     u_rigid: V3,
@@ -93,33 +76,10 @@ def segment_power_and_momentum(
     """``segment_power``, and the segment's momentum times a virtual motion of the animal as one
     rigid body; the velocity ``u`` and that motion are carried on, too.
     """
-    power = segment_power(
-        let,
-        angles,
-        rates,
-        accelerations,
-        virtual_rates,
-        shape,
-        section,
-        tip,
-        E,
-        r,
-        bend,
-        h_own,
-        I_own,
-        pitch_own,
-        yaw_own,
-        H_own,
-        w,
-        w_dot,
-        a,
-        w_virtual,
-        u_virtual,
-    )
-    own = (section, h_own, I_own, pitch_own, yaw_own, H_own)
-    F = let("momentum", segment_momentum(let, rates, *own, w, u)["F"])
+    power = segment_power(let, angles, moving, shape, section, tip, end, own, root, virtual)
+    F = let("momentum", segment_momentum(let, moving.rates, section, own, root.w, u)["F"])
     momentum = F[0:3, :].dot(u_rigid) + F[3:6, :].dot(w_rigid)
-    real = segment_velocity(let, rates, E, r, bend, w, u)
-    rigid = segment_velocity(let, Matrix([0, 0]), E, r, bend, w_rigid, u_rigid)
+    real = segment_velocity(let, moving.rates, end, root.w, u)
+    rigid = segment_velocity(let, Matrix([0, 0]), end, w_rigid, u_rigid)
     carried = {"u": real["u"], "w_rigid": rigid["w"], "u_rigid": rigid["u"]}
     return power | carried | {"power": [power["power"][0] + momentum]}

@@ -6,10 +6,21 @@ sigma = x c1(x^2 z) and gamma = x^2 c2(x^2 z), c_k being Stumpff's functions.  T
 functions of z: nothing is singular or lost where the segment is straight.
 """
 
+from dataclasses import dataclass
+
 from sympy import Matrix, eye
 
 from .rotations import X, Y, Z
-from .shapes import M33, V1, V2, V3, V8, V12
+from .shapes import M33, V1, V2, V3, V8, V12, FrameMotion
+
+
+@dataclass(frozen=True)
+class ArcTip:
+    """Rotation to the tip of a segment, its position, and how both move with a and b."""
+
+    E: M33
+    r: V3
+    bend: V12
 
 
 def section_properties(let, tail_mass: V1, tail_length: V1, share: V1) -> dict:
@@ -60,11 +71,11 @@ def velocity_columns(let, bend, rates) -> tuple[Matrix, Matrix]:
     return total[0:3, :], total[3:6, :]
 
 
-def segment_velocity(let, rates: V2, E: M33, r: V3, bend: V12, w: V3, u: V3) -> dict:
+def segment_velocity(let, rates: V2, end: ArcTip, w: V3, u: V3) -> dict:
     """Angular and linear velocity of the tip, in its frame."""
-    turn, move = velocity_columns(let, bend, rates)
-    E = E.T
-    return {"w": E * let("w", w + turn), "u": E * let("u", u + w.cross(r) + move)}
+    turn, move = velocity_columns(let, end.bend, rates)
+    E = end.E.T
+    return {"w": E * let("w", w + turn), "u": E * let("u", u + w.cross(end.r) + move)}
 
 
 def segment_motion(
@@ -74,12 +85,8 @@ def segment_motion(
     accelerations: V2,
     section: V2,
     tip: V8,
-    E: M33,
-    r: V3,
-    bend: V12,
-    w: V3,
-    w_dot: V3,
-    a: V3,
+    end: ArcTip,
+    root: FrameMotion,
 ) -> dict:
     """Angular velocity, its rate and acceleration of the tip, in its frame, from the root's in the
     root frame.
@@ -109,12 +116,13 @@ def segment_motion(
     )
 
     # the tip in the root frame, then in its own
-    turn, r_dot = velocity_columns(let, bend, rates)
-    turn_q, move_q = velocity_columns(let, bend, accelerations)
+    r, w = end.r, root.w
+    turn, r_dot = velocity_columns(let, end.bend, rates)
+    turn_q, move_q = velocity_columns(let, end.bend, accelerations)
     w_r = let("w_r", w.cross(r))
-    w_tip_dot = w_dot + w.cross(turn) + turn_rate + turn_q
-    a_tip = a + w_dot.cross(r) + w.cross(let("v", w_r + 2 * r_dot)) + r_ddot + move_q
-    E = E.T
+    w_tip_dot = root.w_dot + w.cross(turn) + turn_rate + turn_q
+    a_tip = root.a + root.w_dot.cross(r) + w.cross(let("v", w_r + 2 * r_dot)) + r_ddot + move_q
+    E = end.E.T
     return {
         "w": E * let("w", w + turn),
         "w_dot": E * let("w_dot", w_tip_dot),
@@ -127,11 +135,11 @@ def segment_pose(let, E: M33, r: V3, R: M33, P: V3) -> dict:
     return {"R": R * E, "P": P + R * r}
 
 
-def segment_twist(let, E: M33, r: V3, bend: V12, R: M33, P: V3) -> dict:
+def segment_twist(let, end: ArcTip, R: M33, P: V3) -> dict:
     """Spatial columns at B of a segment's bend: angular, then the velocity of the point of the
     tip's body at B.
     """
-    tip, out = let("tip", P + R * r), []
+    bend, tip, out = end.bend, let("tip", P + R * end.r), []
     for k in (0, 6):
         turn = let("turn", R * bend[k : k + 3, :])
         out += [turn, R * bend[k + 3 : k + 6, :] + tip.cross(turn)]

@@ -3,12 +3,25 @@
 The integrals over x are the form factors of `arc_shape`.
 """
 
+from dataclasses import dataclass
+
 from sympy import Matrix, eye
 
-from .arc import geometry
+from .arc import ArcTip, geometry
 from .arc_shape import factors
 from .rotations import Y, entries, symmetric
-from .shapes import M33, V1, V2, V3, V6, V12, V16
+from .shapes import M33, V1, V2, V3, V6, V16
+
+
+@dataclass(frozen=True)
+class ArcInertia:
+    """A segment's first moment and inertia at its root, its momentum columns, and block of H."""
+
+    h_own: V3
+    I_own: V6
+    pitch_own: V6
+    yaw_own: V6
+    H_own: V3
 
 
 def segment_inertia(let, angles: V2, shape: V16, section: V2) -> dict:
@@ -43,26 +56,13 @@ def rotated_inertia(let, E, I) -> Matrix:
     return let("turned", entries(let("half", E * symmetric(I)) * E.T))
 
 
-def gather_segment(
-    let,
-    section: V2,
-    E: M33,
-    r: V3,
-    bend: V12,
-    h_own: V3,
-    I_own: V6,
-    pitch_own: V6,
-    yaw_own: V6,
-    H_own: V3,
-    mass: V1,
-    h: V3,
-    I: V6,
-) -> dict:
+def gather_segment(let, section: V2, end: ArcTip, own: ArcInertia, mass: V1, h: V3, I: V6) -> dict:
     """Composite inertia at the root, from the composite inertia at the tip; momentum columns of a
     and b, and their block of H.
     """
     # the blocks that Eq. 18 has for this segment and for all beyond, which its bend moves, too
     # what is beyond, from the tip to the root
+    E, r, bend = end.E, end.r, end.bend
     h_tip, I_tip = let("h_tip", E * h), symmetric(rotated_inertia(let, E, I))
     h_root = let("h_root", h_tip + mass[0] * r)
     spread = let("spread", (h_tip + h_root).dot(r))
@@ -70,7 +70,7 @@ def gather_segment(
 
     # momentum columns: of this segment, and of what its bend moves beyond
     columns, twists = [], []
-    for k, column in ((0, pitch_own), (6, yaw_own)):
+    for k, column in ((0, own.pitch_own), (6, own.yaw_own)):
         turn, move = bend[k : k + 3, :], bend[k + 3 : k + 6, :]
         p = let("p", mass[0] * move + turn.cross(h_tip))
         L = let("L", I_tip * turn + h_tip.cross(move))
@@ -84,11 +84,11 @@ def gather_segment(
     ]
     return {
         "mass": mass + Matrix([section[0]]),
-        "h": h_own + h_root,
-        "I": I_own + I_root,
+        "h": own.h_own + h_root,
+        "I": own.I_own + I_root,
         "pitch": columns[0],
         "yaw": columns[1],
-        **{name: [H_own[k] + beyond[k]] for k, name in enumerate(("H_pp", "H_py", "H_yy"))},
+        **{name: [own.H_own[k] + beyond[k]] for k, name in enumerate(("H_pp", "H_py", "H_yy"))},
     }
 
 
@@ -97,28 +97,15 @@ def gather_segment_moment(let, section: V2, E: M33, r: V3, h_own: V3, mass: V1, 
     return {"mass": mass + Matrix([section[0]]), "h": h_own + E * h + mass[0] * r}
 
 
-def segment_momentum(
-    let,
-    rates: V2,
-    section: V2,
-    h_own: V3,
-    I_own: V6,
-    pitch_own: V6,
-    yaw_own: V6,
-    H_own: V3,
-    w: V3,
-    u: V3,
-) -> dict:
+def segment_momentum(let, rates: V2, section: V2, own: ArcInertia, w: V3, u: V3) -> dict:
     """Momentum of a segment, its moment about the root, and its kinetic energy."""
     # momentum of the frame's motion and of bending
-    relative = let("relative", rates[0] * pitch_own + rates[1] * yaw_own)
-    p = let("p", section[0] * u + w.cross(h_own) + relative[0:3, :])
-    L = let("L", symmetric(I_own) * w + h_own.cross(u) + relative[3:6, :])
+    relative, H = let("relative", rates[0] * own.pitch_own + rates[1] * own.yaw_own), own.H_own
+    p = let("p", section[0] * u + w.cross(own.h_own) + relative[0:3, :])
+    L = let("L", symmetric(own.I_own) * w + own.h_own.cross(u) + relative[3:6, :])
 
     # twice the kinetic energy: the frame's, of both, of bending
-    bending = (
-        rates[0] ** 2 * H_own[0] + 2 * rates[0] * rates[1] * H_own[1] + rates[1] ** 2 * H_own[2]
-    )
+    bending = rates[0] ** 2 * H[0] + 2 * rates[0] * rates[1] * H[1] + rates[1] ** 2 * H[2]
     twice = let(
         "twice", u.dot(p) + w.dot(L) + u.dot(relative[0:3, :]) + w.dot(relative[3:6, :]) + bending
     )

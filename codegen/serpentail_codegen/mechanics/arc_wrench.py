@@ -5,10 +5,22 @@ The integrals over x are the form factors of `arc_shape`.
 
 from sympy import Matrix
 
-from .arc import geometry, segment_motion, segment_velocity
+from .arc import ArcTip, geometry, segment_motion, segment_velocity
+from .arc_inertia import ArcInertia
 from .arc_shape import factors
 from .rotations import Y, symmetric
-from .shapes import M33, V2, V3, V6, V8, V12, V16
+from .shapes import (
+    M33,
+    V2,
+    V3,
+    V6,
+    V8,
+    V12,
+    V16,
+    CoordinateMotion,
+    FrameMotion,
+    VirtualMotion,
+)
 
 
 def bending_rates(let, angles, rates) -> tuple:
@@ -91,14 +103,8 @@ def segment_wrench(
     accelerations: V2,
     shape: V16,
     section: V2,
-    h_own: V3,
-    I_own: V6,
-    pitch_own: V6,
-    yaw_own: V6,
-    H_own: V3,
-    w: V3,
-    w_dot: V3,
-    a: V3,
+    own: ArcInertia,
+    root: FrameMotion,
 ) -> dict:
     """Inertial wrench of a segment at its root and its two generalised forces (Eq. 19), in the root
     frame.
@@ -106,6 +112,7 @@ def segment_wrench(
     ``w, w_dot, a`` are of the root frame.
     """
     m, length = section
+    w, w_dot, a, h_own, H_own = root.w, root.w_dot, root.a, own.h_own, own.H_own
 
     # by the rates of the bend alone
     moment, spread = let("mL", Matrix([m * length, m * length * length]))
@@ -113,8 +120,8 @@ def segment_wrench(
     loads = relative_loads(let, angles, rates, shape, w)
 
     # force and moment at the root
-    p = let("p", rates[0] * pitch_own[0:3, :] + rates[1] * yaw_own[0:3, :])
-    bending = let("bending", accelerations[0] * pitch_own + accelerations[1] * yaw_own)
+    p = let("p", rates[0] * own.pitch_own[0:3, :] + rates[1] * own.yaw_own[0:3, :])
+    bending = let("bending", accelerations[0] * own.pitch_own + accelerations[1] * own.yaw_own)
     force = (
         m * a
         + w_dot.cross(h_own)
@@ -122,12 +129,12 @@ def segment_wrench(
         + bending[0:3, :]
         + moment * force_r
     )
-    inertia = symmetric(I_own)
+    inertia = symmetric(own.I_own)
     torque = h_own.cross(a) + inertia * w_dot + w.cross(let("Iw", inertia * w)) + bending[3:6, :]
 
     # generalised forces of a and b
     torques = []
-    for k, column in enumerate((pitch_own, yaw_own)):
+    for k, column in enumerate((own.pitch_own, own.yaw_own)):
         inertial = (
             column[0:3, :].dot(a) + column[3:6, :].dot(w_dot) + spread * let("load", loads[k])
         )
@@ -141,52 +148,26 @@ def segment_wrench(
 def segment_power(
     let,
     angles: V2,
-    rates: V2,
-    accelerations: V2,
-    virtual_rates: V2,
+    moving: CoordinateMotion,
     shape: V16,
     section: V2,
     tip: V8,
-    E: M33,
-    r: V3,
-    bend: V12,
-    h_own: V3,
-    I_own: V6,
-    pitch_own: V6,
-    yaw_own: V6,
-    H_own: V3,
-    w: V3,
-    w_dot: V3,
-    a: V3,
-    w_virtual: V3,
-    u_virtual: V3,
+    end: ArcTip,
+    own: ArcInertia,
+    root: FrameMotion,
+    virtual: VirtualMotion,
 ) -> dict:
     """Power of the inertial wrench of a segment and of its generalised forces (Eq. 19) under a
     virtual motion.
     """
-    wrench = segment_wrench(
-        let,
-        angles,
-        rates,
-        accelerations,
-        shape,
-        section,
-        h_own,
-        I_own,
-        pitch_own,
-        yaw_own,
-        H_own,
-        w,
-        w_dot,
-        a,
-    )
+    rates, accelerations, virtual_rates = moving.rates, moving.accelerations, moving.virtual_rates
+    w_virtual, u_virtual = virtual.w_virtual, virtual.u_virtual
+    wrench = segment_wrench(let, angles, rates, accelerations, shape, section, own, root)
     F, torque = let("F", wrench["F"]), let("torque", wrench["torque_own"])
     power = F[0:3, :].dot(u_virtual) + F[3:6, :].dot(w_virtual) + torque.dot(virtual_rates)
-    motion = segment_motion(
-        let, angles, rates, accelerations, section, tip, E, r, bend, w, w_dot, a
-    )
-    virtual = segment_velocity(let, virtual_rates, E, r, bend, w_virtual, u_virtual)
-    return {"power": [power], **motion, "w_virtual": virtual["w"], "u_virtual": virtual["u"]}
+    motion = segment_motion(let, angles, rates, accelerations, section, tip, end, root)
+    moved = segment_velocity(let, virtual_rates, end, w_virtual, u_virtual)
+    return {"power": [power], **motion, "w_virtual": moved["w"], "u_virtual": moved["u"]}
 
 
 def gather_segment_wrench(let, E: M33, r: V3, bend: V12, F: V6, torque_own: V2, F_next: V6) -> dict:

@@ -4,7 +4,7 @@ Points are given by ``arm``, from B in world axes, and ``velocity``, in the worl
 = 0.  A bristle is what the friction spring of a point is stretched by, in the world's x and y.
 """
 
-from sympy import Matrix, Max, Piecewise, sqrt
+from sympy import Matrix, Piecewise, sqrt
 
 from .shapes import M33, V1, V2, V3, V6, V12
 
@@ -75,11 +75,12 @@ def guarded(let, value, positive):
     return let("safe", Piecewise((value, positive > 0), (1, True)))
 
 
-def normal_force(let, K_n, D_n, depth, rate):
+def normal_force(let, depth, rate, K_n, D_n):
     """max(K_n z^(3/2) + D_n K_n z^(1/2) z_dot, 0) (Eq. 36); the text's z^3/2 is z^(3/2)."""
     root = let("root", sqrt(guarded(let, depth, depth)))
     push = let("push", K_n[0] * root * (depth + D_n[0] * rate))
-    return let("f_n", Piecewise((Max(push, 0), depth > 0), (0, True)))
+    pressing = let("pressing", Piecewise((0, push < 0), (push, True)))  # a NaN stays one
+    return let("f_n", Piecewise((pressing, depth > 0), (0, True)))
 
 
 def cone(let, trial, limit) -> Matrix:
@@ -90,9 +91,10 @@ def cone(let, trial, limit) -> Matrix:
     return trial * let("scale", Piecewise((shorter, excess > 0), (1, True)))
 
 
-def box(let, trial, limit) -> Matrix:
+def clamped(let, trial, limit) -> Matrix:
     """The trial force, each component clamped to the limit (Eq. 37)."""
-    return trial.applyfunc(lambda t: Piecewise((limit, t > limit), (-limit, t < -limit), (t, True)))
+    low = let("low", trial.applyfunc(lambda t: Piecewise((limit, t > limit), (t, True))))
+    return low.applyfunc(lambda t: Piecewise((-limit, t < -limit), (t, True)))
 
 
 def smooth(let, trial, limit) -> Matrix:
@@ -101,7 +103,7 @@ def smooth(let, trial, limit) -> Matrix:
     return trial * let("scale", limit / total)
 
 
-FRICTION = {"cone": cone, "box": box, "smooth": smooth, "paper": box}
+FRICTION = {"cone": cone, "smooth": smooth, "paper": clamped}
 
 
 def bristle_rate(let, K_f, mobility, bristle, sliding, friction: str, depth, force) -> Matrix:
@@ -136,7 +138,7 @@ def contact_force(
     The friction spring restores toward the anchor and opposes slip: Eq. 37 lacks that sign.
     """
     depth, sliding = let("z", -(p[2] + arm[2])), velocity[0:2, :]
-    f_n = normal_force(let, K_n, D_n, depth, -velocity[2])
+    f_n = normal_force(let, depth, -velocity[2], K_n, D_n)
     trial = let("trial", -(K_f[0] * bristle + drag[0] * sliding))
     force = let("f_t", FRICTION[friction](let, trial, let("limit", mu[0] * f_n)))
     rate = bristle_rate(let, K_f, mobility, bristle, sliding, friction, depth, force)

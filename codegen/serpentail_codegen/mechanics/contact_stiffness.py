@@ -10,9 +10,13 @@ a velocity and for a bristle's right-hand side, and of M and N, the bristle for 
 and for a velocity; then h and e, friction and bristle for w df_n.
 """
 
-from sympy import Matrix, Piecewise, eye, sqrt
+from collections.abc import Callable
+from functools import partial
+from itertools import accumulate
 
-from .contact import guarded, normal_force
+from sympy import Matrix, MatrixBase, Piecewise, eye, ordered, sympify, zeros
+
+from .contact import FRICTION, normal_force
 from .rotations import X, Y, Z
 from .shapes import M33, V1, V2, V3, V6, V18
 
@@ -28,67 +32,31 @@ def plane_entries(matrix) -> list:
     return [matrix[0, 0], matrix[0, 1], matrix[1, 1]]
 
 
-def normal_slopes(let, K_n, D_n, depth, rate, f_n) -> tuple:
-    """d|f_n|/dz and d|f_n|/dz_dot of Eq. 36; 0 if no force presses."""
-    root = let("root", sqrt(guarded(let, depth, depth)))
-    stiffness = let("k", K_n[0] * (root * 3 / 2 + D_n[0] * rate / (2 * root)))
-    damping = let("d", K_n[0] * D_n[0] * root)
-    return tuple(
-        let("slope", Piecewise((value, f_n > 0), (0, True))) for value in (stiffness, damping)
-    )
+def slopes(let, law: Callable, *values) -> list[Matrix]:
+    """Return the derivatives of ``law(let, *values)`` by each value: a name, or a column
+    of names.
+    """
+    # every named result is differentiated by the names in it, from those of the values on
+    columns = [Matrix([value]) for value in values]
+    symbols = [symbol for column in columns for symbol in column]
+    rates = {s: Matrix([[int(s == other) for other in symbols]]) for s in symbols}
 
+    def rate(value) -> Matrix:
+        moving = value.free_symbols & rates.keys()
+        return sum((value.diff(s) * rates[s] for s in ordered(moving)), zeros(1, len(symbols)))
 
-def cone_slope(let, trial, limit) -> Matrix:
-    """P of a cone: 1 while the point sticks, else across the force only."""
-    length = let("t_t", trial.dot(trial))
-    excess = let("excess", length - limit**2)
-    safe = guarded(let, length, excess)
-    along = let("along", trial * trial.T / safe)
-    sliding = let("sliding", let("ratio", limit / let("length", sqrt(safe))) * (eye(2) - along))
-    return sliding.applyfunc(lambda e: Piecewise((e, excess > 0), (0, True))) + eye(2) * Piecewise(
-        (0, excess > 0), (1, True)
-    )
+    def named(name, value):
+        if isinstance(value, MatrixBase):
+            return value.applyfunc(lambda entry: named(name, entry))
+        result = let(name, value)
+        if result not in rates:
+            rates[result] = let("slope", rate(sympify(value)))
+        return result
 
-
-def box_slope(let, trial, limit) -> Matrix:
-    """P of a box: 1 along an axis that sticks, else 0."""
-    return Matrix.diag(
-        *(Piecewise((1, let("room", limit**2 - t * t) > 0), (0, True)) for t in trial)
-    )
-
-
-def smooth_slope(let, trial, limit) -> Matrix:
-    """P of a smooth cone."""
-    total = guarded(let, let("sum", limit**2 + trial.dot(trial)), limit)
-    return let("ratio", limit / let("length", sqrt(total))) * (
-        eye(2) - let("along", trial * trial.T / total)
-    )
-
-
-SLOPE = {"cone": cone_slope, "box": box_slope, "smooth": smooth_slope, "paper": box_slope}
-
-
-def cone_bound(let, trial, limit) -> Matrix:
-    """df/d(bound) of a cone: along the force while the point slides."""
-    length = let("t_t", trial.dot(trial))
-    excess = let("excess", length - limit**2)
-    along = trial / let("length", sqrt(guarded(let, length, excess)))
-    return along.applyfunc(lambda e: Piecewise((e, excess > 0), (0, True)))
-
-
-def box_bound(let, trial, limit) -> Matrix:
-    """df/d(bound) of a box: 1 or -1 along an axis that slides."""
-    return trial.applyfunc(lambda t: Piecewise((1, t > limit), (-1, t < -limit), (0, True)))
-
-
-def smooth_bound(let, trial, limit) -> Matrix:
-    """df/d(bound) of a smooth cone: t |t|^2 / (bound^2 + |t|^2)^(3/2)."""
-    square_of_trial = let("t_t", trial.dot(trial))
-    total = guarded(let, let("sum", limit**2 + square_of_trial), limit)
-    return trial * let("share", square_of_trial / (total * let("length", sqrt(total))))
-
-
-BOUND = {"cone": cone_bound, "box": box_bound, "smooth": smooth_bound, "paper": box_bound}
+    results = Matrix([law(named, *values)])
+    jacobian = Matrix.vstack(*(rate(result) for result in results))
+    ends = accumulate(column.rows for column in columns)
+    return [jacobian[:, e - c.rows : e] for c, e in zip(columns, ends, strict=True)]
 
 
 def following_load(let, bound, pressing, mu, share) -> Matrix:
@@ -115,14 +83,14 @@ def linearised_contact(
     friction: str = "cone",
 ) -> dict:
     """Compute ``spring`` of a point in the ground (Eqs. 35 to 37)."""
-    w, depth, rate = weight[0], let("z", -(p[2] + arm[2])), -velocity[2]
-    f_n = normal_force(let, K_n, D_n, depth, rate)
-    k_n, d_n = normal_slopes(let, K_n, D_n, depth, rate, f_n)
+    w, depth, rate = weight[0], let("z", -(p[2] + arm[2])), let("rate", -velocity[2])
+    f_n = normal_force(let, depth, rate, K_n, D_n)
+    k_n, d_n = slopes(let, partial(normal_force, K_n=K_n, D_n=D_n), depth, rate)
 
     # how friction depends on the trial force, and on its bound
     trial = let("trial", -(K_f[0] * bristle + drag[0] * velocity[0:2, :]))
     limit = let("limit", mu[0] * f_n)
-    P, g = SLOPE[friction](let, trial, limit), BOUND[friction](let, trial, limit)
+    P, g = slopes(let, FRICTION[friction], trial, limit)
     g = following_load(let, g, f_n, mu[0], bound_share[0])
     P = plane([let("P", Piecewise((e, f_n > 0), (0, True))) for e in plane_entries(P)])
 
@@ -133,7 +101,7 @@ def linearised_contact(
     B = w * P * let("K_N", K_f[0] * N + drag[0] * eye(2))
 
     # everything that factoring and solving need
-    spring = [w * k_n, w * (d_n + w * k_n)]
+    spring = [w * k_n[0], w * (d_n[0] + w * k_n[0])]
     for matrix in (B, let("w_K_f", w * K_f[0]) * P * M, M, N):
         spring += plane_entries(matrix)
     e = Matrix([0, 0]) if friction == "paper" else let("e", -M * g / drag[0])

@@ -11,7 +11,7 @@ base's motion a alone.  Lanes of K, A, b and T are the entries of x.
 from sympy import Matrix, diag, zeros
 
 from .rotations import X, Y, Z, symmetric
-from .shapes import M33, V1, V2, V3, V6, V8, V12, V15, V30
+from .shapes import M33, V1, V2, V3, V6, V8, V12, V15, V30, V6x3, V6x6
 
 
 def swept_by(arm) -> Matrix:
@@ -73,13 +73,11 @@ def load_at_tip(let, A: V6, b: V1, coasting: V6) -> dict:
     return {"load": [total]}
 
 
-def pass_on(
-    let, T: V6, tip_map: V30, A_0: V6, A_1: V6, A_2: V6, A_3: V6, A_4: V6, A_5: V6, load: V6
-) -> dict:
+def pass_on(let, T: V6, tip_map: V30, A: V6x6, load: V6) -> dict:
     """Contribution of everything beyond the tip to a segment: T^T A T to K, T^T load to b; ``A_0``
     to ``A_5`` are the rows of A.
     """
-    entries, A = tip_matrix(tip_map), (A_0, A_1, A_2, A_3, A_4, A_5)
+    entries = tip_matrix(tip_map)
     moved = [let("moved", sum((A[c][r] * T[c] for c in range(6)), 0)) for r in range(6)]
     K = [sum((entries[r, k] * moved[r] for r in range(6)), 0) for k in range(8)]
     return {"K": K, "b": [sum((load[r] * T[r] for r in range(6)), 0)]}
@@ -129,27 +127,16 @@ def outward(let, tip_map: V30, shares: V15, coasting: V6, base: V6) -> dict:
     return {"accelerations": free, "base": coasting + tip_matrix(tip_map) * Matrix([base, free])}
 
 
-def freed_inertia(
-    let,
-    torso_mass: V1,
-    torso_inertia: V3,
-    tail_mount: V3,
-    A_0: V6,
-    A_1: V6,
-    A_2: V6,
-    A_3: V6,
-    A_4: V6,
-    A_5: V6,
-) -> dict:
+def freed_inertia(let, torso_mass: V1, torso_inertia: V3, tail_mount: V3, A: V6x6) -> dict:
     """Inertia of torso and tail at B with free coordinates: lower triangle for (omega_dot, a),
     torso axes.
     """
-    A, swept = Matrix.hstack(A_0, A_1, A_2, A_3, A_4, A_5).T, swept_by(tail_mount)
+    rows, swept = Matrix.hstack(*A).T, swept_by(tail_mount)
 
     # blocks of A moved from the mount to B, the torso added
-    force, moment = A[0:3, 0:3], A[3:6, 0:3]
+    force, moment = rows[0:3, 0:3], rows[3:6, 0:3]
     coupling = let("coupling", moment + swept.T * force)
-    turning = A[3:6, 3:6] + moment * swept + swept.T * coupling.T
+    turning = rows[3:6, 3:6] + moment * swept + swept.T * coupling.T
     H = Matrix(
         [
             [turning + diag(*torso_inertia), zeros(3, 3)],
@@ -159,11 +146,11 @@ def freed_inertia(
     return {f"H_{r}": H[r, 0 : r + 1].T for r in range(6)}
 
 
-def freed_wrench(let, tail_mount: V3, a_mount: V3, A_0: V6, A_1: V6, A_2: V6, b_mount: V6) -> dict:
+def freed_wrench(let, tail_mount: V3, a_mount: V3, A: V6x3, b_mount: V6) -> dict:
     """Wrench at B that moves a tail with free coordinates whose mount accelerates by ``a_mount``
     and does not turn.
     """
-    F = let("F", b_mount + a_mount[0] * A_0 + a_mount[1] * A_1 + a_mount[2] * A_2)
+    F = let("F", b_mount + a_mount[0] * A[0] + a_mount[1] * A[1] + a_mount[2] * A[2])
     return {"F": Matrix([F[0:3, :], F[3:6, :] + tail_mount.cross(F[0:3, :])])}
 
 

@@ -10,7 +10,7 @@ the frame's origin.  A wrench or momentum ``F`` = (force or momentum, its moment
 from sympy import Matrix, cos, sin, zeros
 
 from .rotations import X, Y, Z, entries, rotation_x, rotation_z, symmetric, turned
-from .shapes import M33, V1, V2, V3, V4, V6, V10
+from .shapes import M33, V1, V2, V3, V4, V6, V10, CoordinateMotion, FrameMotion, VirtualMotion
 
 
 def link_properties(let, tail_mass: V1, tail_length: V1, link_inertia: V3, share: V1) -> dict:
@@ -53,38 +53,22 @@ def link_wrench(let, link: V6, w: V3, w_dot: V3, a_joint: V3, swing: V3) -> dict
 
 
 def link_power(
-    let,
-    joint: V4,
-    rates: V2,
-    accelerations: V2,
-    virtual_rates: V2,
-    link: V6,
-    w: V3,
-    w_dot: V3,
-    a: V3,
-    w_virtual: V3,
-    u_virtual: V3,
+    let, joint: V4, moving: CoordinateMotion, link: V6, base: FrameMotion, virtual: VirtualMotion
 ) -> dict:
     """Power of the inertial wrench of one link (Eq. 17) under a virtual motion; both motions
     carried on.
     """
     # the motion of the link, and its wrench
-    motion = {
-        k: let(k, x)
-        for k, x in link_motion(let, joint, rates, accelerations, link, w, w_dot, a).items()
-    }
-    F = let(
-        "F",
-        link_wrench(let, link, motion["w"], motion["w_dot"], motion["a_joint"], motion["swing"])[
-            "F"
-        ],
-    )
+    motion = link_motion(let, joint, moving.rates, moving.accelerations, link, base)
+    motion = {name: let(name, vector) for name, vector in motion.items()}
+    reads = (motion[name] for name in ("w", "w_dot", "a_joint", "swing"))
+    F = let("F", link_wrench(let, link, *reads)["F"])
 
     # the virtual motion of the link
-    turn = let("turn", link_angular_velocity(let, joint, virtual_rates, w_virtual)["w"])
-    slide = {
-        k: let(k, x) for k, x in link_linear_velocity(let, joint, link, turn, u_virtual).items()
-    }
+    turn = link_angular_velocity(let, joint, moving.virtual_rates, virtual.w_virtual)
+    turn = let("turn", turn["w"])
+    slide = link_linear_velocity(let, joint, link, turn, virtual.u_virtual)
+    slide = {name: let(name, vector) for name, vector in slide.items()}
     power = F[0:3, :].dot(slide["u_joint"]) + F[3:6, :].dot(turn)
     carried = {name: motion[name] for name in ("w", "w_dot", "a")}
     return {"power": [power], **carried, "w_virtual": turn, "u_virtual": slide["u"]}
@@ -259,9 +243,7 @@ def link_linear_velocity(let, joint: V4, link: V6, w: V3, u: V3) -> dict:
     return {"u_joint": u_joint, "u": u_joint - link[1] * w.cross(Y)}
 
 
-def link_motion(
-    let, joint: V4, rates: V2, accelerations: V2, link: V6, w: V3, w_dot: V3, a: V3
-) -> dict:
+def link_motion(let, joint: V4, rates: V2, accelerations: V2, link: V6, base: FrameMotion) -> dict:
     """omega_j (A1), omega_dot_j (A9), acceleration of this joint and the next (A11, A12), in the
     frame of link j.
 
@@ -271,9 +253,9 @@ def link_motion(
     turn_x, turn_z = joint_turns(joint)
 
     # angular velocity and its rate: between the joint's two axes, then beyond both
-    w_mid = let("w_mid", turn_x.T * w + rates[0] * X)
+    w_mid = let("w_mid", turn_x.T * base.w + rates[0] * X)
     w_dot_mid = let(
-        "w_dot_mid", turn_x.T * w_dot + accelerations[0] * X + rates[0] * w_mid.cross(X)
+        "w_dot_mid", turn_x.T * base.w_dot + accelerations[0] * X + rates[0] * w_mid.cross(X)
     )
     w_here = let("w_here", turn_z.T * w_mid + rates[1] * Z)
     w_dot_here = let(
@@ -281,7 +263,7 @@ def link_motion(
     )
 
     # acceleration of this joint, and of the next along the link
-    a_here = let("a_here", turn_z.T * let("a_mid", turn_x.T * a))
+    a_here = let("a_here", turn_z.T * let("a_mid", turn_x.T * base.a))
     products = let(
         "ww",
         Matrix([w_here[0] * w_here[1], w_here[0] ** 2 + w_here[2] ** 2, w_here[1] * w_here[2]]),

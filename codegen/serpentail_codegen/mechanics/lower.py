@@ -6,6 +6,7 @@ their shapes; it returns a dictionary of vectors.
 
 import inspect
 from collections.abc import Callable
+from dataclasses import is_dataclass
 from fractions import Fraction
 from functools import cache
 from typing import Annotated, Any, get_origin
@@ -79,6 +80,8 @@ class Recorder:
     def _power(self, base: sympy.Basic, exponent: sympy.Basic) -> int:
         if exponent == sympy.Rational(1, 2):
             return self.tape.sqrt(self.lower(base))
+        if exponent == sympy.Rational(-1, 2):
+            return self.tape.div(self.tape.const(1), self.lower(sympy.sqrt(base)))
         if not exponent.is_Integer:
             raise TypeError(f"no rule lowers the exponent {exponent}")
         product = self._chain(self.tape.mul, [base] * abs(int(exponent)))
@@ -122,33 +125,56 @@ def exact(number: sympy.Number):
 def declared_shapes(function: Callable) -> dict[str, tuple[int, int]]:
     """Rows and columns of each vector that a step reads, as its annotations say.
 
-    Its first argument is ``let``; arguments with a default are settings of the derivation.
+    An argument is one vector, several of equal size (``V3x8``), or a group: a dataclass of vectors.
     """
-    arguments = inspect.signature(function).parameters.values()
-    shapes = {}
-    for argument in [a for a in arguments if a.default is a.empty][1:]:
-        if get_origin(argument.annotation) is not Annotated:
-            raise TypeError(
-                f"{function.__name__}: {argument.name} needs an annotation of mechanics.shapes"
-            )
-        shapes[argument.name] = argument.annotation.__metadata__[0]
+    shapes: dict[str, tuple[int, int]] = {}
+    for argument in _arguments(function):
+        shapes |= _shapes_of(function, argument)
     return shapes
+
+
+@cache
+def _arguments(function: Callable) -> list[inspect.Parameter]:
+    """Return what a step reads: no ``let``, no settings of the derivation, which have defaults."""
+    arguments = inspect.signature(function).parameters.values()
+    return [a for a in arguments if a.default is a.empty][1:]
+
+
+def _shapes_of(function: Callable, argument: inspect.Parameter) -> dict[str, tuple[int, int]]:
+    """Return the shapes of an argument's vectors."""
+    kind: Any = argument.annotation
+    if is_dataclass(kind):  # a group
+        return {name: part.__metadata__[0] for name, part in kind.__annotations__.items()}
+    if get_origin(kind) is not Annotated:
+        raise TypeError(
+            f"{function.__name__}: {argument.name} needs an annotation of mechanics.shapes"
+        )
+    shape, *count = kind.__metadata__
+    names = [f"{argument.name}_{k}" for k in range(*count)] if count else [argument.name]
+    return dict.fromkeys(names, shape)
 
 
 @cache
 def derive(function: Callable, **settings: Any) -> Step:
     """Derive a step: call ``function(let, *vectors)`` with SymPy vectors of the declared shapes."""
     # symbols of the declared shapes stand for the vectors
-    recorder, first, vectors, inputs = Recorder(), 0, [], []
-    for name, (rows, columns) in declared_shapes(function).items():
-        size = rows * columns
-        vectors.append(recorder.vector(name, first, size).reshape(rows, columns))
-        inputs.append((name, size))
-        first += size
+    recorder, first, values, inputs = Recorder(), 0, [], []
+    for argument in _arguments(function):
+        vectors = {}
+        for name, (rows, columns) in _shapes_of(function, argument).items():
+            size = rows * columns
+            vectors[name] = recorder.vector(name, first, size).reshape(rows, columns)
+            inputs.append((name, size))
+            first += size
+        kind: Any = argument.annotation
+        if isinstance(kind, type):
+            values.append(kind(**vectors))
+        else:
+            values.append(vectors.get(argument.name) or tuple(vectors.values()))
 
     # what the function returns is recorded on the tape
     outputs = {
-        name: list(value) for name, value in function(recorder.let, *vectors, **settings).items()
+        name: list(value) for name, value in function(recorder.let, *values, **settings).items()
     }
     results = tuple(recorder.lower(sympy.sympify(e)) for values in outputs.values() for e in values)
     sizes = tuple((name, len(values)) for name, values in outputs.items())

@@ -5,6 +5,8 @@ with s = depth / w. The force k w (s^3 - s^4 / 2) therefore has two continuous d
 it is that of a spring.
 """
 
+from dataclasses import dataclass
+
 from sympy import Matrix, Piecewise
 
 from .shapes import V1, V2
@@ -20,31 +22,44 @@ def damping_force(let, tail_damping: V2, rates: V2) -> dict:
     return {"passive": tail_damping.multiply_elementwise(rates)}
 
 
-def stop_force(
-    let,
-    tail_stop_lower: V2,
-    tail_stop_upper: V2,
-    tail_stop_stiffness: V2,
-    tail_stop_width: V2,
-    angles: V2,
-) -> dict:
+@dataclass(frozen=True)
+class Stops:
+    """The stops of both coordinates of a segment."""
+
+    tail_stop_lower: V2
+    tail_stop_upper: V2
+    tail_stop_stiffness: V2
+    tail_stop_width: V2
+
+
+@dataclass(frozen=True)
+class StopsOfCoordinate:
+    """The stops of one coordinate."""
+
+    tail_stop_lower: V1
+    tail_stop_upper: V1
+    tail_stop_stiffness: V1
+    tail_stop_width: V1
+
+
+def stop_force(let, stops: Stops, angles: V2) -> dict:
     """Force of the stops: negative below the lower one, positive above the upper one."""
     forces = []
     for k in range(2):
-        w = tail_stop_width[k]
-        under, over = ways_into(let, tail_stop_lower[k], tail_stop_upper[k], w, angles[k])
+        stiffness, width = stops.tail_stop_stiffness[k], stops.tail_stop_width[k]
+        under, over = ways_into(let, stops, k, angles[k])
         pushes = [s**3 - s**4 / 2 + beyond for s, beyond in (under, over)]
-        forces.append(tail_stop_stiffness[k] * w * let("push", pushes[1] - pushes[0]))
+        forces.append(stiffness * width * let("push", pushes[1] - pushes[0]))
     return {"passive": Matrix(forces)}
 
 
-def ways_into(let, lower, upper, width, angle) -> list[tuple]:
-    """Depth of a coordinate in the lower and in the upper stop, in widths: the part up to one
+def ways_into(let, stops: Stops | StopsOfCoordinate, k: int, angle) -> list[tuple]:
+    """Depth of coordinate k in its lower and in its upper stop, in widths: the part up to one
     width, and the rest.
     """
     ways = []
-    for way in (lower - angle, angle - upper):
-        x = let("way", way / width)
+    for way in (stops.tail_stop_lower[k] - angle, angle - stops.tail_stop_upper[k]):
+        x = let("way", way / stops.tail_stop_width[k])
         beyond = let("beyond", Piecewise((x - 1, x > 1), (0, True)))
         ways.append((let("within", Piecewise((x - beyond, x > 0), (0, True))), beyond))
     return ways
@@ -57,21 +72,13 @@ def spring_energy(let, tail_stiffness: V2, tail_rest: V2, angles: V2) -> dict:
     return {"potential": [tail_stiffness.dot(squares) / 2]}
 
 
-def stop_energy(
-    let,
-    tail_stop_lower: V2,
-    tail_stop_upper: V2,
-    tail_stop_stiffness: V2,
-    tail_stop_width: V2,
-    angles: V2,
-) -> dict:
+def stop_energy(let, stops: Stops, angles: V2) -> dict:
     """The integral of the stops' forces over the depth."""
     total = 0
     for k in range(2):
-        w, parts = tail_stop_width[k], 0
-        for s, beyond in ways_into(let, tail_stop_lower[k], tail_stop_upper[k], w, angles[k]):
-            parts += s**4 / 4 - s**5 / 10 + beyond * (beyond + 1) / 2
-        total += tail_stop_stiffness[k] * w**2 * let("part", parts)
+        ways = ways_into(let, stops, k, angles[k])
+        parts = sum(s**4 / 4 - s**5 / 10 + beyond * (beyond + 1) / 2 for s, beyond in ways)
+        total += stops.tail_stop_stiffness[k] * stops.tail_stop_width[k] ** 2 * let("part", parts)
     return {"potential": [total]}
 
 
@@ -93,19 +100,10 @@ def spring_slope(let, tail_stiffness: V1) -> dict:
     return {"slope": tail_stiffness}
 
 
-def stop_slope(
-    let,
-    tail_stop_lower: V1,
-    tail_stop_upper: V1,
-    tail_stop_stiffness: V1,
-    tail_stop_width: V1,
-    angle: V1,
-) -> dict:
+def stop_slope(let, stops: StopsOfCoordinate, angle: V1) -> dict:
     """Stiffness of the stops at a coordinate."""
-    w = tail_stop_width[0]
-    both = ways_into(let, tail_stop_lower[0], tail_stop_upper[0], w, angle[0])
-    shares = [s * s * (3 - 2 * s) for s, _ in both]
-    return {"slope": [tail_stop_stiffness[0] * sum(shares)]}
+    shares = [s * s * (3 - 2 * s) for s, _ in ways_into(let, stops, 0, angle[0])]
+    return {"slope": [stops.tail_stop_stiffness[0] * sum(shares)]}
 
 
 def damped_coordinate(let, tail_damping: V1, weight: V1, gain_v: V1) -> dict:

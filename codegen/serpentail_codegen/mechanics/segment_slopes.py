@@ -10,54 +10,29 @@ from sympy import Matrix
 
 from .free_segment import tip_matrix
 from .rotations import symmetric
-from .shapes import V1, V2, V3, V6, V8, V9, V15, V30
+from .shapes import V1, V2, V3, V6, V8, V9, V15, V30, V3x6, V3x8
 
 
 def change_at_base(
-    let,
-    motion: V9,
-    mass: V1,
-    h: V3,
-    I: V6,
-    pitch: V6,
-    yaw: V6,
-    force_0: V3,
-    force_1: V3,
-    force_2: V3,
-    force_3: V3,
-    force_4: V3,
-    force_5: V3,
-    force_6: V3,
-    force_7: V3,
+    let, motion: V9, mass: V1, h: V3, I: V6, pitch: V6, yaw: V6, force: V3x8
 ) -> dict:
     """Change of wrench and torques with the motion of the base; accelerations act by the segment's
     own inertia.
     """
     w, w_dot, a = (motion[k : k + 3, :] for k in (0, 3, 6))
-    rows = (force_0, force_1, force_2, force_3, force_4, force_5, force_6, force_7)
-    by_w = Matrix([row.dot(w) for row in rows])
-    force, moment = mass[0] * a + w_dot.cross(h), h.cross(a) + symmetric(I) * w_dot
+    by_w = Matrix([row.dot(w) for row in force])
+    inertial, moment = mass[0] * a + w_dot.cross(h), h.cross(a) + symmetric(I) * w_dot
     torques = [p[0:3, :].dot(a) + p[3:6, :].dot(w_dot) for p in (pitch, yaw)]
-    return {"change": by_w + Matrix([force, moment, Matrix(torques)])}
+    return {"change": by_w + Matrix([inertial, moment, Matrix(torques)])}
 
 
-def change_at_tip(
-    let,
-    motion: V9,
-    tip_map: V30,
-    tip_0: V3,
-    tip_1: V3,
-    tip_2: V3,
-    tip_3: V3,
-    tip_4: V3,
-    tip_5: V3,
-) -> dict:
+def change_at_tip(let, motion: V9, tip_map: V30, tip: V3x6) -> dict:
     """Change of the tip's motion with that of the base: ``tip_0`` to ``tip_5`` are the rows of
     (w_dot, a) by w, the rest is T.
     """
     w, w_dot, a = (motion[k : k + 3, :] for k in (0, 3, 6))
     T = tip_matrix(tip_map)[:, 0:6]
-    by_w = Matrix([row.dot(w) for row in (tip_0, tip_1, tip_2, tip_3, tip_4, tip_5)])
+    by_w = Matrix([row.dot(w) for row in tip])
     moved = T * Matrix([a, w_dot])
     turned = T[3:6, 3:6] * w
     return {"motion": Matrix([turned, by_w[0:3, :] + moved[3:6, :], by_w[3:6, :] + moved[0:3, :]])}

@@ -5,7 +5,7 @@ from collections.abc import Container
 from dataclasses import replace
 
 from ..ir.dataflow import overlap, pruned
-from ..ir.program import Apply, Fill, Index, Loop, Program, Ref, Statement
+from ..ir.program import Apply, Body, Fill, Index, Loop, Program, Ref, Statement
 from ..ir.step import Step, compacted
 from ..ir.tape import Tape, replay
 
@@ -20,7 +20,7 @@ def fused(program: Program) -> Program:
     return pruned(replace(program, body=_joined_body(_without_loops(program.body))))
 
 
-def _without_loops(body: tuple[Statement, ...]) -> tuple[Statement, ...]:
+def _without_loops(body: Body) -> Body:
     """Write out the outermost loops that are short, if they have steps alone."""
     out: list[Statement] = []
     for statement in body:
@@ -57,7 +57,7 @@ def _at(call: Apply, variable: str, value: int) -> Apply:
     return replace(call, reads=reads, writes=writes, columns=columns)
 
 
-def _joined_body(body: tuple[Statement, ...]) -> tuple[Statement, ...]:
+def _joined_body(body: Body) -> Body:
     out: list[Statement] = []
     for statement in body:
         before = out[-1] if out else None

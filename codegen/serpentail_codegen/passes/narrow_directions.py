@@ -5,27 +5,12 @@ tangents falls into two: one of all that is the same for every direction, and on
 directions applies.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
 
-from ..ir.dataflow import inlined, names, reads, writes
-from ..ir.program import (
-    Apply,
-    Array,
-    Copy,
-    Fill,
-    Index,
-    Loop,
-    Program,
-    Ref,
-    Solve,
-    Statement,
-    Unit,
-    as_index,
-    statements,
-)
+from ..ir import program as ir
+from ..ir.dataflow import inlined, names, reads, rule_of, writes
 from ..ir.step import Step
 from .dead_fills import without_unread_fills
 from .fuse_steps import fused
@@ -33,10 +18,10 @@ from .split_steps import SLOPES, is_zero, parted, without
 from .structural_zeros import Patterns, lanes_read
 
 DIRECTION = "d"  # the loop variable
-HERE = Index(((DIRECTION, 1),))
+HERE = ir.Index(((DIRECTION, 1),))
 
 
-def directions_in_turn(program: Program) -> Program:
+def directions_in_turn(program: ir.Program) -> ir.Program:
     """Return a program without wide arrays: direction after direction lies in narrow ones.
 
     What is zero whatever the state is neither computed nor stored, where nothing else reads it.
@@ -51,15 +36,15 @@ def directions_in_turn(program: Program) -> Program:
     return without_unread_fills(narrow)
 
 
-def has_directions(program: Program) -> bool:
+def has_directions(program: ir.Program) -> bool:
     """Tell if a program has wide arrays."""
     return any(a.lanes for a in inlined(program).arrays)
 
 
-def places_lanes(program: Program) -> bool:
+def places_lanes(program: ir.Program) -> bool:
     """Tell if a program writes single lanes, which no line of wide operations can express."""
     body = inlined(program).body
-    return any(ref.lane and ref.array.lanes for s, _ in statements(body) for ref in writes(s))
+    return any(ref.lane and ref.array.lanes for s, _ in ir.statements(body) for ref in writes(s))
 
 
 class _Turns:
@@ -70,96 +55,85 @@ class _Turns:
     slopes: arrays of what is the same for every direction, by their names.
     """
 
-    def __init__(self, patterns: Patterns, boundaries: dict[int, list[Index]]) -> None:
+    def __init__(self, patterns: Patterns, boundaries: dict[int, list[ir.Index]]) -> None:
         self.patterns, self.boundaries = patterns, boundaries
-        self.slopes: dict[str, Array] = {}
-        self.rules: dict[type, Callable[[Any], Iterator[Statement]]] = {
-            Apply: self.apply,
-            Copy: self.copy,
-            Fill: self.fill,
-            Solve: self.solve,
-            Unit: self.unit,
-        }
+        self.slopes: dict[str, ir.Array] = {}
 
-    def body(
-        self, body: tuple[Statement, ...], variables: tuple[str, ...]
-    ) -> tuple[Statement, ...]:
+    def body(self, body: ir.Body, variables: tuple[str, ...]) -> ir.Body:
         """Return the rewritten loop nest."""
-        out: list[Statement] = []
+        out: list[ir.Statement] = []
         for statement in body:
-            if isinstance(statement, Loop):
+            if isinstance(statement, ir.Loop):
                 inner = self.body(statement.body, (*variables, statement.var))
                 out.append(replace(statement, body=inner))
             elif any(ref.array.lanes for ref in (*reads(statement), *writes(statement))):
-                rule = self.rules.get(type(statement))
-                if rule is None:
-                    raise TypeError(f"no rule takes {type(statement).__name__} in turn")
+                rule = rule_of(self, statement, "narrows")
                 self.variables = variables
                 out += rule(statement)
-            elif isinstance(statement, Apply):
+            elif isinstance(statement, ir.Apply):
                 out.append(replace(statement, columns=None))  # it has no tangents left
             else:
                 out.append(statement)
         return tuple(out)
 
     @staticmethod
-    def narrow(array: Array) -> Array:
+    def narrow(array: ir.Array) -> ir.Array:
         """Return what holds an array's directions one after the other."""
         return replace(array, count=array.count * max(array.lanes, 1), lanes=0)
 
-    def at(self, ref: Ref, direction: Index | int = HERE) -> Ref:
+    def at(self, ref: ir.Ref, direction: ir.Index | int = HERE) -> ir.Ref:
         """Return what a reference means in one direction; lanes become scalars that lie apart."""
         array, length = ref.array, ref.array.length
         if not array.lanes:
             return ref
         if ref.lane is None:
-            offset, stride = ref.offset + length * as_index(direction), ref.stride
+            offset, stride = ref.offset + length * ir.as_index(direction), ref.stride
         else:
             down = ref.stride == array.row  # one lane of several scalars
             offset, stride = ref.offset + length * ref.lane, 1 if down else length
-        return Ref(self.narrow(array), offset, ref.size, stride)
+        return ir.Ref(self.narrow(array), offset, ref.size, stride)
 
-    def each(self, lanes: Index | int, *body: Statement) -> Loop:
+    def each(self, lanes: ir.Index | int, *body: ir.Statement) -> ir.Loop:
         """Return a loop over directions."""
-        return Loop(DIRECTION, as_index(0), as_index(lanes), False, body)
+        return ir.Loop(DIRECTION, ir.as_index(0), ir.as_index(lanes), False, body)
 
-    def fill(self, fill: Fill) -> Iterator[Statement]:
+    def fill(self, fill: ir.Fill) -> Iterator[ir.Statement]:
         """Yield the fill for each direction; a whole array is filled at once."""
         target = self.at(fill.target)
         if fill.target == fill.target.array.whole() and len(set(fill.values)) == 1:
             whole = target.array.whole()
-            yield Fill(whole, fill.values[:1] * whole.size)
+            yield ir.Fill(whole, fill.values[:1] * whole.size)
             return
         if not fill.target.lanes:  # single lanes
             yield replace(fill, target=target)
             return
         yield self.each(fill.target.lanes, replace(fill, target=target))
 
-    def unit(self, unit: Unit) -> Iterator[Statement]:
+    def unit(self, unit: ir.Unit) -> Iterator[ir.Statement]:
         """Yield zeros, then the directions that have a one among them."""
         target = unit.target
-        yield from self.fill(Fill(target, (0,) * target.size))
+        yield from self.fill(ir.Fill(target, (0,) * target.size))
         for k in range(target.size):
             one = tuple(int(j == k) for j in range(target.size))
-            yield Fill(self.at(target, unit.first + k), one)
+            yield ir.Fill(self.at(target, unit.first + k), one)
 
-    def copy(self, copy: Copy) -> Iterator[Statement]:
+    def copy(self, copy: ir.Copy) -> Iterator[ir.Statement]:
         """Yield the copy for each direction that has anything, or that of single lanes."""
         moved = replace(copy, target=self.at(copy.target), source=self.at(copy.source))
         if not copy.source.lanes:
             yield self.each(copy.target.lanes, moved) if copy.target.lanes else moved
             return
-        for first, last, moving in self.kinds(copy, as_index(copy.target.lanes)):
+        for first, last, moving in self.kinds(copy, ir.as_index(copy.target.lanes)):
             zeros = [] if copy.adds else self.cleared(copy.target)
             body = [moved] if moving else zeros
             if body:
                 yield replace(self.each(last, *body), start=first)
 
-    def solve(self, solve: Solve) -> Iterator[Statement]:
+    def solve(self, solve: ir.Solve) -> Iterator[ir.Statement]:
         """Yield a solution for each direction."""
         yield self.each(solve.x.lanes, replace(solve, x=self.at(solve.x)))
 
-    def apply(self, call: Apply) -> Iterator[Statement]:
+    def apply(self, call: ir.Apply) -> Iterator[ir.Statement]:
         """Yield the step of what all directions share, then that of each direction."""
         inputs, outputs = call.inputs(), call.outputs()
         adds = dict(zip(outputs, call.adds, strict=True))
@@ -174,42 +148,44 @@ class _Turns:
 
         slopes = {}
         if parts.slopes:
-            array = Array(f"slopes_of_{call.step.name}", "local", parts.slopes)
+            array = ir.Array(f"slopes_of_{call.step.name}", "local", parts.slopes)
             slopes[SLOPES] = self.slopes.setdefault(array.name, array)[0]
         targets = {name: self.at(ref) for name, ref in outputs.items()} | slopes
         sources = {name: self.at(ref) for name, ref in inputs.items()} | slopes
 
-        def applied(step: Step) -> Apply:
+        def applied(step: Step) -> ir.Apply:
             given = [targets[name] for name, _ in step.outputs]
-            return Apply.named(step, sources, given, [adds.get(n, False) for n, _ in step.outputs])
+            return ir.Apply.named(
+                step, sources, given, [adds.get(n, False) for n, _ in step.outputs]
+            )
 
         if parts.shared.outputs:
             yield applied(parts.shared)
         lanes = next(ref.lanes for ref in (inputs | outputs).values() if ref.lanes)
-        stop = as_index(lanes if call.columns is None else call.columns)
+        stop = ir.as_index(lanes if call.columns is None else call.columns)
         for first, last, moving in self.kinds(call, stop):
             step = without(parts.each, wide - moving)
             body = self.cleared(*call.stored()) if is_zero(step) else [applied(step)]
             if body:
                 yield replace(self.each(last, *body), start=first)
 
-    def cleared(self, *targets: Ref) -> list[Statement]:
+    def cleared(self, *targets: ir.Ref) -> list[ir.Statement]:
         """Return what stores the zeros that come of nothing but zeros."""
-        return [Fill(self.at(ref), (0,) * ref.size) for ref in targets if ref.lanes]
+        return [ir.Fill(self.at(ref), (0,) * ref.size) for ref in targets if ref.lanes]
 
     def kinds(
-        self, call: Apply | Copy, stop: Index
-    ) -> Iterator[tuple[Index, Index, frozenset[str]]]:
+        self, call: ir.Apply | ir.Copy, stop: ir.Index
+    ) -> Iterator[tuple[ir.Index, ir.Index, frozenset[str]]]:
         """Yield ranges of directions, and what is not zero in them of what a statement reads."""
         runs = self.patterns.get(id(call), [])
         lanes = next(ref.lanes for ref in (*reads(call), *writes(call)) if ref.lanes)
-        marks = [as_index(0)]
+        marks = [ir.as_index(0)]
         for mark in self.boundaries.get(lanes, []):
             known = all(variable in self.variables for variable, _ in mark.terms)
             if known and all(marks[-1].at(at) <= mark.at(at) <= stop.at(at) for at, _ in runs):
                 marks.append(mark)
         begun: list[
-            tuple[Index, frozenset[str]]
+            tuple[ir.Index, frozenset[str]]
         ] = []  # where each kind begins, and what moves in it
         for first, last in pairwise([*marks, stop]):
             moving = frozenset(
@@ -230,15 +206,15 @@ def bits_between(first: int, last: int) -> int:
     return (1 << max(last, 0)) - (1 << max(first, 0)) if last > first else 0
 
 
-def boundaries(program: Program) -> dict[int, list[Index]]:
+def boundaries(program: ir.Program) -> dict[int, list[ir.Index]]:
     """Return where unit directions begin and end, in order, by the number of all directions."""
-    found: dict[int, set[Index]] = {}
-    for unit, _ in statements(program.body):
-        if isinstance(unit, Unit):
+    found: dict[int, set[ir.Index]] = {}
+    for unit, _ in ir.statements(program.body):
+        if isinstance(unit, ir.Unit):
             ends = unit.first, unit.first + unit.target.size
             found.setdefault(unit.target.lanes, set()).update(ends)
     return {lanes: sorted(marks, key=_place) for lanes, marks in found.items()}
 
 
-def _place(mark: Index) -> tuple:
+def _place(mark: ir.Index) -> tuple:
     return mark.offset, mark.terms

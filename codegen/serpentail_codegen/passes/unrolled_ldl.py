@@ -8,37 +8,25 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 
+from ..ir import program as ir
 from ..ir.dataflow import rewritten
 from ..ir.ldl import ldl_factor, pair_solve
-from ..ir.program import (
-    Apply,
-    Array,
-    Call,
-    Factor,
-    Guard,
-    Program,
-    Ref,
-    Solve,
-    SolvePair,
-    Statement,
-    padded,
-)
 from ..ir.step import Step, compacted
 from ..ir.tape import Tape
 
 
-def unrolled_ldl(program: Program, largest: int) -> Program:
+def unrolled_ldl(program: ir.Program, largest: int) -> ir.Program:
     """Return a program whose matrices of up to ``largest`` rows are eliminated without loops."""
-    pivots: dict[str, Array] = {}
+    pivots: dict[str, ir.Array] = {}
 
-    def rewrite(statement: Statement) -> Iterator[Statement]:
-        if isinstance(statement, Factor) and statement.size <= largest:
+    def rewrite(statement: ir.Statement) -> Iterator[ir.Statement]:
+        if isinstance(statement, ir.Factor) and statement.size <= largest:
             name = f"pivots_{statement.matrix.name}"
-            pivots[name] = Array(name, "local", statement.size)
+            pivots[name] = ir.Array(name, "local", statement.size)
             yield from _factored(statement, pivots[name])
-        elif isinstance(statement, Solve | SolvePair) and statement.x.size <= largest:
+        elif isinstance(statement, ir.Solve | ir.SolvePair) and statement.x.size <= largest:
             yield _solved(statement)
-        elif isinstance(statement, Call):
+        elif isinstance(statement, ir.Call):
             yield replace(statement, program=unrolled_ldl(statement.program, largest))
         else:
             yield statement
@@ -47,26 +35,26 @@ def unrolled_ldl(program: Program, largest: int) -> Program:
     return replace(program, arrays=(*program.arrays, *pivots.values()), body=body)
 
 
-def _factored(factor: Factor, pivots: Array) -> Iterator[Statement]:
+def _factored(factor: ir.Factor, pivots: ir.Array) -> Iterator[ir.Statement]:
     """Yield the step that factors a matrix in place, and the guard of its pivots."""
     rows = _rows(factor.matrix, factor.size, factor.size)
     step = _factor_step(factor.size)
-    yield Apply(step, rows, (*rows, pivots[0]), (False,) * (len(rows) + 1))
-    yield Guard(pivots[0], "NOT_POSITIVE_DEFINITE", rows)
+    yield ir.Apply(step, rows, (*rows, pivots[0]), (False,) * (len(rows) + 1))
+    yield ir.Guard(pivots[0], "NOT_POSITIVE_DEFINITE", rows)
 
 
-def _solved(solve: Solve | SolvePair) -> Apply:
+def _solved(solve: ir.Solve | ir.SolvePair) -> ir.Apply:
     """Return the step that solves with a factored matrix, or with a factored pair."""
-    size, triangles = solve.x.size, 2 if isinstance(solve, SolvePair) else 1
+    size, triangles = solve.x.size, 2 if isinstance(solve, ir.SolvePair) else 1
     rows = _rows(solve.matrix, triangles * size, size)
     step = _solve_step(size, triangles)
     inputs = {f"row_{k}": row for k, row in enumerate(rows)} | {"x": solve.x}
-    return Apply.named(step, inputs, (solve.x,))
+    return ir.Apply.named(step, inputs, (solve.x,))
 
 
-def _rows(matrix: Array, count: int, size: int) -> tuple[Ref, ...]:
+def _rows(matrix: ir.Array, count: int, size: int) -> tuple[ir.Ref, ...]:
     """Return so many rows of lower triangles, one below the other."""
-    return tuple(matrix.part(k * padded(size), k % size + 1) for k in range(count))
+    return tuple(matrix.part(k * ir.padded(size), k % size + 1) for k in range(count))
 
 
 def _row_names(size: int, triangles: int) -> tuple[tuple[str, int], ...]:

@@ -81,19 +81,29 @@ def kind_problems(table: Mapping[str, Any], kind: str) -> list[Problem]:
     wrong = [key for key in names if key in parameters]
     problems += [Problem(f"parameters.{key}", parameters[key], remedy) for key in wrong]
 
-    # coordinates, and functions that polar ones do not have
-    derivatives = _derivatives_in(table.get("functions"))
+    # coordinates
     if table.get("coordinates", rules.coordinates[0]) not in rules.coordinates:
         choices = " or ".join(f'"{name}"' for name in rules.coordinates)
         remedy = f"needs {choices}; polar angles are singular at theta = 0, convert states"
         problems.append(Problem("coordinates", table["coordinates"], remedy))
-    elif table.get("coordinates") == "polar" and derivatives:
+    return problems
+
+
+def polar_problems(table: Mapping[str, Any], kind: str, contacts: Collection[str]) -> list[Problem]:
+    """Return a problem for each entry that polar coordinates do not have."""
+    if table.get("coordinates") != "polar":
+        return []
+    problems, parameters = [], parameters_in(table)
+    derivatives = _derivatives_in(table.get("functions"))
+    if derivatives and "polar" in ONLY[kind].coordinates:
         remedy = f'has no derivatives, such as {derivatives[0]}: use "bend", which has'
         problems.append(Problem("coordinates", "polar", remedy))
-    if table.get("coordinates") == "polar":
-        remedy = 'polar coordinates have no springs, damping or stops: use "bend"'
-        wrong = [name for name in PASSIVE_NAMES if name in parameters]
-        problems += [Problem(f"parameters.{name}", parameters[name], remedy) for name in wrong]
+    remedy = 'polar coordinates have no springs, damping or stops: use "bend"'
+    wrong = [name for name in PASSIVE_NAMES if name in parameters]
+    problems += [Problem(f"parameters.{name}", parameters[name], remedy) for name in wrong]
+    if contacts:
+        remedy = 'polar coordinates have no contacts: use "bend"'
+        problems.append(Problem("contacts", list(contacts), remedy))
     return problems
 
 
@@ -117,9 +127,6 @@ def contact_problems(
     for name, group in [(name, group) for name, group in lacks.items() if group]:
         remedy = f'nothing touches the ground by it; add "{group}" to `contacts`, or remove it'
         problems.append(Problem(f"parameters.{name}", parameters[name], remedy))
-    if contacts and values["coordinates"] == "polar":
-        remedy = 'polar coordinates have no contacts: use "bend"'
-        problems.append(Problem("contacts", list(contacts), remedy))
 
     # a flight has no friction and no functions of the ground; some need one group of points
     remedy = 'needs points that touch the ground: add contacts = ["feet"]'

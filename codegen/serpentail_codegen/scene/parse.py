@@ -32,6 +32,7 @@ from .checks import (
     lacking,
     parameters_in,
     plain,
+    polar_problems,
     segments_in,
     single_problems,
     tail_pieces,
@@ -81,7 +82,7 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
     values |= tail.values
     problems += [*tail.problems, *key_problems(values), *kind_problems(table, kind)]
     problems += function_problems(values["functions"]) + contact_problems(table, values, contacts)
-    problems += fixed_problems(values, contacts)
+    problems += polar_problems(table, kind, contacts) + fixed_problems(values, contacts)
 
     # the kind and the contacts determine which parameters there are
     links = min(sum(values["shape"].counts) or tail_pieces(values), MOST_LINKS)

@@ -193,9 +193,9 @@ def the_ground_never_pulls_nor_holds_by_more_than_friction(model: Model, s: Case
     s, P = sunk(model, s), model.parameters
     _, _, forces = model.contact_dynamics(s.q, s.v, s.tau, bristles(model), *legs(model))
 
-    # a box bounds each axis, a cone the length
+    # the paper's law bounds each axis, the others the length
     sides, limit = forces[:, :2].astype(float), P["mu"] * forces[:, 2].astype(float)
-    boxed = model.manifest["scene"]["friction"] in ("box", "paper")
+    boxed = model.manifest["scene"]["friction"] == "paper"
     size = np.abs(sides).max(axis=1) if boxed else np.linalg.norm(sides, axis=1)
     excess, pull = np.maximum(size - limit, 0), np.maximum(-limit, 0)
     return relative(excess + pull, 0, size + np.finfo(float).tiny)

@@ -41,7 +41,7 @@ from .tails import (
 
 FREE = ("m2_n2", "arcs1", "fixed")
 FREE_SLOW = ("straight", "loops", "segments", "single", "arcs2_loops", "arcs2", "mixed", "baked")
-STANDING = ("ground_m2_n2", "box", "smooth", "paper", "small")
+STANDING = ("ground_m2_n2", "smooth", "paper", "small")
 STANDING_SLOW = ("ground_arcs", "single_ground", "ground_mixed", "feet", "feet_tail")
 
 

@@ -9,9 +9,9 @@ from serpentail_scene.layout import OMEGA, VELOCITY
 from ...ir.program import Array, Index, Ref, padded
 from ...mechanics import airborne, rotations, translation
 from ..draft import Draft
-from ..layout import block, segment_v, tail_v
+from ..layout import block
 from ..passive import add_passive_forces
-from ..scope import State, Vectors
+from ..scope import Vectors
 from ..sweeps.inertia import column_of, tail_inertia
 from ..sweeps.wrenches import core_bias
 from ..tail import Tail
@@ -71,8 +71,8 @@ class Balance:
         which a net force moves, too.
         """
         with self.draft.loop("k", self.draft.tail.nt) as k:
-            reads = {"gain": self.gain[k], "rate": tail_v(rates, k)}
-            self.draft.step(airborne.turned_back_by, reads, turn_=turn)
+            reads = {"gain": self.gain[k], "rate": self.draft.tail.coordinate_v(rates, k)}
+            self.draft.step(airborne.taken_back, reads, part_=turn)
         self.shift(turn, shift, rates)
         if net:
             mass = self.center.only("inverse_mass")
@@ -84,13 +84,14 @@ class Balance:
         self.draft.step(airborne.drift_of_turn, com, {"turn": turn}, shift=shift)
         if rates is None:
             return
-        with self.draft.loop("k", self.draft.tail.nt) as k:
-            reads = {"column": column_of(self.columns, k), "rate": tail_v(rates, k)}
+        tail = self.draft.tail
+        with self.draft.loop("k", tail.nt) as k:
+            reads = {"column": column_of(self.columns, k), "rate": tail.coordinate_v(rates, k)}
             self.draft.step(airborne.moved_back_by, mass, reads, shift_=shift)
 
 
 @dataclass(frozen=True)
-class Motion:
+class Accelerations:
     """Accelerations of an airborne state: ``v_dot``, and ``a`` of B less gravity, torso axes."""
 
     v_dot: Array
@@ -120,7 +121,7 @@ def balance(draft: Draft, arrays: dict[str, Array]) -> Balance:
         return M.part(row * k + other, entries)
 
     columns = draft.array("columns", 6, nt)
-    segments, composite = tail_inertia(draft, State(q, v), M_tail, columns)
+    segments, composite = tail_inertia(draft, draft.state(q, v), M_tail, columns)
     center = draft.vectors(inverse_mass=1, com=3)
     rows = {f"A_{r}": inertia.part(padded(TURN) * r, r + 1) for r in range(TURN)}
     draft.step(translation.without_translation, composite, **center, **rows)
@@ -137,8 +138,8 @@ def balance(draft: Draft, arrays: dict[str, Array]) -> Balance:
         )
         draft.copy(gain[k], coupling[k])
         draft.solve(inertia, gain[k])
-        reads = {"coupling": coupling[k], "rate": tail_v(v, k)}
-        draft.step(airborne.momentum_left, reads, momentum_=omega)
+        reads = {"gain": coupling[k], "rate": tail.coordinate_v(v, k)}
+        draft.step(airborne.taken_back, reads, part_=omega)
         with draft.loop("l", k + 1) as other:
             reads = {"column": column_of(columns, k), "other": column_of(columns, other)}
             reads |= {"coupling": coupling[k], "gain": gain[other]}
@@ -153,12 +154,12 @@ def balance(draft: Draft, arrays: dict[str, Array]) -> Balance:
 
     bias = draft.array("bias", tail.nv)
     core_bias(draft, segments, bias)
-    add_passive_forces(draft, segments.state, lambda i: segment_v(bias, i))
+    add_passive_forces(draft, segments.state, lambda i: tail.segment_v(bias, i))
     tail_momenta = columns, coupling, gain
     return Balance(draft, q, v, quaternion, momentum, inertia, M, *tail_momenta, center, bias)
 
 
-def second_derivatives(b: Balance, arrays: dict[str, Array]) -> Motion:
+def second_derivatives(b: Balance, arrays: dict[str, Array]) -> Accelerations:
     """Store omega_dot's load, and q_t_ddot."""
     draft, tail = b.draft, b.draft.tail
     v_dot, loads = draft.array("v_dot", tail.nv), draft.vectors(net=3)
@@ -166,27 +167,30 @@ def second_derivatives(b: Balance, arrays: dict[str, Array]) -> Motion:
     turn_load = block(v_dot, OMEGA)
     draft.step(airborne.torso_load, b.center.only("com"), reads, **loads, turn_load=turn_load)
     with draft.loop("k", tail.nt) as k:
-        target = tail_v(v_dot, k)
+        target = tail.coordinate_v(v_dot, k)
         draft.copy(target, arrays["tau"].part(k, 1))
-        reads = b.of_tail(k) | {"inertial": tail_v(b.bias, k), "turn_load": turn_load}
+        reads = b.of_tail(k) | {
+            "inertial": tail.coordinate_v(b.bias, k),
+            "turn_load": turn_load,
+        }
         mass = b.center.only("inverse_mass")
         draft.step(airborne.torque_without_torso, mass, loads, reads, load_=target)
     draft.solve(b.M, tail.all_v(v_dot))
-    return Motion(v_dot, loads["net"])
+    return Accelerations(v_dot, loads["net"])
 
 
-def store_rates(b: Balance, motion: Motion, y: Array) -> None:
+def store_rates(b: Balance, motion: Accelerations, y: Array) -> None:
     """Store the rates of x, then omega."""
     draft, tail = b.draft, b.draft.tail
     first, second = at_coordinates(tail), at_rates(tail)
-    reads = {"quaternion": b.quaternion, "omega": b.omega}
-    draft.step(airborne.quaternion_of_turning, reads, rate=block(y, QUATERNION))
+    reads = {"quaternion": b.quaternion, "turn": b.omega}
+    draft.step(rotations.turned_quaternion, reads, rate=block(y, QUATERNION))
     draft.copy(y.part(first, tail.nt), tail.all_v(b.v))
     draft.copy(y.part(second, tail.nt), tail.all_v(motion.v_dot))
     draft.copy(y.part(second + tail.nt, TURN), b.omega)
 
 
-def assemble_rates(draft: Draft, arrays: dict[str, Array]) -> tuple[Balance, Motion]:
+def assemble_rates(draft: Draft, arrays: dict[str, Array]) -> tuple[Balance, Accelerations]:
     """Rates of an airborne state, and omega."""
     b = balance(draft, arrays)
     motion = second_derivatives(b, arrays)

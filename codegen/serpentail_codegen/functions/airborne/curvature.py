@@ -10,23 +10,22 @@ from serpentail_scene.layout import OMEGA, PER_SEGMENT, TORSO_NQ, TORSO_NV, VELO
 
 from ...ir.program import Array, Index, Ref
 from ...mechanics import airborne, rotations
-from ..derivatives.differentiated import VIRTUAL_POWER
+from ..derivatives.differentiated import POWER_AND_MOMENTUM, VIRTUAL_POWER
 from ..derivatives.directions import Directions
 from ..derivatives.hessian import tangents_of_gradient
 from ..draft import Draft
 from ..function import Assembly
-from ..layout import block, coordinate, tail_v
+from ..layout import block, coordinate
 from .balance import (
     QUATERNION,
     TURN,
+    Accelerations,
     Balance,
-    Motion,
     assemble_rates,
     at_coordinates,
     at_rates,
 )
-from .power import POWER_AND_MOMENTUM
-from .slopes import Slopes, assemble_derivatives
+from .slopes import AirborneSlopes, assemble_derivatives
 
 BY_Q = ("q", "v", "v_dot", "a", "drift", "slide")
 
@@ -62,7 +61,7 @@ def assemble_hessian(draft: Draft, arrays: dict[str, Array]) -> None:
     store_hessian(b, slopes, found, crossed, weights, arrays)
 
 
-def store_weights(b: Balance, slopes: Slopes, mu: Array) -> Weights:
+def store_weights(b: Balance, slopes: AirborneSlopes, mu: Array) -> Weights:
     """Store the multipliers: those of accelerations, M^-1 mu with the torso following, then those
     of omega.
     """
@@ -88,7 +87,9 @@ def store_weights(b: Balance, slopes: Slopes, mu: Array) -> Weights:
     return Weights(accelerating, turning)
 
 
-def curvatures(b: Balance, motion: Motion, slopes: Slopes, weights: Weights) -> Curvatures:
+def curvatures(
+    b: Balance, motion: Accelerations, slopes: AirborneSlopes, weights: Weights
+) -> Curvatures:
     """Differentiate the gradients of the weighted equations, by coordinates, and by omega and
     rates.
     """
@@ -113,7 +114,7 @@ def curvatures(b: Balance, motion: Motion, slopes: Slopes, weights: Weights) -> 
     return Curvatures(by_q, by_v["v"], of_q, of_v)
 
 
-def store_crossed(b: Balance, slopes: Slopes, found: Curvatures) -> tuple[Array, Array]:
+def store_crossed(b: Balance, slopes: AirborneSlopes, found: Curvatures) -> tuple[Array, Array]:
     """Return the mixed terms of pairs of a coordinate (lane) and any direction through
     accelerations and drift: along the directions of slopes, and along torques.
     """
@@ -125,7 +126,7 @@ def store_crossed(b: Balance, slopes: Slopes, found: Curvatures) -> tuple[Array,
     reads = {"move": move, "turn": turn}
     draft.step(airborne.torso_weights, b.center, reads, move=move, turn=turn)
     with draft.loop("k", nt) as k:
-        weight = tail_v(by_q["v_dot"], k)
+        weight = tail.coordinate_v(by_q["v_dot"], k)
         reads = b.of_tail(k) | {"weight": weight, "move": move, "turn": turn}
         draft.step(airborne.tail_weight, reads, weight=weight)
     draft.solve(b.inertia, turn)
@@ -138,7 +139,10 @@ def store_crossed(b: Balance, slopes: Slopes, found: Curvatures) -> tuple[Array,
             add = "sum_" if first else "sum"
             draft.step(airborne.crossed, reads, **{add: crossed.part(d, 1)})
         with draft.loop("k", nt) as k:
-            reads = {"weight": tail_v(by_q["v_dot"], k), "change": slopes.tail.lane(k, d, 1)}
+            reads = {
+                "weight": tail.coordinate_v(by_q["v_dot"], k),
+                "change": slopes.tail.lane(k, d, 1),
+            }
             draft.step(airborne.crossed_by_rate, reads, sum_=crossed.part(d, 1))
     add_drift(b, slopes, found, crossed)
 
@@ -146,12 +150,12 @@ def store_crossed(b: Balance, slopes: Slopes, found: Curvatures) -> tuple[Array,
     draft.fill(by_torque.part(0, nt), 0)
     with draft.loop("l", nt) as other, draft.loop("k", nt) as k:
         change = slopes.by_torque.lane(k, other, 1)
-        reads = {"weight": tail_v(by_q["v_dot"], k), "change": change}
+        reads = {"weight": tail.coordinate_v(by_q["v_dot"], k), "change": change}
         draft.step(airborne.crossed_by_rate, reads, sum_=by_torque.part(other, 1))
     return crossed, by_torque
 
 
-def add_drift(b: Balance, slopes: Slopes, found: Curvatures, crossed: Array) -> None:
+def add_drift(b: Balance, slopes: AirborneSlopes, found: Curvatures, crossed: Array) -> None:
     """Add what the drift changes, weighted by the rigid motion's momentum."""
     draft, tail, directions = b.draft, b.draft.tail, slopes.directions
     shift, mass = draft.vector("drift_slope", 3), b.center.only("inverse_mass")
@@ -167,8 +171,8 @@ def add_drift(b: Balance, slopes: Slopes, found: Curvatures, crossed: Array) -> 
         number = coordinate(i) + k
         lane = directions.of_q(i) + k
         b.shift(slopes.omega.down(0, lane, TURN), shift)
-        momentum = {"momentum": found.by_q["slide"].down(0, number, 3)}
-        draft.step(airborne.recoil, mass, momentum, shift_=shift)
+        momentum = {"net": found.by_q["slide"].down(0, number, 3)}
+        draft.step(airborne.pushed, mass, momentum, shift_=shift)
         draft.step(airborne.crossed, weight, sum_=crossed.part(lane, 1))
 
         lane = directions.of_v(i) + k
@@ -180,7 +184,7 @@ def add_drift(b: Balance, slopes: Slopes, found: Curvatures, crossed: Array) -> 
 
 def store_hessian(
     b: Balance,
-    slopes: Slopes,
+    slopes: AirborneSlopes,
     found: Curvatures,
     crossed: tuple[Array, Array],
     weights: Weights,

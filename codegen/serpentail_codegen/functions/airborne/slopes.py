@@ -10,17 +10,17 @@ from serpentail_scene.layout import OMEGA, PER_SEGMENT, TORSO_NV, VELOCITY
 
 from ...autodiff.forward import tangent_program
 from ...ir.program import Array, Index, Ref
-from ...mechanics import airborne
+from ...mechanics import airborne, rotations
 from ..derivatives.differentiated import CORE
 from ..derivatives.directions import Directions
 from ..draft import Draft
 from ..function import assemble
-from ..layout import block, coordinate, tail_v
+from ..layout import block, coordinate
 from ..sweeps.inertia import column_of
 from .balance import (
     TURN,
+    Accelerations,
     Balance,
-    Motion,
     assemble_rates,
     at_coordinates,
     at_rates,
@@ -28,7 +28,7 @@ from .balance import (
 
 
 @dataclass(frozen=True)
-class Slopes:
+class AirborneSlopes:
     """Derivatives of an airborne state's unknowns, row by row, along all directions.
 
     ``omega`` (3 rows); ``tail``: q_t_ddot (nt rows); ``loads``: net and turn_load (3 rows each).
@@ -52,7 +52,9 @@ class Slopes:
         return {f"turn_{k}": self.turns[k] for k in range(4)}
 
 
-def assemble_derivatives(draft: Draft, arrays: dict[str, Array]) -> tuple[Balance, Motion, Slopes]:
+def assemble_derivatives(
+    draft: Draft, arrays: dict[str, Array]
+) -> tuple[Balance, Accelerations, AirborneSlopes]:
     """Rates of an airborne state with their Jacobian."""
     b, motion = assemble_rates(draft, arrays)
     slopes = store_slopes(b, motion)
@@ -60,7 +62,7 @@ def assemble_derivatives(draft: Draft, arrays: dict[str, Array]) -> tuple[Balanc
     return b, motion, slopes
 
 
-def store_slopes(b: Balance, motion: Motion) -> Slopes:
+def store_slopes(b: Balance, motion: Accelerations) -> AirborneSlopes:
     """Differentiate the inertial forces at fixed accelerations, then solve."""
     draft, tail, directions = b.draft, b.draft.tail, Directions(b.draft.tail, ("omega",))
     lanes = directions.count
@@ -88,7 +90,11 @@ def store_slopes(b: Balance, motion: Motion) -> Slopes:
     reads = {"force": block(rows, VELOCITY), "moment": block(rows, OMEGA)}
     draft.step(airborne.torso_load, b.center.only("com"), reads, net=net, turn_load=turn_load)
     with draft.loop("k", tail.nt) as k:
-        reads = b.of_tail(k) | {"inertial": tail_v(rows, k), "net": net, "turn_load": turn_load}
+        reads = b.of_tail(k) | {
+            "inertial": tail.coordinate_v(rows, k),
+            "net": net,
+            "turn_load": turn_load,
+        }
         target = tail_slopes.part(k, 1)
         step = airborne.torque_without_torso
         draft.step(step, b.center.only("inverse_mass"), reads, load=target)
@@ -101,7 +107,7 @@ def store_slopes(b: Balance, motion: Motion) -> Slopes:
     columns = {f"column_{k}": turns[k] for k in range(4)}
     reads = {"quaternion": b.quaternion, "momentum": b.momentum}
     draft.step(airborne.turn_of_quaternion, reads, **columns)
-    return Slopes(directions, omega, tail_slopes, loads, by_omega, by_torque, turns, a)
+    return AirborneSlopes(directions, omega, tail_slopes, loads, by_omega, by_torque, turns, a)
 
 
 def store_omega(b: Balance, directions: Directions, rows: Array, omega: Array) -> None:
@@ -122,8 +128,8 @@ def store_omega(b: Balance, directions: Directions, rows: Array, omega: Array) -
         }
         target = omega.down(0, directions.of_q(i) + k, TURN)
         draft.step(airborne.momentum_slope, b.center, reads, forces, momentum=target)
-        one = {"coupling": b.coupling[number], "rate": draft.fixed("one", [1])}
-        draft.step(airborne.momentum_left, one, momentum=omega.down(0, rate, TURN))
+        one = {"gain": b.coupling[number], "rate": draft.fixed("one", [1])}
+        draft.step(airborne.taken_back, one, part=omega.down(0, rate, TURN))
     draft.solve(b.inertia, omega.part(0, TURN))
 
 
@@ -138,7 +144,7 @@ def chain(draft: Draft, rows: Array, omega: Array) -> Array:
     return by_omega
 
 
-def store_jacobian(b: Balance, slopes: Slopes, J: Array) -> None:
+def store_jacobian(b: Balance, slopes: AirborneSlopes, J: Array) -> None:
     """Store d(y)/d(x, tau), row by row."""
     draft, tail, directions = b.draft, b.draft.tail, slopes.directions
     size, nt = tail.airborne_arguments, tail.nt
@@ -166,7 +172,7 @@ def store_jacobian(b: Balance, slopes: Slopes, J: Array) -> None:
     # of the quaternion's rate
     turning = {"quaternion": b.quaternion}
     with draft.loop("k", tau) as k:
-        reads = turning | {"omega": J.part(k + size * tau, TURN, size)}
-        draft.step(airborne.quaternion_of_turning, reads, rate=J.part(k, 4, size))
+        reads = turning | {"turn": J.part(k + size * tau, TURN, size)}
+        draft.step(rotations.turned_quaternion, reads, rate=J.part(k, 4, size))
     rows = {f"row_{k}_": J.part(k * size, 4) for k in range(4)}
     draft.step(airborne.turning_by_quaternion, {"omega": b.omega}, **rows)

@@ -2,11 +2,10 @@
 
 from ...autodiff.forward import tangent_program
 from ...ir.program import Array
-from ..differentiable import FUNCTIONS
 from ..draft import Draft
 from ..function import Function, assemble
 from ..tail import struct_parameters
-from .differentiated import CORE
+from .differentiated import CORE, FUNCTIONS
 from .jacobians import forward_dynamics_first, minus
 
 
@@ -22,15 +21,18 @@ def assemble_forward_dynamics_parameter_derivatives(draft: Draft, arrays: dict[s
     count = draft.tail.parameter_numbers
     factored, motion = forward_dynamics_first(draft, arrays)
     arguments = {name: arrays[name] for name in ("q", "v")} | motion
-    rows = parameter_tangents(draft, CORE, arguments)
+    # in torso axes gravity acts as an acceleration of a torso that moves
+    inner = FUNCTIONS["inverse_dynamics"] if draft.tail.fixed else CORE
+    arguments = {a.name: arguments[a.name] for a in inner.inputs}
+    rows = parameter_tangents(draft, inner, arguments)
     x = draft.wide("x", draft.tail.nv, count)
     gravity = None
-    if "gravity" in draft.parameters:
+    if "gravity" in draft.parameters and not draft.tail.fixed:
         gravity = draft.wide("d_gravity_z", 1, count)[0]
         draft.unit(
             gravity, 0
         )  # gravity is the first parameter: p_b_ddot decreases by the same amount
-    factored.solve(draft, minus(draft, rows, gravity=gravity), x)
+    factored.solve(minus(draft, rows, gravity=gravity), x)
     spread_parameters(draft, x, arrays["dparameters"])
 
 

@@ -21,9 +21,9 @@ from ...mechanics import link, rotations, segment_slopes, torso, translation
 from ...mechanics.lower import derive
 from ..draft import Draft
 from ..function import Function, assemble
-from ..layout import block, coordinate, segment_v
+from ..layout import block, coordinate
 from ..passive import add_passive_slopes, net_torques
-from ..scope import Motion, State, Vectors
+from ..scope import Motion, Vectors
 from ..sweeps.pieces import mechanism
 from ..sweeps.segments import Freed, forward_dynamics
 from ..tails.mechanism import Segments
@@ -36,7 +36,7 @@ FORCES = 6 + PER_SEGMENT  # wrench at the base, torques
 
 
 @dataclass(frozen=True)
-class Slopes:
+class SegmentSlopes:
     """Derivatives of every segment along its own directions: motion of the tip, wrench and
     torques.
     """
@@ -45,7 +45,7 @@ class Slopes:
     force: Array
 
     @classmethod
-    def declared(cls, draft: Draft, role: str) -> "Slopes":
+    def declared(cls, draft: Draft, role: str) -> "SegmentSlopes":
         """Declare the arrays."""
         sizes = {"tip": 9 * draft.tail.segments, "force": FORCES * draft.tail.segments}
         return cls(*(draft.declare(Array(n, role, s, lanes=OWN)) for n, s in sizes.items()))
@@ -65,7 +65,7 @@ class Slopes:
 def derivatives_by_segments(draft: Draft, arrays: dict[str, Array]) -> None:
     """Jacobians of v_dot by q, v and tau."""
     tail, nv = draft.tail, draft.tail.nv
-    state, v_dot = State(arrays["q"], arrays["v"]), draft.array("acceleration", nv)
+    state, v_dot = draft.state(arrays["q"], arrays["v"]), draft.array("acceleration", nv)
     unloaded = draft.constant("unloaded", [0] * 6)
     torques = net_torques(draft, state, arrays["tau"])
     freed = forward_dynamics(draft, state, unloaded, torques, v_dot, again=True)
@@ -75,7 +75,7 @@ def derivatives_by_segments(draft: Draft, arrays: dict[str, Array]) -> None:
     a = draft.vector("a_torso", 3)
     draft.step(torso.torso_acceleration, reads, a=a)
     motion = Motion(state.omega, block(v_dot, OMEGA), a)
-    slopes = Slopes.declared(draft, "local")
+    slopes = SegmentSlopes.declared(draft, "local")
     arguments = {"q": arrays["q"], "v": arrays["v"], "v_dot": v_dot, "a_torso": a.array}
     draft.call(assemble(SLOPES, tail), tip=slopes.tip, force=slopes.force, **arguments)
 
@@ -106,12 +106,12 @@ def moved(function, *active: str) -> Step:
 
 
 @dataclass(frozen=True)
-class Links:
+class LinkTangents:
     """Differentiates the links of every segment: their wrenches along all of its own directions."""
 
     draft: Draft
     segments: Segments
-    slopes: Slopes
+    slopes: SegmentSlopes
     wrench: Array
     d_wrench: Array
     own: dict[str, Ref]
@@ -167,9 +167,9 @@ class Links:
 
 def assemble_segment_slopes(draft: Draft, arrays: dict[str, Array]) -> None:
     """Slopes of every segment by its own directions, link by link."""
-    state, v_dot, total = State(arrays["q"], arrays["v"]), arrays["v_dot"], draft.tail.total
+    state, v_dot, total = draft.state(arrays["q"], arrays["v"]), arrays["v_dot"], draft.tail.total
     segments = mechanism(draft).prepare(draft, state, False)
-    slopes = Slopes.declared(draft, "output")
+    slopes = SegmentSlopes.declared(draft, "output")
     wrench, d_wrench = draft.array("wrench", 6, total), draft.wide("d_wrench", 6 * total, OWN)
 
     # directions of a segment's own: omega of its base, angles, rates
@@ -177,7 +177,7 @@ def assemble_segment_slopes(draft: Draft, arrays: dict[str, Array]) -> None:
     for name, first in (("w", 0), ("angles", ANGLES), ("rates", RATES)):
         own[name] = draft.wide(f"d_{name}_own", 3 if name == "w" else PER_SEGMENT, OWN)[0]
         draft.unit(own[name], first)
-    links = Links(draft, segments, slopes, wrench, d_wrench, own)
+    links = LinkTangents(draft, segments, slopes, wrench, d_wrench, own)
     links.outward(Motion(state.omega, block(v_dot, OMEGA), arrays["a_torso"][0]), v_dot)
     links.inward()
     add_passive_slopes(draft, state, own, slopes.torque)
@@ -201,7 +201,7 @@ class Changes:
 
     draft: Draft
     directions: Directions
-    slopes: Slopes
+    slopes: SegmentSlopes
     freed: Freed
     lanes: int
 
@@ -233,13 +233,11 @@ class Changes:
         with draft.loop("i", draft.tail.segments) as i:
             reads = self.freed.elimination(i) | {"base": base}
             reads["free"] = free.part(PER_SEGMENT * i, PER_SEGMENT)
-            writes = {"accelerations": segment_v(x, i), "base": base}
+            writes = {"accelerations": draft.tail.segment_v(x, i), "base": base}
             draft.step(segment_slopes.responding, passes.tip_of(i), reads, **writes)
 
     def _outward(self, start: Motion) -> Array:
-        """Carry the motion to the tip at fixed second derivatives; return the loads that it
-        requires.
-        """
+        """Carry the motion to the tip at fixed second derivatives; return the loads it requires."""
         draft, directions = self.draft, self.directions
         motion = draft.wide("d_motion", 9, self.lanes)
         loads = draft.wide("d_loads", FORCES * draft.tail.segments, self.lanes)

@@ -7,10 +7,11 @@ from serpentail_scene.layout import OMEGA
 from serpentail_scene.signatures.arguments import FORCE, MULTIPLIER, V_DOT, Argument, Q, V
 
 from ...ir.program import Array, Ref
+from .. import dynamics, kinematics
 from ..draft import Draft
 from ..dynamics import inertial_forces
-from ..function import Function
-from ..layout import block, segment_v
+from ..function import Function, signed
+from ..layout import block
 from ..passive import add_passive_forces, add_passive_power
 from ..scope import Motion, State, Vectors
 from ..sweeps.momentum import gather_moment
@@ -20,48 +21,53 @@ from ..sweeps.wrenches import virtual_power
 POWER = Argument("power", (1,), "lambda^T (H v_dot + C)")
 A = Argument("a", (3,), "R^T (p_b_ddot + g z), which stands for v_dot[0:3]")
 U_VIRTUAL = Argument("u", (3,), "R^T multiplier[0:3], the virtual velocity of B")
+DRIFT = Argument("drift", (3,), "velocity of B relative to the COM, torso axes")
+RIGID = Argument("rigid", (3,), "turn of a virtual motion as one rigid body")
+SLIDE = Argument("slide", (3,), "its velocity at B")
+RIGID_MOTION = {"w_rigid": "rigid", "u_rigid": "slide", "drift": "drift"}
 FIRST_MOMENT = Argument("moment", (3,), "first moment about B, torso axes (kg m)")
 
 
 def assemble_core(draft: Draft, arrays: dict[str, Array]) -> None:
     """H v_dot + C with all vectors in torso axes: it depends on no attitude and no gravity."""
-    state = State(arrays["q"], arrays["v"])
+    state = draft.state(arrays["q"], arrays["v"])
     core_forces(draft, state, state.omega, arrays)
-    add_passive_forces(draft, state, lambda i: segment_v(arrays["force"], i))
+    add_passive_forces(draft, state, lambda i: draft.tail.segment_v(arrays["force"], i))
 
 
 def assemble_inertia(draft: Draft, arrays: dict[str, Array]) -> None:
     """The core at rest: H v_dot in torso axes."""
-    core_forces(draft, State(arrays["q"]), draft.zero(3), arrays)
+    core_forces(draft, draft.state(arrays["q"]), draft.zero(3), arrays)
 
 
 def core_forces(draft: Draft, state: State, omega: Ref, arrays: dict[str, Array]) -> None:
     """Store H v_dot + C in torso axes."""
     v_dot = arrays["v_dot"]
     segments = mechanism(draft).prepare(draft, state, False)
-    motion = Motion(omega, block(v_dot, OMEGA), arrays["a"][0])
+    motion = Motion(omega, draft.of_torso(v_dot, OMEGA), arrays["a"][0])
     inertial_forces(draft, segments, motion, v_dot, arrays["force"])
 
 
 def assemble_first_moment(draft: Draft, arrays: dict[str, Array]) -> None:
     """First moment of the animal."""
-    segments = mechanism(draft).prepare(draft, State(arrays["q"]), False)
+    segments = mechanism(draft).prepare(draft, draft.state(arrays["q"]), False)
     moment = gather_moment(draft, segments)
     draft.copy(arrays["moment"][0], moment["h"])
 
 
 def assemble_virtual_power(draft: Draft, arrays: dict[str, Array]) -> None:
-    """lambda^T (H v_dot + C) in torso axes, as one sum over the links, from the torso to the
-    tip.
+    """lambda^T (H v_dot + C) in torso axes, as one sum over the links, from the torso to the tip;
+    with a rigid motion among the arguments, also the power of the momentum under it.
     """
     v_dot, multiplier = arrays["v_dot"], arrays["multiplier"]
-    state = State(arrays["q"], arrays["v"])
+    state = draft.state(arrays["q"], arrays["v"])
     segments = mechanism(draft).prepare(draft, state, False)
 
     # the torso moves by v and v_dot, and virtually by the multiplier
     motion = {"w": state.omega, "w_dot": block(v_dot, OMEGA), "a": arrays["a"][0]}
     virtual = {"w_virtual": block(multiplier, OMEGA), "u_virtual": arrays["u"][0]}
-    start = Vectors(motion | virtual)
+    rigid = {name: arrays[a][0] for name, a in RIGID_MOTION.items() if a in arrays}
+    start = Vectors(motion | virtual | rigid)
     virtual_power(draft, segments, start, multiplier, v_dot, arrays["power"][0])
     add_passive_power(draft, state, multiplier, arrays["power"][0])
 
@@ -78,3 +84,15 @@ VIRTUAL_POWER = Function(
     (POWER,),
     assemble_virtual_power,
 )
+# for second derivatives of airborne motion: its weights are Lagrange's multipliers of the equations
+# of accelerations, and of A_r v = R^T h, which determines omega
+POWER_AND_MOMENTUM = Function(
+    "power_and_momentum",
+    "lambda^T (H v_dot + C), and the momentum's power under a rigid motion",
+    (Q, V, V_DOT, A, MULTIPLIER, U_VIRTUAL, DRIFT, RIGID, SLIDE),
+    (POWER,),
+    assemble_virtual_power,
+)
+
+# functions of one state without contact, of which derivatives are taken
+FUNCTIONS = signed(dynamics.ASSEMBLIES | kinematics.ASSEMBLIES)

@@ -6,12 +6,12 @@ body axes, tail coordinates. The columns of such a matrix are those of a velocit
 
 from dataclasses import dataclass
 
-from serpentail_scene.layout import OMEGA, PER_SEGMENT, QUATERNION, TORSO_NV, VELOCITY
+from serpentail_scene.layout import OMEGA, PER_SEGMENT, QUATERNION, VELOCITY
 
 from ...ir.program import Array, Index, Loop, Ref
 from ...mechanics import rotations
 from ..draft import Draft
-from ..layout import block, coordinate, segment_q, segment_v
+from ..layout import block, coordinate
 from ..tail import Tail
 
 # directions of the torso: their position in the tangent of q or v, and whether it is q
@@ -88,9 +88,9 @@ class Directions:
                 )
         with draft.loop("i", self.tail.segments) as i:
             if self.coordinates:
-                draft.unit(segment_q(tangents["d_q"], i), self.of_q(i))
+                draft.unit(draft.tail.segment_q(tangents["d_q"], i), self.of_q(i))
             if self.rates:
-                draft.unit(segment_v(tangents["d_v"], i), self.of_v(i))
+                draft.unit(draft.tail.segment_v(tangents["d_v"], i), self.of_v(i))
         return tangents
 
     def turn(self, draft: Draft) -> Ref:
@@ -110,7 +110,7 @@ class Directions:
                 target = of_q if is_q or not of_v else of_v
                 draft.copy(target.part(nv * r + where.start, 3), source.lane(r, 3 * lane, 3))
             with draft.loop("i", self.tail.segments) as i:
-                column = nv * r + coordinate(i) + TORSO_NV
+                column = nv * r + coordinate(i) + self.tail.torso_nv
                 draft.copy(of_q.part(column, 2), source.lane(r, self.of_q(i), PER_SEGMENT))
                 if of_v:
                     draft.copy(of_v.part(column, 2), source.lane(r, self.of_v(i), PER_SEGMENT))

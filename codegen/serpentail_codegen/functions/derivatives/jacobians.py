@@ -12,16 +12,15 @@ from ...autodiff.reverse import adjoint_program
 from ...ir.program import Array, Index, Ref
 from ...mechanics import rotation_derivatives as turns
 from ...mechanics import rotations, torso, translation
-from ..differentiable import FUNCTIONS
 from ..draft import Draft
 from ..dynamics import assemble_forward_dynamics
 from ..factored import FactoredDynamics, Loads
 from ..function import assemble
-from ..layout import block, tail_v
-from ..scope import State, Vectors
+from ..layout import block
+from ..scope import Vectors
 from ..sweeps.pieces import attitude
 from .by_segments import derivatives_by_segments
-from .differentiated import CORE, VIRTUAL_POWER
+from .differentiated import CORE, FUNCTIONS, VIRTUAL_POWER
 from .directions import Directions
 from .torso_axes import TorsoAxes, acceleration_at, torso_axes, turned_back
 
@@ -42,9 +41,15 @@ def with_unit_quaternion(draft: Draft, q: Array) -> Array:
 
 def assemble_inverse_dynamics_derivatives(draft: Draft, arrays: dict[str, Array]) -> None:
     """Tangents of H v_dot + C along all directions at once, in torso axes."""
-    tail, directions = draft.tail, Directions(draft.tail, ("turn", "omega"))
+    tail, R = draft.tail, attitude(draft, draft.state(arrays["q"]))
+    if tail.fixed:
+        motion = {"v_dot": arrays["v_dot"], "a": acceleration_at(draft, R, arrays["v_dot"])}
+        directions = Directions(tail, ())
+        rows = core_rows(draft, directions, {"q": arrays["q"], "v": arrays["v"]} | motion)
+        directions.spread(draft, rows, arrays["dq"], arrays["dv"])
+        return
+    directions = Directions(tail, ("turn", "omega"))
     lanes, active = directions.count, ("q", "v", "a")
-    R = attitude(draft, State(arrays["q"]))
     a, turn = acceleration_at(draft, R, arrays["v_dot"]), directions.turn(draft)
     inner = tangent_program(
         assemble(CORE, tail), active, lanes, directions.outward, kept=("force",)
@@ -59,6 +64,15 @@ def assemble_inverse_dynamics_derivatives(draft: Draft, arrays: dict[str, Array]
     reads = {"R": R, "force": block(force, VELOCITY), "turn": turn, "change": change}
     draft.step(turns.turning_force, reads, change=change)
     directions.spread(draft, rows, arrays["dq"], arrays["dv"])
+
+
+def core_rows(draft: Draft, directions: Directions, arguments: dict[str, Array]) -> Array:
+    """Return tangents of H v_dot + C in torso axes at fixed accelerations, as wide rows."""
+    lanes = directions.count
+    inner = tangent_program(assemble(CORE, draft.tail), ("q", "v"), lanes, directions.outward)
+    rows = draft.wide("rows", draft.tail.nv, lanes)
+    draft.call(inner, d_force=rows, **arguments, **directions.tangents(draft))
+    return rows
 
 
 def forward_dynamics_first(
@@ -88,9 +102,9 @@ def minus(
     gravity: Ref | None = None,
 ) -> Loads:
     """Return loads of H x = tau - rows, where rows are a change of H v_dot + C in torso axes."""
-    change = {"force": block(rows, VELOCITY), "moment": block(rows, OMEGA)}
+    change = {"force": draft.of_torso(rows, VELOCITY), "moment": draft.of_torso(rows, OMEGA)}
     at_torso, none = loads_at_torso(draft, **change), draft.zero(1)
-    return Loads(at_torso, lambda k: tail_v(rows, k), tau, gravity or none)
+    return Loads(at_torso, lambda k: draft.tail.coordinate_v(rows, k), tau, gravity or none)
 
 
 def assemble_forward_dynamics_derivatives(draft: Draft, arrays: dict[str, Array]) -> None:
@@ -102,18 +116,17 @@ def assemble_forward_dynamics_derivatives(draft: Draft, arrays: dict[str, Array]
         return
     tail, nv = draft.tail, draft.tail.nv
     factored, motion = forward_dynamics_first(draft, arrays)
-    directions = Directions(tail, ("omega",))
-    inner = tangent_program(assemble(CORE, tail), ("q", "v"), directions.count, directions.outward)
-    rows, x = draft.wide("rows", nv, directions.count), draft.wide("x", nv, directions.count)
-    arguments = {name: arrays[name] for name in ("q", "v")} | motion
-    draft.call(inner, d_force=rows, **arguments, **directions.tangents(draft))
-    factored.solve(draft, minus(draft, rows), x)
+    directions = Directions(tail, () if tail.fixed else ("omega",))
+    x = draft.wide("x", nv, directions.count)
+    rows = core_rows(draft, directions, {"q": arrays["q"], "v": arrays["v"]} | motion)
+    factored.solve(minus(draft, rows), x)
     directions.spread(draft, x, arrays["dq"], arrays["dv"])
 
     # how p_b_ddot moves with a rotation of the torso
-    turned = {f"row_{r}": arrays["dq"].part(nv * r + OMEGA.start, 3) for r in range(3)}
-    reads = {"R": factored.R, "a": motion["a"][0]}
-    draft.step(translation.turned_acceleration, reads, **turned)
+    if not tail.fixed:
+        turned = {f"row_{r}": arrays["dq"].part(nv * r + OMEGA.start, 3) for r in range(3)}
+        reads = {"R": factored.R, "a": motion["a"][0]}
+        draft.step(translation.turned_acceleration, reads, **turned)
     torque_columns(draft, factored, arrays["dtau"])
 
 
@@ -122,7 +135,7 @@ def torque_columns(draft: Draft, factored: FactoredDynamics, dtau: Array) -> Non
     nt, nv = draft.tail.nt, draft.tail.nv
     unit, x = draft.wide("unit_torque", nt, nt), draft.wide("x_torque", nv, nt)
     draft.unit(unit.part(0, nt), 0)
-    factored.solve(draft, weightless(draft, lambda k: unit.part(k, 1)), x)
+    factored.solve(weightless(draft, lambda k: unit.part(k, 1)), x)
     with draft.loop("row", nv) as r:
         draft.copy(dtau.part(nt * r, nt), x.lane(r, 0, nt))
 
@@ -139,7 +152,7 @@ def assemble_forward_dynamics_jvp(draft: Draft, arrays: dict[str, Array]) -> Non
     inner = tangent_program(assemble(CORE, tail), ("q", "v"))
     arguments = {name: arrays[name] for name in ("q", "v")} | motion
     draft.call(inner, **arguments, d_q=d_q, d_v=arrays["dv"], d_force=rows)
-    factored.solve(draft, minus(draft, rows, lambda k: arrays["dtau"].part(k, 1)), x)
+    factored.solve(minus(draft, rows, lambda k: arrays["dtau"].part(k, 1)), x)
 
     # how p_b_ddot moves with a rotation of the torso
     p_ddot = block(x, VELOCITY)
@@ -194,7 +207,7 @@ def assemble_forward_dynamics_vjp(draft: Draft, arrays: dict[str, Array]) -> Non
     pull, p_dot = draft.vector("pull", 3), block(multiplier, VELOCITY)
     draft.step(torso.torso_velocity, {"R": factored.R, "p_dot": p_dot}, u=pull)
     load = {"load_force": pull, "load_moment": block(multiplier, OMEGA)}
-    factored.solve(draft, weightless(draft, lambda k: tail_v(multiplier, k), **load), mu)
+    factored.solve(weightless(draft, lambda k: tail.coordinate_v(multiplier, k), **load), mu)
 
     # minus the gradient of mu^T (H v_dot + C)
     axes = torso_axes(draft, arrays["q"], v_dot, mu, factored.R)

@@ -12,7 +12,7 @@ from ...mechanics import rotation_derivatives as turns
 from ...mechanics import torso
 from ..draft import Draft
 from ..layout import block
-from ..scope import State, Vectors
+from ..scope import Vectors
 from ..sweeps.pieces import attitude
 
 
@@ -37,7 +37,7 @@ def torso_axes(
     draft: Draft, q: Array, v_dot: Array, multiplier: Array, R: Ref | None = None
 ) -> TorsoAxes:
     """Turn an acceleration and a virtual velocity into torso axes."""
-    R = R or attitude(draft, State(q))
+    R = R or attitude(draft, draft.state(q))
     axes = TorsoAxes(R, acceleration_at(draft, R, v_dot), draft.array("body_multiplier", 3))
     p_dot = {"R": R, "p_dot": block(multiplier, VELOCITY)}
     draft.step(torso.torso_velocity, p_dot, u=axes.u[0])
@@ -47,7 +47,7 @@ def torso_axes(
 def acceleration_at(draft: Draft, R: Ref, v_dot: Array) -> Array:
     """Return R^T (p_b_ddot + g z)."""
     a = draft.array("body_acceleration", 3)
-    reads = {"R": R, "p_ddot": block(v_dot, VELOCITY)}
+    reads = {"R": R, "p_ddot": draft.of_torso(v_dot, VELOCITY)}
     draft.step(torso.torso_acceleration, reads, a=a[0])
     return a
 

@@ -7,10 +7,9 @@ definite, except for points that slide: their friction follows the load, and S t
 The first three pivots of S eliminate translation.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
-from serpentail_scene.layout import TORSO_NQ, TORSO_NV
+from serpentail_scene.layout import TORSO_NV
 
 from ...ir.program import Array, Index, Ref, padded
 from ...ir.step import Step
@@ -27,27 +26,15 @@ from ..sweeps.pieces import each_segment, points_of
 from ..tails.mechanism import Segments
 from .layout import Factors, each_contact, first_tail_point
 
-# fills H with a given distance of rows; returns state, segments, and attitude of a free torso
-Inertia = Callable[[Draft, dict[str, Array], Array, int], tuple[State, Segments, Ref | None]]
 
-
-def free_inertia(
-    draft: Draft, arrays: dict[str, Array], A: Array, row: int
-) -> tuple[State, Segments, Ref]:
-    """Fill H; return state, segments and attitude."""
-    state = State(arrays["q"], arrays["v"])
-    return state, *fill_mass_matrix(draft, state, A, row)
-
-
-def assemble_factor(
-    draft: Draft, arrays: dict[str, Array], inertia: Inertia = free_inertia
-) -> None:
+def assemble_factor(draft: Draft, arrays: dict[str, Array]) -> None:
     """S = H + tail damping, stiffness and gains + J^T G J of the points in the ground, and its
     LDL^T.
     """
     f, nv = Factors(arrays["factors"], draft.tail), draft.tail.nv
     weight = {"weight": arrays["weight"].part(0, 1)}
-    state, segments, R = inertia(draft, arrays, f.array, padded(nv))
+    state = draft.state(arrays["q"], arrays["v"])
+    segments, R = fill_mass_matrix(draft, state, f.array, padded(nv))
 
     # what fills up the rows of S
     room = padded(nv) - nv
@@ -64,7 +51,7 @@ def assemble_factor(
         draft.copy(f.tail_entry(k, k), f("damped", k), adds=True)
 
     # the ground
-    if draft.tail.contacts and R:
+    if draft.tail.contacts:
         add_contacts(draft, f, state, R, segments, arrays)
         add_sliding(draft, f, R)
         draft.factor_pair(f.array, nv)
@@ -86,7 +73,7 @@ def add_passive_stiffness(draft: Draft, f: Factors, state: State, k: Index) -> N
         slope = draft.vector("slope", 1)
         draft.fill(slope, 0)
         for step in (SLOPES[name] for name in draft.tail.passive if name in SLOPES):
-            reads = Vectors({"angle": state.q.part(TORSO_NQ + k, 1)})
+            reads = Vectors({"angle": state.q.part(draft.tail.torso_nq + k, 1)})
             draft.step(step, reads, passive_parameters(draft, step, own), slope_=slope)
         writes = {"damped_": f("damped", k), "sprung": f("sprung", k)}
         draft.step(passive.sprung_coordinate, weights, {"slope": slope}, **writes)
@@ -113,7 +100,7 @@ def add_gains(draft: Draft, f: Factors, weights: dict[str, Ref]) -> None:
 
 
 @dataclass(frozen=True)
-class Ground:
+class ContactLinearisation:
     """What the linearisation of a point reads: the torso, weights and bristles, and the contact
     law.
     """
@@ -141,7 +128,7 @@ def add_contacts(
     points = gather_points(draft, state, R, arrays, segments)
     law = derive(stiffness.linearised_contact, friction=draft.tail.friction)
     weights = Vectors({**weight, **drag})
-    ground = Ground(state.torso(R), weights, arrays["bristles"], law, points)
+    ground = ContactLinearisation(state.torso(R), weights, arrays["bristles"], law, points)
     for group in [name for name in draft.tail.contacts if name != "tail"]:
         with draft.loop("k", draft.tail.groups[group]) as k:
             number = k + points.first[group]
@@ -152,7 +139,7 @@ def add_contacts(
         add_tail_contacts(draft, f, ground)
 
 
-def keep_point(draft: Draft, f: Factors, ground: Ground, number: Index) -> None:
+def keep_point(draft: Draft, f: Factors, ground: ContactLinearisation, number: Index) -> None:
     """Store arm and depth of a point, and zero stiffness."""
     arm = ground.points.arms[number]
     draft.copy(f("arm", number), arm)
@@ -160,7 +147,7 @@ def keep_point(draft: Draft, f: Factors, ground: Ground, number: Index) -> None:
     draft.fill(f("spring", number), 0)
 
 
-def stiffen(draft: Draft, f: Factors, ground: Ground, number: Index) -> None:
+def stiffen(draft: Draft, f: Factors, ground: ContactLinearisation, number: Index) -> None:
     """Linearise a point in the ground, and add its stiffness to the torso's block of S."""
     motion, spring = ground.points.motion(number), {"spring": f("spring", number)}
     bristle = {"bristle": ground.bristles.part(2 * number, 2)}
@@ -169,7 +156,7 @@ def stiffen(draft: Draft, f: Factors, ground: Ground, number: Index) -> None:
     draft.step(stiffness.stiffened_torso, ground.torso, motion, spring, **rows)
 
 
-def add_tail_contacts(draft: Draft, f: Factors, ground: Ground) -> None:
+def add_tail_contacts(draft: Draft, f: Factors, ground: ContactLinearisation) -> None:
     """Add tail points like those of the torso, with their columns of the tail's coordinates."""
     tail, points = draft.tail, ground.points
     S, force = draft.array("S_segment", 12, tail.segments), draft.vector("force_column", 3)

@@ -12,7 +12,7 @@ from ...ir.program import Array, Index, Ref
 from ...mechanics import contact, passive
 from ...mechanics import contact_stiffness as stiffness
 from ..draft import Draft
-from ..layout import block, coordinate, tail_v
+from ..layout import block, coordinate
 from .layout import Factors, each_contact, first_tail_point
 
 
@@ -91,7 +91,7 @@ class Shift:
             return
         point = number + -first_tail_point(draft.tail)
         with draft.loop("k", coordinate(segment + 1)) as k:
-            reads = {"J_k": f.column(point, k), "coupling": tail_v(self.v, k)}
+            reads = {"J_k": f.column(point, k), "coupling": draft.tail.coordinate_v(self.v, k)}
             draft.step(stiffness.tail_shift, reads, motion_=motion)
 
 
@@ -131,7 +131,7 @@ def contact_response(draft: Draft, f: Factors, arrays: dict[str, Array]) -> Arra
             with draft.loop("k", coordinate(segment + 1)) as k:
                 column = f.column(number + -first_tail_point(draft.tail), k)
                 reads = {"J_k": column, "force": force}
-                draft.step(stiffness.tail_response, reads, rhs_=tail_v(x, k))
+                draft.step(stiffness.tail_response, reads, rhs_=draft.tail.coordinate_v(x, k))
 
     each_contact(draft, respond)
     reads = {"R": f("R"), "load": load}

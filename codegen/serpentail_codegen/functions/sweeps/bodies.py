@@ -7,9 +7,7 @@ from ..scope import Vectors
 
 
 def lane(vector: Ref, i: Index) -> Ref:
-    """Return the part of segment i: a lane of a wide vector, or an entry of an array."""
-    if not vector.lanes:
-        return vector.array[i]
+    """Return the part of segment i: a lane of a wide vector."""
     return vector.array.down(vector.offset, i, vector.size)
 
 
@@ -55,7 +53,7 @@ class Freed:
 
 
 @dataclass(frozen=True)
-class Body:
+class ArticulatedBody:
     """Everything beyond the base of a segment as one body: its wrench is A a + b for the motion a
     of the base.
     """

@@ -12,8 +12,8 @@ from serpentail_scene.layout import OMEGA, VELOCITY
 from ...ir.program import Array, Ref
 from ...mechanics import link_columns, mount, torso, translation
 from ..draft import Draft
-from ..layout import block, coordinate, tail_v
-from ..scope import Motion, State, Vectors
+from ..layout import block, coordinate
+from ..scope import Motion, Vectors
 from ..tails.mechanism import Segments, Wrenches
 from .inertia import column_of, columns_of
 from .pieces import across, each_piece, mechanism
@@ -27,7 +27,7 @@ def factored_dynamics_by_columns(
     quantities that elimination needs.
     """
     nt, columns, bias = draft.tail.nt, arrays["columns"], arrays["bias"]
-    state = State(arrays["q"], arrays["v"])
+    state = draft.state(arrays["q"], arrays["v"])
     segments = mechanism(draft).prepare(draft, state, True)
     zero = draft.zero(3)
     motion = Motion(state.omega, zero, zero)
@@ -50,7 +50,7 @@ def factored_dynamics_by_columns(
     writes = {"force": block(bias, VELOCITY), "moment": block(bias, OMEGA)}
     draft.step(link_columns.torso_bias, reads, **writes)
     with draft.loop("k", nt) as k:
-        draft.copy(tail_v(bias, k), rows.lane(k, nt))
+        draft.copy(draft.tail.coordinate_v(bias, k), rows.lane(k, nt))
         for r in range(6):
             draft.copy(columns.part(6 * k + r, 1), F_columns.array.lane(r, k))
 
@@ -66,9 +66,7 @@ def factored_dynamics_by_columns(
 def _gather(
     draft: Draft, segments: Segments, wrenches: Wrenches, F_columns: Ref, rows: Array
 ) -> tuple[Vectors, Array]:
-    """Sweep from the tip to the mount; return ``mass, h, I``, and the contribution of each
-    segment's joints to its own block.
-    """
+    """Sweep to the mount; return ``mass, h, I``, and what joints add to their own blocks."""
     tail, lanes = draft.tail, rows.lanes
     at, own_joints = draft.wide("at", lanes, lanes), draft.array("own", 2, tail.segments)
     draft.unit(at.part(0, lanes), 0)
@@ -126,9 +124,7 @@ def _own_blocks(
     columns: Array,
     entry: Callable[..., Ref],
 ) -> None:
-    """Store the rows in ``A``: blocks of two segments unchanged, blocks of one segment
-    completed.
-    """
+    """Store the rows in ``A``; blocks of one segment are completed."""
     with draft.loop("i", draft.tail.segments) as i:
         pitch, yaw = coordinate(i), coordinate(i, 1)
         reads = {"own": own_joints[i], "columns": columns_of(columns, i)}

@@ -116,6 +116,14 @@ def tail_inertia(
     return segments, composite
 
 
+def columns_and_inertia(draft: Draft, state: State) -> tuple[Segments, Array, Vectors]:
+    """Return the segments, the momentum columns, and ``mass, h, I`` at B, without H."""
+    segments = mechanism(draft).prepare(draft, state, True)
+    columns, roots = draft.array("columns", 12, draft.tail.segments), segment_roots(draft)
+    forward_roots(draft, segments, torso_pose(draft), roots)
+    return segments, columns, gather_inertia(draft, segments, roots, columns)
+
+
 def column_of(columns: Array, k: Index) -> Ref:
     """Momentum column of tail coordinate k."""
     return columns.part(6 * k, 6)

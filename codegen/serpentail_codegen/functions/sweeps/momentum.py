@@ -40,6 +40,10 @@ def _begin_momentum(
     segments = mechanism(draft).prepare(draft, state, False)
     moment = gather_moment(draft, segments)
     velocity = draft.vectors(w=3, u=3)
+    if draft.tail.fixed:
+        for ref in velocity.named.values():
+            draft.fill(ref, 0)
+        return segments, moment, velocity, Vectors({"u_torso": state.velocity})
     draft.step(torso.torso_velocity, {"R": R, "p_dot": p_dot}, u=velocity["u"])
     u_torso = draft.vectors(u_torso=3)
     draft.copy(u_torso["u_torso"], velocity["u"])
@@ -50,15 +54,12 @@ def _begin_momentum(
 
 
 def gather_moment(draft: Draft, segments: Segments) -> Vectors:
-    """Sum mass and first moment of the tail at its mount, then with a moving torso at B, in
-    ``mass`` and ``h``.
-    """
+    """Sum mass and first moment of torso and tail at B, in ``mass`` and ``h``."""
     moment = draft.vectors(mass=1, h=3)
     for ref in moment.named.values():
         draft.fill(ref, 0)
     for place in each_piece(draft, downward=True):
         draft.step(mechanism(draft).gather_moment, segments.at(*place), moment, **moment)
     across(draft, mount.moment_at_mount, h=moment["h"])
-    if not draft.tail.fixed:
-        draft.step(torso.torso_moment, moment, **moment)
+    draft.step(torso.torso_moment, moment, **moment)
     return moment

@@ -13,8 +13,11 @@ from ...mechanics import mount, rotations, torso
 from ...scene.variant import Stretch
 from ..draft import Draft
 from ..scope import Pose, State
+from ..tails.articulated import ARTICULATED
+from ..tails.continuum import CONTINUUM
 from ..tails.mechanism import Mechanism
-from ..tails.of_scene import mechanism_of
+from ..tails.mixed import MIXED
+from ..tails.polar import POLAR
 
 IDENTITY = (1, 0, 0, 0, 1, 0, 0, 0, 1)
 
@@ -25,11 +28,17 @@ def mechanism(draft: Draft) -> Mechanism:
     In a mixed tail these are the steps of the segments that the open loop is over; outside of such
     loops, those that describe all segments.
     """
-    return mechanism_of(draft.tail, draft.stretch.kind if draft.stretch else "")
+    if draft.tail.polar:
+        return POLAR
+    if draft.tail.kind == "mixed":
+        return MIXED[draft.stretch.kind if draft.stretch else ""]
+    return {"articulated": ARTICULATED, "continuum": CONTINUUM}[draft.tail.kind]
 
 
 def attitude(draft: Draft, state: State) -> Ref:
-    """Store the rotation matrix of the torso."""
+    """Store the rotation matrix of the torso; that of a fixed base is a constant."""
+    if draft.tail.fixed:
+        return draft.fixed("identity", IDENTITY)
     reads = {"quaternion": state.quaternion}
     return draft.store(rotations.quaternion_rotation, reads, R=9)["R"]
 
@@ -97,11 +106,11 @@ def torso_pose(
     draft: Draft, R: Ref | None = None, origin: Ref | None = None, name: str = "link"
 ) -> Pose:
     """Return the pose of the tail mount, to be carried along the tail: from B in torso axes, or
-    from an origin in world axes if the attitude R is given.
+    from an origin in world axes if the attitude R is given.  On a fixed base both are the same.
     """
     pose = Pose(draft.vector(f"R_{name}", 9), draft.vector(f"P_{name}", 3))
     axes = mount_axes(draft)
-    if R:
+    if R and not draft.tail.fixed:
         draft.copy(pose.R, R)
         start = origin or draft.fixed("origin", [0, 0, 0])
         draft.step(torso.mount_position, {"R": R, "p": start}, P=pose.P)

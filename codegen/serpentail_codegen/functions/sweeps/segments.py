@@ -1,26 +1,22 @@
 """Forward dynamics of a long articulated tail by segments: it gives v_dot without H.
 
-The links of all segments are swept at once, segment i in lane i, or joined by doubling. Then one
-sweep goes over the segments from the tip to the mount and treats each as an articulated body with
-free coordinates. A last sweep carries accelerations from the torso to the tip.
+The links of all segments are swept at once, segment i in lane i. Then one sweep goes over the
+segments from the tip to the mount and treats each as an articulated body with free coordinates. A
+last sweep carries accelerations from the torso to the tip.
 """
-
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 from serpentail_scene.layout import OMEGA, PER_SEGMENT, VELOCITY
 
 from ...ir.program import Array, Index, Ref, as_index
 from ...ir.tape import Number
-from ...mechanics import free_segment, link, link_chain, rotations, torso
+from ...mechanics import free_segment, link, rotations, torso
 from ...mechanics.link_columns import torso_bias
 from ..draft import Draft
-from ..layout import block, coordinates, segment_v
+from ..layout import block, coordinates
 from ..scope import State, Vectors
 from ..tails.articulated import link_properties
 from ..tails.mechanism import simplified
-from .bodies import Body, Freed, Passes, lane
-from .doubling import is_doubled, joined_links, lanes_of_chain, links_of
+from .bodies import ArticulatedBody, Freed, Passes, lane
 from .pieces import IDENTITY
 
 UNKNOWNS = 8  # motion of a segment's base, and two coordinates
@@ -40,8 +36,9 @@ def forward_dynamics(
     passes = Passes(tip, draft.array("coasting", 6, m), draft.array("shares", 15, m), over)
 
     # loads of the segments' own links
-    own = _doubled if is_doubled(draft.tail) else _link_by_link
-    inertia, bias = own(draft, state, passes)
+    links = _prepare(draft, state)
+    inertia = _own_inertia(draft, links, passes)
+    bias = _bias(draft, state, links, _base_velocities(draft, state, passes))
 
     # inward: everything beyond the mount, then the torso; outward: accelerations
     body = _inward_pass(draft, passes, inertia, bias, torques)
@@ -51,7 +48,7 @@ def forward_dynamics(
     draft.copy(base.part(3, 3), block(v_dot, OMEGA))
     with draft.loop("i", m) as i:
         reads = {"shares": passes.elimination[i], "coasting": passes.coasting[i], "base": base[0]}
-        writes = {"accelerations": segment_v(v_dot, i), "base": base[0]}
+        writes = {"accelerations": draft.tail.segment_v(v_dot, i), "base": base[0]}
         draft.step(free_segment.outward, passes.tip_of(i), reads, **writes)
     return Freed(passes, inertia, *freed)
 
@@ -64,47 +61,15 @@ def _wide(draft: Draft, name: str, size: int, *values: Number) -> Ref:
     return vector
 
 
-def _link_by_link(draft: Draft, state: State, passes: Passes) -> tuple[Vectors, Vectors]:
-    """Inertia and bias of all segments, segment i in lane i; their tips go to ``passes``."""
-    links = _prepare(draft, state)
-    inertia = _own_inertia(draft, links, passes)
-    w = _wide(draft, "w", 3, 0)
-    with _each_base(draft, state, passes) as (i, w_base):
-        draft.copy(w.array.down(0, i, 3), w_base)
-    return inertia, _bias(draft, state, links, w)
-
-
-def _doubled(draft: Draft, state: State, passes: Passes) -> tuple[Vectors, Vectors]:
-    """The same by doubling: segments are chains of equal links, joined."""
-    m = draft.tail.segments
-    properties = link_properties(draft)
-    chain = joined_links(draft, state, properties["link"])
-    mass = draft.vectors(mass=1)
-    draft.step(link_chain.mass_of_links, properties, links_of(draft, draft.tail.links), **mass)
-    with draft.loop("i", m) as i:
-        tip = lanes_of_chain(chain, i, m)
-        draft.step(link_chain.chain_tip, Vectors(tip), **passes.tip_of(i))
-
-    sizes = {"F_next": 6, "torque": 2, "w_dot": 3, "a": 3}
-    bias = {name: draft.array(f"{name}_bias", size, m) for name, size in sizes.items()}
-    with _each_base(draft, state, passes) as (i, w_base):
-        moving = {"rates": state.rates(i), "w": w_base}
-        writes = {name: array[i] for name, array in bias.items()}
-        draft.step(link_chain.chain_bias, moving, Vectors(lanes_of_chain(chain, i, m)), **writes)
-    named = {name: Ref(array, as_index(0), array.size) for name, array in bias.items()}
-    H = {name: chain["H"].array.part(k, 1) for k, name in enumerate(("H_pp", "H_py", "H_yy"))}
-    return Vectors({**chain.only("h", "I", "pitch", "yaw").named, **H, **mass}), Vectors(named)
-
-
-@contextmanager
-def _each_base(draft: Draft, state: State, passes: Passes) -> Iterator[tuple[Index, Ref]]:
-    """Open a loop over segments; yields the segment and the angular velocity of its base."""
-    w_base = draft.vector("w_base", 3)
+def _base_velocities(draft: Draft, state: State, passes: Passes) -> Ref:
+    """Angular velocities of the bases of all segments."""
+    w, w_base = _wide(draft, "w", 3, 0), draft.vector("w_base", 3)
     draft.copy(w_base, state.omega)
     with draft.loop("i", draft.tail.segments) as i:
-        yield i, w_base
+        draft.copy(w.array.down(0, i, 3), w_base)
         reads = {"rates": state.rates(i), "w": w_base}
         draft.step(free_segment.tip_angular_velocity, passes.tip_of(i), reads, w=w_base)
+    return w
 
 
 def _prepare(draft: Draft, state: State) -> Vectors:
@@ -143,9 +108,7 @@ def _own_inertia(draft: Draft, links: Vectors, passes: Passes) -> Vectors:
 
 
 def _bias(draft: Draft, state: State, links: Vectors, w: Ref) -> Vectors:
-    """Compute the loads that velocities alone cause in each segment, ``F_next`` and ``torque``, and
-    the accelerations of its tip by velocities alone, ``w_dot`` and ``a``.
-    """
+    """Compute loads and tip accelerations of each segment that velocities alone cause."""
     # from the base to the tip
     motion = {"w": w, "w_dot": _wide(draft, "w_dot", 3, 0), "a": _wide(draft, "a", 3, 0)}
     joint = {name: _wide(draft, name, 3) for name in ("a_joint", "swing")}
@@ -167,14 +130,12 @@ def _bias(draft: Draft, state: State, links: Vectors, w: Ref) -> Vectors:
 
 def _inward_pass(
     draft: Draft, passes: Passes, inertia: Vectors, bias: Vectors, torques: Array
-) -> Body:
-    """Sweep from the tip to the mount, eliminate the coordinates, and return what is beyond the
-    mount.
-    """
+) -> ArticulatedBody:
+    """Eliminate the coordinates from the tip to the mount; return all beyond the mount."""
     K, T = draft.wide("K", UNKNOWNS, UNKNOWNS), draft.wide("T", 6, UNKNOWNS)
     b, load = draft.wide("b", 1, UNKNOWNS), draft.wide("load", 1, UNKNOWNS)
     pivots = draft.vector("pivots", 2)
-    body = Body(draft.wide("A", 6, UNKNOWNS), draft.wide("b_base", 1, UNKNOWNS))
+    body = ArticulatedBody(draft.wide("A", 6, UNKNOWNS), draft.wide("b_base", 1, UNKNOWNS))
 
     def begin(i: Index) -> None:
         """Start with the segment alone: its inertia, loads, and the acceleration of its tip by
@@ -225,11 +186,9 @@ def _inward_pass(
 
 
 def _at_torso(
-    draft: Draft, state: State, body: Body, load: Array, v_dot: Array
+    draft: Draft, state: State, body: ArticulatedBody, load: Array, v_dot: Array
 ) -> tuple[tuple[Array, Ref], Ref]:
-    """Compute the accelerations of the torso; return its inertia and attitude, and the acceleration
-    of the mount.
-    """
+    """Accelerate the torso; return its inertia and attitude, and how the mount accelerates."""
     H, rhs = draft.array("H", UNKNOWNS, 6), draft.array("rhs", 6)
     zero, omega = draft.zero(3), state.omega
     F, a_mount = draft.vector("F_tail", 6), draft.vector("a_mount", 3)

@@ -1,16 +1,17 @@
 """Sweeps of wrenches: motion from the torso to the tip, forces back, and their power."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from serpentail_scene.layout import OMEGA, VELOCITY
 
 from ...ir.program import Array, Index, Ref
-from ...mechanics import mount, torso
+from ...mechanics import airborne_power, mount, torso
 from ..draft import Draft
-from ..layout import block, segment_v
-from ..scope import Motion, Vectors
+from ..layout import block
+from ..scope import Motion, State, Vectors
 from ..tails.mechanism import Segments, Wrenches
-from .pieces import across, each_piece, each_segment, mechanism, pieces_of
+from .pieces import across, attitude, each_piece, each_segment, mechanism, pieces_of
 
 
 def forward_wrenches(
@@ -60,13 +61,25 @@ def gather_wrenches(
 
 def core_bias(draft: Draft, segments: Segments, bias: Array) -> None:
     """C without gravity and translation: force and moment at B in torso axes, then the tail's
-    forces.
+    forces; on a fixed base those alone, with gravity.
+    """
+    motion = torso_without_acceleration(draft, segments.state)
+    wrenches = forward_wrenches(draft, segments, motion, None)
+    total = gather_wrenches(draft, segments, wrenches, lambda i: draft.tail.segment_v(bias, i))
+    if not draft.tail.fixed:
+        torso_wrench(draft, motion, total, bias)
+
+
+def torso_without_acceleration(draft: Draft, state: State) -> Motion:
+    """Return the motion of a torso that falls freely, without gravity in its own axes; a fixed base
+    does not fall, and gravity is an acceleration of it.
     """
     zero = draft.zero(3)
-    motion = Motion(segments.state.omega, zero, zero)
-    wrenches = forward_wrenches(draft, segments, motion, None)
-    total = gather_wrenches(draft, segments, wrenches, lambda i: segment_v(bias, i))
-    torso_wrench(draft, motion, total, bias)
+    motion = Motion(state.omega, zero, zero)
+    if not draft.tail.fixed:
+        return motion
+    reads = {"R": attitude(draft, state), "p_ddot": zero}
+    return replace(motion, a=draft.store(torso.torso_acceleration, reads, a=3)["a"])
 
 
 def torso_wrench(draft: Draft, motion: Motion, total: Vectors, force: Array) -> None:
@@ -81,36 +94,48 @@ def torso_wrench(draft: Draft, motion: Motion, total: Vectors, force: Array) -> 
 
 
 def virtual_power(
-    draft: Draft,
-    segments: Segments,
-    start: Vectors,
-    multiplier: Array,
-    v_dot: Array,
-    power: Ref,
+    draft: Draft, segments: Segments, start: Vectors, multiplier: Array, v_dot: Array, power: Ref
 ) -> None:
     """Sum the power of all inertial wrenches when the animal moves with the velocity
     ``multiplier``.
 
     ``start``: ``w``, ``w_dot``, ``a`` of the torso and ``w_virtual``, ``u_virtual``, its virtual
-    velocities.
+    velocities. With ``w_rigid``, ``u_rigid`` and ``drift``, the power of the momentum of omega,
+    drift and rates under a motion as one rigid body is added.
     """
-    names = ("w", "w_dot", "a", "w_virtual", "u_virtual")
-    carried = Vectors({name: draft.vector(f"{name}_here", 3) for name in names})
+    rigid = "w_rigid" in start.named
+    turning = ("w", "w_dot", "w_virtual", "w_rigid") if rigid else ("w", "w_dot", "w_virtual")
+    virtual = [("w_virtual", "u_virtual")] + [("w_rigid", "u_rigid")] * rigid
     draft.step(torso.torso_power, start, power=power)
+    if rigid:
+        draft.step(airborne_power.torso_momentum_power, start, power_=power)
 
     # from B to the tail mount
+    names = ("w", "w_dot", "a", "w_virtual", "u_virtual", *("u", "w_rigid", "u_rigid") * rigid)
+    carried = Vectors({name: draft.vector(f"{name}_here", 3) for name in names})
     draft.step(torso.mount_acceleration, start, a_mount=carried["a"])
-    virtual = {"w": start["w_virtual"], "u": start["u_virtual"]}
-    draft.step(torso.mount_velocity, virtual, u=carried["u_virtual"])
-    for name in ("w", "w_dot", "w_virtual"):
+    for w, u in virtual:
+        draft.step(torso.mount_velocity, {"w": start[w], "u": start[u]}, u=carried[u])
+    if rigid:
+        reads = {"w": start["w"], "u": start["drift"]}
+        draft.step(torso.mount_velocity, reads, u=carried["u"])
+    for name in turning:
         draft.copy(carried[name], start[name])
 
     # into the tail's root axes
     across(draft, mount.motion_at_root, carried.only("w", "w_dot", "a").named)
-    across(draft, mount.virtual_velocity_at_root, carried.only("w_virtual", "u_virtual").named)
+    if rigid:
+        across(draft, mount.velocity_at_root, carried.only("u").named)
+    for w, u in virtual:
+        turned = {"w_virtual": carried[w], "u_virtual": carried[u]}
+        across(draft, mount.virtual_velocity_at_root, turned)
 
     # from the mount to the tip
     for i, g in each_piece(draft):
-        rates = segments.motion(i, v_dot), {"virtual_rates": segment_v(multiplier, i)}
-        step = mechanism(draft).power
+        rates = (
+            segments.motion(i, v_dot),
+            {"virtual_rates": draft.tail.segment_v(multiplier, i)},
+        )
+        tail = mechanism(draft)
+        step = tail.power_and_momentum if rigid else tail.power
         draft.step(step, segments.at(i, g), *rates, carried, power_=power, **carried)

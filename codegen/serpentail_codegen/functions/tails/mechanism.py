@@ -11,7 +11,6 @@ from ...ir.program import Array, Index, Ref
 from ...ir.step import Step, specialised
 from ...mechanics.lower import derive
 from ..draft import Draft
-from ..layout import segment_v
 from ..scope import Motion, State, Vectors
 
 StepFunction = Callable[..., dict]  # a function of mechanics, from which a step is derived
@@ -40,7 +39,7 @@ class Segments:
         """Return the rates of segment i if it moves, and its accelerations if there are any."""
         named = {"rates": self.state.rates(i)} if self.state.v else {}
         if v_dot:
-            named["accelerations"] = segment_v(v_dot, i)
+            named["accelerations"] = self.state.tail.segment_v(v_dot, i)
         return Vectors(named)
 
 

@@ -5,7 +5,7 @@ pass from one stretch to the next as between two links, because both kinds hand 
 tips.
 """
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 from ..draft import Draft
@@ -56,21 +56,10 @@ def with_both(kind: Mechanism) -> Mechanism:
     )
 
 
+# outside of loops over segments only the data of all segments are there
+STEPS = [field.name for field in fields(Mechanism)]
 MIXED = {
     "articulated": with_both(ARTICULATED),
     "continuum": with_both(CONTINUUM),
-    "": Mechanism(
-        prepare=prepare_both,
-        prepare_samples=prepare_both_samples,
-        declare_torques=bending_torques,
-        move=of_no_segment,
-        momentum=of_no_segment,
-        pose=of_no_segment,
-        twist=of_no_segment,
-        gather=of_no_segment,
-        gather_wrench=of_no_segment,
-        gather_moment=of_no_segment,
-        power=of_no_segment,
-        power_and_momentum=of_no_segment,
-    ),
+    "": with_both(Mechanism(**dict.fromkeys(STEPS, of_no_segment))),
 }

@@ -3,13 +3,12 @@
 from dataclasses import dataclass
 
 from ...functions.function import Function, assemble
-from ...functions.sweeps.doubling import is_doubled
 from ...functions.tail import Tail, struct_parameters
 from ...ir.cost import applied, branches
 from ...ir.program import Program
 from ...passes.narrow_directions import directions_in_turn, has_directions, places_lanes
+from ...passes.structural_zeros import without_still
 from ...passes.unrolled_ldl import unrolled_ldl
-from ...passes.zero_tangents import without_still
 from ...scene.scene import Scene
 from .loops import in_loops
 from .routine import CFunction
@@ -62,9 +61,8 @@ def fastest(function: Function, tail: Tail) -> tuple[str, Program]:
     Straight lines are fastest until their text fills the instruction cache, if all of them are
     always run. Sweeps in lanes overtake them before that, and sweeps by segments overtake both.
     """
-    # sweeps by segments, if the tail or a segment is long
-    several = tail.segments > 1 and tail.nt * tail.total >= SEGMENTS_FROM
-    long = tail.uniform and (several or is_doubled(tail))
+    # sweeps by segments, if the tail is long
+    long = tail.uniform and tail.segments > 1 and tail.nt * tail.total >= SEGMENTS_FROM
     form, swept = in_form("segments" if long else "lanes", function, tail)
     if form == "segments" or function.name in ALWAYS_IN_LOOPS:
         return form, swept

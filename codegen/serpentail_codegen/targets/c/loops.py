@@ -3,24 +3,7 @@
 from dataclasses import replace
 from functools import singledispatchmethod
 
-from ...ir.program import (
-    Apply,
-    Array,
-    Call,
-    Copy,
-    Factor,
-    FactorPair,
-    Fill,
-    Guard,
-    Loop,
-    Program,
-    Ref,
-    Solve,
-    SolvePair,
-    Unit,
-    When,
-    padded,
-)
+from ...ir import program as ir
 from ..expressions import called, index_text
 from ..target import UnprintableStatement, body_lines, unknown_statement
 from .conditions import copied_where, stored_where, when_in_lanes
@@ -34,20 +17,20 @@ CALLEES_WORK = "<work>"  # placeholder for the start of a called function's work
 class LoopPrinter:
     """Prints a program as C loops that call its steps."""
 
-    def __init__(self, program: Program, real: str, prefix: str, fixed=None):
+    def __init__(self, program: ir.Program, real: str, prefix: str, fixed=None):
         self.program, self.real, self.prefix, self.fixed = program, real, prefix, fixed or {}
         self.dialect = dialect(real)
-        self.callees: dict[str, tuple[Program, CFunction]] = {}
+        self.callees: dict[str, tuple[ir.Program, CFunction]] = {}
         self.routines: dict[str, Routine] = {}
         self.helpers: set[str] = set()
-        self.used: dict[str, Array] = {}
+        self.used: dict[str, ir.Array] = {}
         self.where: tuple[str, ...] = ()  # rows that are positive in the lanes that store
 
     def function(self) -> CFunction:
         """Return the printed function."""
         body = body_lines(self, self.program.body)
         declarations, work = self._declarations()
-        inner = padded(work)  # the workspace of called functions begins at a whole vector, too
+        inner = ir.padded(work)  # the workspace of called functions begins at a whole vector, too
         lines = (
             *declarations,
             *(line.replace(CALLEES_WORK, str(inner)) for line in body),
@@ -72,7 +55,7 @@ class LoopPrinter:
                 work += array.length * array.row
         return lines, work
 
-    def _ref(self, ref: Ref) -> Ref:
+    def _ref(self, ref: ir.Ref) -> ir.Ref:
         if ref.array.name in self.fixed:
             values = tuple(self.fixed[ref.array.name])
             ref = replace(ref, array=replace(ref.array, role="constant", values=values))
@@ -82,7 +65,7 @@ class LoopPrinter:
     statement = singledispatchmethod(unknown_statement)
 
     @statement.register
-    def _loop(self, loop: Loop) -> list[str]:
+    def _loop(self, loop: ir.Loop) -> list[str]:
         start, stop, var = index_text(loop.start), index_text(loop.stop), loop.var
         head = f"for (int {var} = {start}; {var} < {stop}; ++{var}) {{"
         if loop.downward:
@@ -90,14 +73,14 @@ class LoopPrinter:
         return [head, *("  " + line for line in body_lines(self, loop.body)), "}"]
 
     @statement.register
-    def _when(self, when: When) -> list[str]:
+    def _when(self, when: ir.When) -> list[str]:
         if when.scalar.lanes:
             return when_in_lanes(self, when, self._ref(when.scalar))
         head = f"if ({scalar(self._ref(when.scalar), 0)} > {self.dialect.literal(0)}) {{"
         return [head, *("  " + line for line in body_lines(self, when.body)), "}"]
 
     @statement.register
-    def _fill(self, fill: Fill) -> list[str]:
+    def _fill(self, fill: ir.Fill) -> list[str]:
         target = self._ref(fill.target)
         if target.lanes:
             return self._fill_wide(target, fill.values)
@@ -109,7 +92,7 @@ class LoopPrinter:
             f"{scalar(target, k)} = {self.dialect.literal(v)};" for k, v in enumerate(fill.values)
         ]
 
-    def _fill_wide(self, target: Ref, values) -> list[str]:
+    def _fill_wide(self, target: ir.Ref, values) -> list[str]:
         if target.stride == 1 and not any(values):
             return [
                 f"{self.helper('clear_rows')}({target.size * target.array.row}, {pointer(target)});"
@@ -122,7 +105,7 @@ class LoopPrinter:
         ]
 
     @statement.register
-    def _unit(self, unit: Unit) -> list[str]:
+    def _unit(self, unit: ir.Unit) -> list[str]:
         target, pitch = self._ref(unit.target), unit.target.array.row
         zeros = f"{self.helper('clear_rows')}({target.size * pitch}, {pointer(target)});"
         ones = [target.offset * pitch + k * pitch + unit.first + k for k in range(target.size)]
@@ -132,7 +115,7 @@ class LoopPrinter:
         ]
 
     @statement.register
-    def _copy(self, copy: Copy) -> list[str]:
+    def _copy(self, copy: ir.Copy) -> list[str]:
         target, source = self._ref(copy.target), self._ref(copy.source)
         if target.lanes:
             return self._copy_wide(target, source, copy.adds)
@@ -142,7 +125,7 @@ class LoopPrinter:
         sign = "+=" if copy.adds else "="
         return [f"{scalar(target, k)} {sign} {scalar(source, k)};" for k in range(target.size)]
 
-    def _copy_wide(self, target: Ref, source: Ref, adds: bool) -> list[str]:
+    def _copy_wide(self, target: ir.Ref, source: ir.Ref, adds: bool) -> list[str]:
         pitch = target.array.row
         if self.where:
             return copied_where(self, target, source, adds)
@@ -170,7 +153,7 @@ class LoopPrinter:
         return f"{self.prefix}_{name}"
 
     @statement.register
-    def _guard(self, guard: Guard) -> list[str]:
+    def _guard(self, guard: ir.Guard) -> list[str]:
         scalars, zero = self._ref(guard.scalar), self.dialect.literal(0)
         if scalars.lanes:
             length = scalars.size * scalars.array.row
@@ -180,10 +163,10 @@ class LoopPrinter:
             holds = f"({' && '.join(tests)})"
         return [f"if (!{holds}) {{", f"  return STATUS_{guard.status};", "}"]
 
-    @statement.register(Factor)
-    @statement.register(FactorPair)
-    def _factor(self, factor: Factor | FactorPair) -> list[str]:
-        helper = "pair_factor" if isinstance(factor, FactorPair) else "ldl_factor"
+    @statement.register(ir.Factor)
+    @statement.register(ir.FactorPair)
+    def _factor(self, factor: ir.Factor | ir.FactorPair) -> list[str]:
+        helper = "pair_factor" if isinstance(factor, ir.FactorPair) else "ldl_factor"
         matrix = self._ref(factor.matrix[0])
         self.helpers.add("all_positive" if matrix.lanes else "lanes")
         if matrix.lanes:
@@ -192,7 +175,7 @@ class LoopPrinter:
         return unless_definite(f"{self.helper(helper)}({factor.size}, {pointer(matrix)})")
 
     @statement.register
-    def _solve(self, solve: Solve) -> list[str]:
+    def _solve(self, solve: ir.Solve) -> list[str]:
         matrix, x = self._ref(solve.matrix[0]), self._ref(solve.x)
         if not x.lanes:
             return [f"{self.helper('ldl_solve')}({x.size}, {pointer(matrix)}, {pointer(x)});"]
@@ -204,7 +187,7 @@ class LoopPrinter:
         return [f"{helper}({x.size}, {x.lanes}, {x.array.row}, {pointer(matrix)}, {pointer(x)});"]
 
     @statement.register
-    def _solve_pair(self, solve: SolvePair) -> list[str]:
+    def _solve_pair(self, solve: ir.SolvePair) -> list[str]:
         matrix, x = pointer(self._ref(solve.matrix[0])), pointer(self._ref(solve.x))
         if solve.x.lanes:
             helper = self.helper("pair_solve_side_by_side")
@@ -212,7 +195,7 @@ class LoopPrinter:
         return [f"{self.helper('pair_solve')}({solve.x.size}, {matrix}, {x});"]
 
     @statement.register
-    def _call(self, call: Call) -> list[str]:
+    def _call(self, call: ir.Call) -> list[str]:
         inner = in_loops(call.program, self.real, self.prefix, self.fixed)
         name = call.program.name
         if self.callees.setdefault(name, (call.program, inner))[0] != call.program:
@@ -235,7 +218,7 @@ class LoopPrinter:
         ]
 
     @statement.register
-    def _apply(self, call: Apply) -> list[str]:
+    def _apply(self, call: ir.Apply) -> list[str]:
         outputs = list(zip(call.step.outputs, map(self._ref, call.writes), call.adds, strict=True))
         routine, lanes = self._routine(call)
         arguments = [pointer(self._ref(ref)) for ref in call.reads]
@@ -255,16 +238,16 @@ class LoopPrinter:
         line = f"{self.prefix}_{routine.name}({', '.join(arguments)});"
         return [line] if not before else ["{", *("  " + x for x in (*before, line, *after)), "}"]
 
-    def _scattered(self, name: str, target: Ref, adds: bool) -> list[str]:
+    def _scattered(self, name: str, target: ir.Ref, adds: bool) -> list[str]:
         if target.lanes:
-            source = Array(f"{name}_new", "local", target.size, lanes=target.lanes)[0]
+            source = ir.Array(f"{name}_new", "local", target.size, lanes=target.lanes)[0]
             return self._copy_wide(target, source, adds)
         return [
             f"{scalar(target, k)} {'+=' if adds else '='} {name}_new[{k}];"
             for k in range(target.size)
         ]
 
-    def _routine(self, call: Apply) -> tuple[Routine, int]:
+    def _routine(self, call: ir.Apply) -> tuple[Routine, int]:
         """Return what to call, and the lanes of what is wide."""
         inputs, outputs = call.inputs(), call.outputs()
         refs = (*inputs.items(), *outputs.items())
@@ -278,7 +261,7 @@ class LoopPrinter:
         routine = Routine(call.step, frozenset(wide), pitch, frozenset(adds), apart, chosen)
         if self.routines.setdefault(routine.name, routine) != routine:
             raise ValueError(f"two steps are called {routine.name}")
-        lanes = {name: padded(ref.lanes) for name, ref in wide.items()}
+        lanes = {name: ir.padded(ref.lanes) for name, ref in wide.items()}
         input_lanes = [lanes.get(name, 0) for name, size in call.step.inputs for _ in range(size)]
         self.helpers |= called(call.step.nodes, input_lanes) | ({"lanes"} if wide else set())
         return routine, next((ref.lanes for ref in wide.values()), 0)
@@ -289,6 +272,6 @@ def unless_definite(call: str) -> list[str]:
     return [f"if ({call} != STATUS_OK) {{", "  return STATUS_NOT_POSITIVE_DEFINITE;", "}"]
 
 
-def in_loops(program: Program, real: str, prefix: str, fixed=None) -> CFunction:
+def in_loops(program: ir.Program, real: str, prefix: str, fixed=None) -> CFunction:
     """Print a program as loops."""
     return LoopPrinter(program, real, prefix, fixed).function()

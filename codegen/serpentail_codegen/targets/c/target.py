@@ -7,13 +7,20 @@ from ...functions.function import Function
 from ...functions.tail import Tail
 from ...scene.scene import Scene
 from ..target import Emission, Target
+from ..templating import render
 from .batch import batch_entry, batch_files, batches
 from .batch_rollout import batch_rollout, batch_rollout_entry, batch_rollout_file
 from .form import RULE, printed_function
 from .loops import LoopPrinter
 from .model import c_context, model_files
-from .package import package_files
 from .records import layouts
+
+PACKAGE = {
+    "Makefile": "package/makefile.jinja",
+    "CMakeLists.txt": "package/cmake.txt.jinja",
+    "LICENSE": "package/license.txt.jinja",
+    "README.md": "package/readme.md.jinja",
+}
 
 
 def emit(scene: Scene, tail: Tail, functions: Iterable[Function], version: str) -> Emission:
@@ -54,6 +61,12 @@ def c_entries(context: dict[str, Any]) -> dict[str, Any]:
             "records": layouts(has),
         }
     return entries
+
+
+def package_files(context: dict) -> dict[str, str]:
+    """Render the files that a user of the C alone needs besides it."""
+    context = context | {"size": {"float": 4, "double": 8}[context["real"]]}
+    return {name: render("c", template, context) for name, template in PACKAGE.items()}
 
 
 C = Target("c", LoopPrinter, emit)

@@ -3,24 +3,8 @@
 import re
 from functools import singledispatchmethod
 
+from ...ir import program as ir
 from ...ir.dataflow import inlined
-from ...ir.program import (
-    Apply,
-    Call,
-    Copy,
-    Factor,
-    FactorPair,
-    Fill,
-    Guard,
-    Loop,
-    Program,
-    Ref,
-    Solve,
-    SolvePair,
-    Unit,
-    When,
-    padded,
-)
 from ...ir.step import Step
 from ..expressions import Dialect, Scalars, index_text
 from ..target import UnprintableStatement, body_lines, refused, unknown_statement
@@ -32,7 +16,7 @@ PYTHON = Dialect(
 )
 
 
-def slice_text(ref: Ref) -> str:
+def slice_text(ref: ir.Ref) -> str:
     """Print the slice of a list for a reference."""
     if ref.array.lanes:
         raise UnprintableStatement(f"{ref.array.name} has lanes: the module's lists hold numbers")
@@ -64,7 +48,7 @@ def step_view(step: Step) -> dict:
 class PythonPrinter:
     """Prints a program as Python loops over lists."""
 
-    def __init__(self, program: Program):
+    def __init__(self, program: ir.Program):
         self.program = inlined(program)
         self.steps: dict[str, Step] = {}
 
@@ -89,25 +73,25 @@ class PythonPrinter:
     statement = singledispatchmethod(unknown_statement)
 
     @statement.register
-    def _loop(self, loop: Loop) -> list[str]:
+    def _loop(self, loop: ir.Loop) -> list[str]:
         span = f"range({index_text(loop.start)}, {index_text(loop.stop)})"
         head = f"for {loop.var} in {f'reversed({span})' if loop.downward else span}:"
         return [head, *("    " + line for line in body_lines(self, loop.body))]
 
     @statement.register
-    def _fill(self, fill: Fill) -> list[str]:
+    def _fill(self, fill: ir.Fill) -> list[str]:
         target = slice_text(fill.target)
         if len(set(fill.values)) == 1:
             return [f"{target} = [{PYTHON.literal(fill.values[0])}] * {fill.target.size}"]
         return [f"{target} = [{', '.join(map(PYTHON.literal, fill.values))}]"]
 
     @statement.register
-    def _copy(self, copy: Copy) -> list[str]:
+    def _copy(self, copy: ir.Copy) -> list[str]:
         target, source = slice_text(copy.target), slice_text(copy.source)
         return [f"{target} = added({target}, {source})" if copy.adds else f"{target} = {source}"]
 
     @statement.register
-    def _guard(self, guard: Guard) -> list[str]:
+    def _guard(self, guard: ir.Guard) -> list[str]:
         if guard.scalar.size != 1:
             raise refused(self, guard, "`where` of the module takes a single scalar")
         return [
@@ -116,17 +100,17 @@ class PythonPrinter:
         ]
 
     @statement.register
-    def _factor(self, factor: Factor) -> list[str]:
-        matrix, distance = factor.matrix.name, padded(factor.size)
+    def _factor(self, factor: ir.Factor) -> list[str]:
+        matrix, distance = factor.matrix.name, ir.padded(factor.size)
         return [f"{matrix} = ldl_factor({matrix}, {factor.size}, {distance})"]
 
     @statement.register
-    def _solve(self, solve: Solve) -> list[str]:
-        x, distance = slice_text(solve.x), padded(solve.x.size)
+    def _solve(self, solve: ir.Solve) -> list[str]:
+        x, distance = slice_text(solve.x), ir.padded(solve.x.size)
         return [f"{x} = ldl_solve({solve.matrix.name}, {x}, {distance})"]
 
     @statement.register
-    def _apply(self, apply: Apply) -> list[str]:
+    def _apply(self, apply: ir.Apply) -> list[str]:
         if self.steps.setdefault(apply.step.name, apply.step) != apply.step:
             raise ValueError(f"two steps are called {apply.step.name}")
         call = f"{apply.step.name}({', '.join(map(slice_text, apply.reads))})"
@@ -140,13 +124,13 @@ class PythonPrinter:
         return [f"({', '.join(targets)},) = {call}", *sums]
 
     @statement.register
-    def _when(self, statement: When) -> list[str]:
+    def _when(self, statement: ir.When) -> list[str]:
         raise refused(self, statement, "a symbolic graph has no branches")
 
     @statement.register
-    def _compiled_only(self, statement: Unit | FactorPair | SolvePair) -> list[str]:
+    def _compiled_only(self, statement: ir.Unit | ir.FactorPair | ir.SolvePair) -> list[str]:
         raise refused(self, statement, "only functions that CasADi gets as compiled C have it")
 
     @statement.register
-    def _call(self, statement: Call) -> list[str]:
+    def _call(self, statement: ir.Call) -> list[str]:
         raise refused(self, statement, "programs are inlined before they are printed")
