@@ -4,7 +4,7 @@ import numpy as np
 
 from checks.stress.figure import Figure
 from checks.stress.subjects import changed, compared, errors, state, subject
-from serpentail.model.plausible_sizes import disparity
+from serpentail.basics.plausible_values import disparity
 
 LONG = ((1, 1), (8, 4), (20, 1), (20, 4), (1, 512), (6, None))
 EXTREME = ((1, 1), (1, 3), (3, 4), (1, None), (3, None))

@@ -111,7 +111,7 @@ def test_what_cannot_be_built_is_refused_by_name(cache, monkeypatch):
         with row(scene, options), pytest.raises(st.SerpentailError, match=words):
             made(scene, **options)
     monkeypatch.setattr("serpentail.building.generator.find_spec", lambda name: None)
-    with pytest.raises(st.ModelError, match="without serpentail_codegen"):
+    with pytest.raises(st.ModelError, match="without the package serpentail_codegen"):
         made(**TINY)
 
 
