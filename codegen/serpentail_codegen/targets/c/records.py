@@ -259,4 +259,5 @@ ROLLOUTS = fields(
     ("next", "long", "index of the next run to start"),
     ("pause", "long", "largest number of steps in one call"),
     ("work", "real *", "workspace; it contains the flights between calls"),
+    ("lane", "int", "the lane whose run all others are in step with; -1: they are not"),
 )
