@@ -17,6 +17,7 @@ ROOT = Path(__file__).parents[2]
 PAGE = "serpentail/show/page/page.html"
 PARTS = {  # where the sources of a wheel's folders are, and which files of them it has
     "serpentail_codegen": (ROOT / "codegen" / "serpentail_codegen", ("*.py", "*.jinja", "*.typed")),
+    "serpentail_scene": (ROOT / "codegen" / "serpentail_scene", ("*.py", "*.typed")),
     "serpentail": (ROOT / "runtime" / "serpentail", ("*.py", "*.[ch]", "*.cc", "*.typed")),
     "serpentail/examples": (ROOT / "scenes", ("*.toml",)),
 }
