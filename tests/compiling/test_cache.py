@@ -15,7 +15,7 @@ from serpentail.compiling import compiler
 from serpentail.compiling.cache import publish
 from tests.support.file_faults import HOUR, age
 
-from ...support.rows import row
+from ..support.rows import row
 from .conftest import TWICE, call_twice, forbid_processes, libraries
 
 

@@ -24,7 +24,7 @@ from serpentail.model.manifest import read_folder
 from tests.support import zoo
 from tests.support.file_faults import age, at, before_calls, fault
 
-from ...support.rows import row
+from ..support.rows import row
 from .conftest import call_twice, forbid_processes, libraries, program
 
 
