@@ -12,11 +12,10 @@ from serpentail.model.parameters import RunParameters, link_inertia, resolve
 from serpentail_codegen.scene.parse import parse_scene
 from serpentail_codegen.scene.resolve import resolve_parameters
 from serpentail_scene.parameters import PARAMETERS
+from tests.compiling.conftest import forbid_processes
 from tests.support import zoo
 from tests.support.models import folder_of
 from tests.support.rows import row
-
-from .compiler.conftest import forbid_processes
 
 TOTAL = 4  # links of "m2_n2"
 INERTIA = (2.5e-07, 3.9e-09, 2.6e-07)
