@@ -31,6 +31,7 @@ _HOME = {
     "plan": "planning.planner",
     **dict.fromkeys(["Goal", "Bounds"], "planning.goal"),
     "Plan": "planning.result.plan",
+    "Gains": "planning.gains.gains",
     "Mpc": "mpc.mpc",
     "Pfl": "simulation.controllers.pfl",
     "Sequence": "sequence.sequence",

@@ -2,9 +2,10 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,6 +27,9 @@ from ..problem import PlanningProblem
 from .curve import Curve
 from .full_state import full_state
 from .truth import planned_torques
+
+if TYPE_CHECKING:
+    from ..gains.gains import Gains
 
 SAMPLES = 240  # of a trajectory, at least
 SHOWN = ("planned", "true", "passive")  # motions of its page
@@ -116,6 +120,20 @@ class Plan:
     def duration(self) -> float:
         """Duration (s)."""
         return self.curve.duration
+
+    @cached_property
+    def gains(self) -> "Gains":
+        """Feedback along the plan, a controller for ``simulate``; made when it is first needed.
+
+        PlanningError if the model lacks a function, or the plan was pickled: see ``Gains``.
+        """
+        from ..gains.gains import Gains
+
+        return Gains(self)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out the gains, which belong to the model's compiled code."""
+        return {name: value for name, value in vars(self).items() if name != "gains"}
 
     def view(self, path: str | PathLike[str] = "plan.html", model: Model | None = None) -> Path:
         """Write a page with the planned motion, the true one, and passive flight.

@@ -1,0 +1,1 @@
+"""Feedback along a plan: Riccati gains, and where they hold."""
