@@ -89,18 +89,19 @@ int gains_tick(gains_state *state, gains_real t, const gains_real *q, const gain
     const gains_task *task = state->task;
     const int m = task->tail, n = GAINS_TORSO + 2 * m;
     gains_real *e = state->memory;
+    const gains_real late = t + task->period / 1000; /* a t that was rounded down counts as reached */
     int told = 0;
-    state->ticks++;
-    if (!(t < task->times[task->pieces])) {
+    if (!(late < task->times[task->pieces])) {
         for (int a = 0; a < m; a++) {
             tau[a] = 0;
         }
         return 0;
     }
+    state->ticks++;
     planned(task, t, m, 3 * m + GAINS_PLANNED, e + 1);
     planned(task, t + task->period / 2, 0, m, tau); /* the mean until the next tick, nearly */
     const gains_real norm = error(m, q, v, e);
-    const int knot = last_before(task->begins, task->knots, t);
+    const int knot = last_before(task->begins, task->knots, late);
     const gains_real size = cost(n, task->costs + knot * (n * (n + 1) / 2), e);
     if (!isfinite(size) || !(10 * norm > 9 && 10 * norm < 11)) {
         told = GAINS_FAILED;

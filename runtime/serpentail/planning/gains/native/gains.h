@@ -44,7 +44,7 @@ typedef struct {
 typedef struct {
     const gains_task *task;
     gains_real *memory;                      /* gains_memory_size(task) numbers */
-    long ticks, failed, saturated, beyond; /* number of ticks, and of those that told each flag */
+    long ticks, failed, saturated, beyond; /* ticks in the flight; those that told each flag */
 } gains_state;
 
 int gains_memory_size(const gains_task *task);
