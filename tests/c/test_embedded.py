@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from checks.embedded import boards, comparison, costs, image, mpc_image, results
+from checks.embedded import boards, comparison, costs, gains_image, image, mpc_image, results
 from tests.support import zoo
 from tests.support.models import folder_of
 from tests.support.predictive import plan_of
@@ -127,6 +127,24 @@ def test_the_controller_needs_nothing_but_the_model_and_memory(tmp_path):
     assert not [name for name, kind in symbols if kind in "BbDdC"]  # nothing that is kept
     public = {name for name, kind in symbols if kind in "TRV"}
     assert public and all(name.startswith(f"{model.name}_mpc_") for name in public)
+
+
+# Gains
+
+
+def test_gains_on_a_cortex_m4f_have_the_host_s_bits_and_leave_room_for_1_khz(tmp_path):
+    """A tick of a board at 168 MHz is 168000 cycles; the torques are Python's, in float."""
+    board("m4")
+    gains = st.Gains(plan_of(1), within=None)
+    found, host = (
+        gains_image.ticks(gains, name, tmp_path / name, "reproducible") for name in ("m4", "host")
+    )
+    assert (found.bits == host.bits).all() and set(found.statuses) == {0}
+    assert 500 < max(found.instructions) < 2000
+    for state, torques in zip(gains_image.states_of(gains), found.values, strict=True):
+        t, q, v = np.split(state.astype(float), [1, 10])
+        np.testing.assert_allclose(torques, gains(t[0], q, v), atol=1e-5)
+        assert np.abs(torques - gains.plan.torque(t)).max() > 1e-5
 
 
 # The instruments.

@@ -73,7 +73,8 @@ def test_examples_of_docstrings_run():
 
 # The site.
 
-CLASSES = (st.Model, st.Trajectory, st.Plan, st.Rollouts, st.Mpc, st.Sweep, st.Identification)
+CLASSES = (st.Model, st.Trajectory, st.Plan, st.Rollouts, st.Gains, st.Mpc, st.Sweep)
+CLASSES += (st.Identification,)
 LINK = r'<link\b(?=[^>]*\srel="([^"]*)")[^>]*\shref="([^"]*)"'
 RELATED = {"next", "prev", "search", "index"}
 BESIDE = ("CHANGELOG.md", "CONTRIBUTING.md", "LICENSE", "README.md", "SECURITY.md")

@@ -56,7 +56,7 @@ class SimulationError(SerpentailError):
 
 
 class PlanningError(SerpentailError, ValueError):
-    """A planning problem is not well posed, or a setting of a plan or of ``Mpc`` is wrong."""
+    """A planning problem, or a setting of a plan, of ``Gains`` or of ``Mpc``, is wrong."""
 
 
 class IdentificationError(SerpentailError, ValueError):

@@ -55,11 +55,11 @@ def simulate(
         State at the start; the quaternion is normalised. With a leading axis, (k, nq) or
         (k, nv), they are k starts; see Notes.
     controller : controller or callable, optional
-        Torques of the tail: ``Damping``, ``TorqueTable``, ``TorqueCurve``, ``Pfl``, ``Mpc``,
-        ``NativeTorque``, ``Sampled``, ``Phases`` of these, or a function ``(t, q, v) -> tau`` with
-        t (s) and tau (2m,) (N m). It must depend on (t, q, v) alone: it is called several times
-        a step, also at earlier times. ``Sampled`` is for functions with a memory. Default: no
-        torque.
+        Torques of the tail: ``Damping``, ``TorqueTable``, ``TorqueCurve``, ``Pfl``, ``Gains``,
+        ``Mpc``, ``NativeTorque``, ``Sampled``, ``Phases`` of these, or a function
+        ``(t, q, v) -> tau`` with t (s) and tau (2m,) (N m). It must depend on (t, q, v) alone: it
+        is called several times a step, also at earlier times. ``Sampled`` is for functions with a
+        memory. Default: no torque.
     t_span : float or (float, float), default (0, 1)
         Start and end (s), or the end alone.
     method : str, default "auto"
