@@ -93,7 +93,7 @@ def test_gains_solve_the_least_squares_over_simulated_steps():
     """Of all torques from a step to the end, as one problem, the first ones are K e."""
     tail = st.Goal("upright", None, (0.1, None), (None, 0.0))
     for goal, damping in ((st.Goal(), 0.0), (tail, 1e-4)):
-        plan = plan_of(0, goal=goal, damping=damping, intervals=24)
+        plan = plan_of(0, goal=goal, damping=damping, intervals=24, solver="fatrop")
         gains = st.Gains(plan, rate=60, knots=1000)
         times = np.append(gains.times, plan.duration)
         steps = [linear_step(plan, *pair) for pair in pairwise(times)]
