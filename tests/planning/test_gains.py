@@ -182,6 +182,8 @@ def test_flights_that_end_wrong_are_flagged_and_most_others_are_not(plan):
     free = st.Gains(plan, within=None)
     run = st.simulate(rat(), q, v + 20, controller=free, t_span=0.4)
     assert run.info["gains"]["beyond"] == 0 < run.info["gains"]["saturated"]
+    anyhow = st.Gains(plan_of(1, goal=st.Goal(None, None, tail=(0.1, None))), flights=4)
+    assert not anyhow.validity.errors.any() and anyhow.validity.push == anyhow.validity.pushes[-1]
 
 
 def test_gains_right_bodies_that_their_plan_does_not(plan):

@@ -1,6 +1,6 @@
 """Flights near a plan: linear equations of their errors, from the model's exact derivatives."""
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 
@@ -8,7 +8,8 @@ from ...basics.attitude import product
 from ...model.model import Model
 from ..result.plan import Plan
 
-SQUARE = slice(0, 3)  # entries of the attitude's error, in e and in z
+TURNED = slice(0, 3)  # entries of the attitude's error, in e and in z
+MOST_POINTS = 500  # of a call: for many more, a model compiles lanes, which takes seconds
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,24 +29,20 @@ class LinearFlight:
     E: np.ndarray
 
 
-def planned_at(model: Model, plan: Plan, k: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return airborne states (K, 4 + 2 (2m)), torques with damping (K, 2m), the angular momentum
-    (K, 3) and planned numbers, as of ``LinearFlight``, in intervals k (K,) at fractions s (K,).
-    """
-    blocks = plan.curve.inside(k, s)
+def linear_flight(model: Model, plan: Plan, k: np.ndarray, s: np.ndarray) -> LinearFlight:
+    """Return the linear equations in intervals k (K,) of the plan at fractions s (K,) of them."""
+    if len(k) > MOST_POINTS:
+        places = range(0, len(k), MOST_POINTS)
+        pairs = ((k[i : i + MOST_POINTS], s[i : i + MOST_POINTS]) for i in places)
+        parts = [astuple(linear_flight(model, plan, *pair)) for pair in pairs]
+        return LinearFlight(*(np.concatenate(rows) for rows in zip(*parts, strict=True)))
+    blocks, nt, points = plan.curve.inside(k, s), model.layout.nt, len(k)
     norm = np.linalg.norm(blocks["attitude"], axis=1, keepdims=True)
     x = np.concatenate([blocks["attitude"] / norm, blocks["tail"], blocks["tail_rate"]], axis=1)
     tau = blocks["torque"] - plan.problem.damping * blocks["tail_rate"]
-    h = np.tile(model.momentum(*plan.start)[1], (len(x), 1))
-    omega = model.airborne_rates(x, tau, h)[:, -3:]
-    return x, tau, h, np.concatenate([blocks["torque"], x[:, :4], omega, x[:, 4:]], axis=1)
-
-
-def linear_flight(model: Model, plan: Plan, k: np.ndarray, s: np.ndarray) -> LinearFlight:
-    """Return the linear equations in intervals k (K,) of the plan at fractions s (K,) of them."""
-    x, tau, h, planned = planned_at(model, plan, k, s)
-    nt, points = model.layout.nt, len(x)
-    _, J = model.airborne_rates_derivatives(x, tau, h)
+    h = np.tile(model.momentum(*plan.start)[1], (points, 1))
+    y, J = model.airborne_rates_derivatives(x, tau, h)
+    turning = y[:, -3:]
 
     # y = (rates of x, omega) by z: the quaternion turns by q (0, phi) / 2
     turned = np.zeros((points, x.shape[1], 3 + 2 * nt))
@@ -60,13 +57,12 @@ def linear_flight(model: Model, plan: Plan, k: np.ndarray, s: np.ndarray) -> Lin
     # phi_dot = domega - omega x phi; the momentum stays
     n, omega, rates = 6 + 2 * nt, by_z[:, -3:], slice(4 + nt, 4 + 2 * nt)
     A, B, E = np.zeros((points, n, n)), np.zeros((points, n, nt)), np.zeros((points, n, n))
-    A[:, SQUARE] = omega
-    A[:, SQUARE, SQUARE] -= np.swapaxes(
-        np.cross(planned[:, nt + 4 : nt + 7, None].swapaxes(1, 2), np.eye(3)), 1, 2
-    )
+    A[:, TURNED] = omega
+    A[:, TURNED, TURNED] += np.cross(turning[:, None], np.eye(3))
     A[:, 3 : 3 + nt, 3 + nt : 3 + 2 * nt] = np.eye(nt)
     A[:, 3 + nt : 3 + 2 * nt], B[:, 3 + nt : 3 + 2 * nt] = by_z[:, rates], by_torque[:, rates]
-    E[:, SQUARE, SQUARE], E[:, 3:6], E[:, 6:, 3 : 3 + 2 * nt] = np.eye(3), omega, np.eye(2 * nt)
+    E[:, TURNED, TURNED], E[:, 3:6], E[:, 6:, 3 : 3 + 2 * nt] = np.eye(3), omega, np.eye(2 * nt)
+    planned = np.concatenate([blocks["torque"], x[:, :4], turning, x[:, 4:]], axis=1)
     return LinearFlight(planned, A, B, E)
 
 

@@ -8,7 +8,7 @@ from ...model.model import Model
 from ..nlp.coordinates import attitude
 from ..nlp.direct import goal_matrix
 from ..result.plan import Plan
-from .linear import SQUARE, LinearFlight, linear_flight, planned_at
+from .linear import TURNED, linear_flight
 
 # errors at the end that weigh as much as a correction by the largest torque all the time
 TURN, TURN_RATE = 1e-2, 0.1  # rad, rad/s: of the torso
@@ -103,12 +103,12 @@ def _transitions(
 def _end_cost(model: Model, plan: Plan) -> np.ndarray:
     """Return the weights (n, n) of z at the plan's end; what the goal leaves free has none."""
     goal, nt = plan.problem.goal, model.layout.nt
-    end: LinearFlight = linear_flight(model, plan, np.array([plan.mesh.intervals - 1]), np.ones(1))
+    end = linear_flight(model, plan, np.array([plan.mesh.intervals - 1]), np.ones(1))
     x, matrix = end.planned[0, nt : nt + 4], goal_matrix(goal.attitude, attitude("quaternion"))
     w, v = x[0], x[1:]
     turned = np.vstack([-v, w * np.eye(3) + np.cross(v, np.eye(3)).T])  # 2 dq / dphi
     tilt = np.zeros((len(matrix), len(end.E[0])))
-    tilt[:, SQUARE] = matrix @ turned / TURN
+    tilt[:, TURNED] = matrix @ turned / TURN
     parts: Any = (
         (goal.torso_rate, 3, TURN_RATE),
         (goal.tail, 6, ANGLE),
@@ -127,7 +127,7 @@ def _polynomials(model: Model, plan: Plan) -> np.ndarray:
     pieces, powers = plan.mesh.intervals, len(plan.rule.nodes) + 1
     s = (1 - np.cos(np.pi * np.arange(powers) / (powers - 1))) / 2
     k = np.repeat(np.arange(pieces), powers)
-    values = planned_at(model, plan, k, np.tile(s, pieces))[-1].reshape(pieces, powers, -1)
+    values = linear_flight(model, plan, k, np.tile(s, pieces)).planned.reshape(pieces, powers, -1)
     found = np.linalg.solve(np.vander(s, increasing=True), values)
     widths = np.diff(plan.curve.ends)[:, None, None]
     return np.swapaxes(found, 1, 2) / widths ** np.arange(powers)

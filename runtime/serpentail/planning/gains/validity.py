@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from serpentail_scene.layout import OMEGA, QUATERNION, TAIL_Q, TAIL_V
+
 from ...basics.errors import SimulationError
 from ...basics.short_repr import brief
 from ...motion.trajectory import Trajectory
@@ -39,7 +41,7 @@ class Validity:
         At each knot the least cost of an error from which a flight ended wrong; 1e30 if none did.
     pushes, errors : ndarray, shape (flights,)
         Sizes of the pushes (rad/s), in their order, and distances from the goal's attitude at the
-        end (deg); inf for a flight that could not be computed.
+        end (deg), 0 if the goal leaves it free; inf for a flight that could not be computed.
     """
 
     push: float
@@ -52,14 +54,14 @@ class Validity:
 def validity_of(gains: Gains, flights: int, seed: int) -> Validity:
     """Return where gains hold; gains.within: largest error at the end (deg) that is right."""
     motion, random = gains.plan.trajectory, np.random.default_rng(seed)
-    free, nt = gains.unwatched(), gains.model.layout.nt
+    problem, free, nt = gains.plan.problem, gains.unwatched(), gains.model.layout.nt
     pushes = np.sort(LEAST * (MOST / LEAST) ** random.uniform(size=flights))
     errors, costs = np.full(flights, np.inf), np.zeros((flights, len(gains.times)))
     for i, push in enumerate(pushes):
         # the sample of the plan at which it is pushed, and the flight from there
         k = int(np.searchsorted(motion.t, BEGINS[i % len(BEGINS)] * gains.plan.duration))
         axis, tail, v = random.normal(size=3), random.normal(size=nt), motion.v[k].copy()
-        v[3:] += push * np.concatenate([axis / np.linalg.norm(axis), tail])
+        v[OMEGA.start :] += push * np.concatenate([axis / np.linalg.norm(axis), tail])
         law, rest = Phases([(-motion.t[k], free)]), gains.plan.duration - motion.t[k]
         start = motion.q[k], v
         sample = {"method": "rk4", "step": STEP, "output_step": STEP}
@@ -69,7 +71,8 @@ def validity_of(gains: Gains, flights: int, seed: int) -> Validity:
             if error.trajectory is not None:
                 costs[i] = _costs(gains, error.trajectory, motion.t[k])
             continue
-        errors[i] = attitude_errors(gains.plan.problem, motion.q[-1, 3:7], flown.q[-1, 3:7])[1]
+        ends = motion.q[-1, QUATERNION], flown.q[-1, QUATERNION]
+        errors[i] = 0.0 if problem.goal.attitude is None else attitude_errors(problem, *ends)[1]
         costs[i] = _costs(gains, flown, motion.t[k])
     wrong = ~(errors <= gains.within)
     least = pushes[wrong].min(initial=np.inf)
@@ -96,9 +99,8 @@ def error_of(plan: Piecewise, t: np.ndarray, q: np.ndarray, v: np.ndarray) -> np
     """Return the errors (K, n) of states at times t (K,) from a plan's channels (see gains.h)."""
     nt = q.shape[1] - 7
     values = plan.at(t)[0][:, nt:]
-    (w, a), (w1, b) = ((r[:, :1], r[:, 1:4]) for r in (values[:, :4], q[:, 3:7]))
+    (w, a), (w1, b) = ((r[:, :1], r[:, 1:4]) for r in (values[:, :4], q[:, QUATERNION]))
     turn = w * b - w1 * a - np.cross(a, b)
     sign = np.where(w * w1 + np.sum(a * b, axis=1, keepdims=True) < 0, -2, 2)
-    return np.concatenate(
-        [sign * turn, np.column_stack([v[:, 3:6], q[:, 7:], v[:, 6:]]) - values[:, 4:]], axis=1
-    )
+    rest = np.column_stack([v[:, OMEGA], q[:, TAIL_Q], v[:, TAIL_V]]) - values[:, 4:]
+    return np.concatenate([sign * turn, rest], axis=1)
