@@ -25,14 +25,6 @@ FUNCTIONS = (
 )
 # those, and what the stages of FATROP need
 STAGED = f"{FUNCTIONS},airborne_rates,airborne_rates_derivatives,airborne_rates_hessian"
-PAPER = {
-    "formulation": "full",
-    "attitude": "euler",
-    "rule": "trapezoidal",
-    "tolerance": None,
-    "retries": 0,
-}
-PAPER |= {"smoothing": 0.0}
 
 
 def model(segments: int, links: int | None, functions: str = FUNCTIONS) -> st.Model:

@@ -22,6 +22,8 @@ TAILS = ((1, 6), (2, 3), (3, 2))
 MORE = ((4, 2), (5, 2), (6, 2), (1, None), (2, None), (3, None), (4, None))
 SOURCES = (
     "examples/righting.py",
+    "examples/paper",
+    "examples/studies/righting_paper.py",
     "examples/studies/righting_plans.py",
     "examples/studies/righting_kinds.py",
     "runtime",
@@ -51,12 +53,12 @@ def examples() -> dict[str, tuple]:
     """
     parts = {}
     for frequency in FREQUENCIES:
-        nodes = round(frequency * righting.FLIGHT)
-        both = {"paper": righting.PAPER | {"intervals": nodes}}
-        both["ours"] = {"intervals": max(2, nodes // 3), "tolerance": None, "retries": 0}
-        for way, settings in both.items():
-            make = partial(plans.example, settings)
-            parts[f"Fig. 11 {way} {frequency} Hz"] = RAT, settings, make
+        steps = round(frequency * righting.FLIGHT)
+        ours = {"intervals": max(2, steps // 3), "tolerance": None, "retries": 0}
+        makes = {"paper": partial(plans.paper_example, steps + 1)}
+        makes["ours"] = partial(plans.example, ours)
+        for way, make in makes.items():
+            parts[f"Fig. 11 {way} {frequency} Hz"] = RAT, {"frequency": frequency}, make
     return parts
 
 

@@ -169,8 +169,9 @@ def draw_rates(rates: dict[str, dict[str, list[dict]]], path: Path) -> tuple[Fig
         figure = Figure(figsize=(7.2, 1.2 + 0.3 * len(rates)), layout="constrained")
         axes = figure.subplots(1, 3, sharey=True)
         for shift, (way, (colour, mark)) in zip((0.22, 0, -0.22), RATES.items(), strict=True):
-            at = shift - np.arange(len(rates))
-            rows = [ways[way] for ways in rates.values()]
+            places = [k for k, ways in enumerate(rates.values()) if way in ways]
+            at = shift - np.array(places)
+            rows = [ways[way] for ways in rates.values() if way in ways]
             shares = [100 * np.mean([is_true(row) for row in of]) for of in rows]
             look = {"color": colour, "label": way}
             axes[0].plot(shares, at, mark, markersize=3.5, linestyle="none", **look)

@@ -11,14 +11,16 @@ import numpy as np
 
 import serpentail as st
 from examples import righting
+from examples.studies import righting_paper
 from examples.studies.parts import Part
 from examples.studies.righting_plans import RAT, rat
 
 BLOCK = 10  # random starts that are kept together
-WAYS = {
+PAPER = "paper"
+WAYS: dict[str, dict] = {
     "IPOPT": {"track": False},
     "FATROP": {"solver": "fatrop", "track": False},
-    "paper": righting.PAPER | {"intervals": 58, "track": False},
+    PAPER: {},
 }
 LIMIT = 120.0  # s a plan
 SLENDER = (1.5, 0.25, 1.5)  # factors of the torso's inertia; the second axis is the long one
@@ -40,6 +42,10 @@ class Kind:
     still: bool = False
     any_rate: bool = False
     settings: dict = field(default_factory=dict)
+
+    def ways(self) -> list[str]:
+        """Return the ways that take its task: the paper minimises the effort alone."""
+        return [way for way in WAYS if way != PAPER or "objective" not in self.settings]
 
 
 KINDS = {
@@ -71,7 +77,7 @@ def titles(count: int) -> dict[tuple[str, str], dict[str, Callable]]:
     for name, kind in KINDS.items():
         starts = list(range(1, max(1, count // kind.fewer) + 1))
         blocks = [starts[first : first + BLOCK] for first in range(0, len(starts), BLOCK)]
-        for way in WAYS:
+        for way in kind.ways():
             found[name, way] = {
                 f"{name}, {way}, starts {some[0]} to {some[-1]}": partial(block, kind, way, some)
                 for some in blocks
@@ -94,17 +100,26 @@ def block(kind: Kind, way: str, starts: list[int]) -> list[dict]:
     The whole tail of one segment bends by 180 degrees as in Sect. 4.2, others by 360 as in 4.3.
     """
     model, rows = animal(kind), []
-    given = {"duration": (0.3, righting.FLIGHT), "time_limit": LIMIT}
-    given["bounds"] = righting.bounds(model, np.pi if kind.size == RAT else 2 * np.pi)
-    if kind.any_rate:
-        given["goal"] = st.Goal(torso_rate=None)
+    limits = righting.bounds(model, np.pi if kind.size == RAT else 2 * np.pi)
     for k in starts:
         q, v = righting.tumbling(model, k)
-        start = q, v * (not kind.still)
         begun = time.process_time()
-        plan = st.plan(model, start=start, **given | kind.settings | WAYS[way])
-        rows.append(righting.row(plan) | {"start": k, "cpu_s": time.process_time() - begun})
+        row = row_of(kind, way, model, (q, v * (not kind.still)), limits)
+        rows.append(row | {"start": k, "cpu_s": time.process_time() - begun})
     return rows
+
+
+def row_of(kind: Kind, way: str, model: st.Model, start: tuple, limits: st.Bounds) -> dict:
+    """Return the numbers of a plan from a start."""
+    settings = {"duration": (0.3, righting.FLIGHT)} | kind.settings
+    if way == PAPER:
+        task = start, settings["duration"], limits
+        rest = not kind.any_rate
+        plan = righting_paper.planned(model, *task, at_rest=rest, time_limit=LIMIT)
+        return righting_paper.row(model, plan)
+    goal = {"goal": st.Goal(torso_rate=None)} if kind.any_rate else {}
+    given = {"start": start, "bounds": limits, "time_limit": LIMIT} | goal | settings
+    return righting.row(st.plan(model, **given, **WAYS[way]))
 
 
 def animal(kind: Kind) -> st.Model:
@@ -139,7 +154,11 @@ def table(rates: dict[str, dict[str, list[dict]]]) -> list[str]:
     lines = [f"| starts | of | {' | '.join(heads)} |", "|---" * (2 + 3 * len(WAYS)) + "|"]
     for name, ways in rates.items():
         cells = [name, str(len(ways["IPOPT"]))]
-        for rows in ways.values():
+        for way in WAYS:
+            if way not in ways:
+                cells += ["", "", ""]
+                continue
+            rows = ways[way]
             middle, most = np.percentile([row["cpu_s"] for row in rows], (50, 95))
             errors = [row["open_loop_attitude_error_deg"] for row in rows]
             error = np.median(np.nan_to_num(errors, nan=np.inf))  # nan: it has no flight

@@ -6,6 +6,7 @@ import numpy as np
 
 import serpentail as st
 from examples import righting
+from examples.studies import righting_paper
 from examples.studies.parts import as_lists
 
 EXAMPLE = 4  # the random start of Fig. 11: both ways of planning converge on it
@@ -52,6 +53,14 @@ def example(settings: dict) -> dict:
     )
 
 
+def paper_example(nodes: int) -> dict:
+    """Fig. 11: plan from this start as the paper does."""
+    model = rat(*RAT)
+    task = righting.tumbling(model, EXAMPLE), righting.FLIGHT, righting.bounds(model)
+    plan = righting_paper.planned(model, *task, nodes=nodes, time_limit=LIMIT)
+    return righting_paper.row(model, plan) | righting_paper.tracked(model, plan)
+
+
 def true(size: tuple) -> dict:
     """Sect. 4.3: plan from the kick's state until the plan is true."""
     model = rat(*size)
@@ -65,6 +74,5 @@ def paper(size: tuple) -> dict:
     """Sect. 4.3: plan from the kick's state as the paper does, at 100 Hz."""
     model = rat(*size)
     start, limits = righting.kicked(model), righting.bounds(model, 2 * np.pi)
-    given = {"start": start, "bounds": limits, "duration": righting.FLIGHT}
-    plan = st.plan(model, **righting.PAPER, intervals=58, time_limit=LIMIT, **given)
-    return righting.row(plan)
+    plan = righting_paper.planned(model, start, righting.FLIGHT, limits, time_limit=LIMIT)
+    return righting_paper.row(model, plan) | righting_paper.tracked(model, plan)
