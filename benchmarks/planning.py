@@ -1,7 +1,8 @@
 """Planning by FATROP and by IPOPT with MUMPS, against the targets, in CPU time of the whole call.
 
 An iteration on the same mesh; random tumbling starts, upright and at rest; the kick's state; other
-objectives; one problem of 60 nodes with the exact Hessian and L-BFGS, and the paper's program of 59; planning again from states up to 1 % away, by IPOPT and by `st.Mpc`. True: within
+objectives; one problem of 60 nodes with the exact Hessian and with L-BFGS, and the paper's program
+of 59; planning again from states up to 1 % away, by IPOPT and by `st.Mpc`. True: within
 0.01 deg when the torques are applied. Passive flight is the first guess.
 """
 

@@ -1,8 +1,7 @@
 """Plans one flight as the paper does, with several rules and nodes, and as `st.plan` does.
 
-effort: integral of tau^2, (mN m)^2 s. error: angle (deg) between the torso's planned attitude at the
-end and the one to which the torques truly lead. st.plan also counts the rates of the tail, unless
-smoothing is 0.
+effort: integral of tau^2, (mN m)^2 s; `st.plan` also weighs rates, unless smoothing is 0.
+error: angle in deg, at the end, from the torso's planned attitude to where the torques truly lead.
 """
 
 from examples import front
