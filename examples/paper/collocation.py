@@ -28,6 +28,7 @@ K_DMP = 1e-3  # N m s, of the passive tail (Eq. 47)
 SAMPLES = 10  # of the first guess from node to node, so that no turn is missed
 MOST_NODES = 2000
 SILENT = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
+STOPPED = ("User_Requested_Stop", "NonIpopt_Exception_Thrown")  # what Ctrl-C becomes in CasADi
 SETTINGS = SILENT | {"ipopt.honor_original_bounds": "yes"}
 
 
@@ -184,6 +185,8 @@ def paper_plan(
         ubg=0,
     )
     spent, told = time.process_time() - begun, solver.stats()
+    if told["return_status"] in STOPPED:
+        raise KeyboardInterrupt
     duration, states, torques = np.split(found["x"].full().ravel(), [1, 1 + z.numel()])
     times = np.linspace(0, duration[0], N)
     states, torques = states.reshape(N, -1) * units, torques.reshape(N, -1) * unit

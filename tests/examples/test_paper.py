@@ -1,5 +1,8 @@
 """The paper's program: its laws by other means, its optimum beside `st.plan`, what it refuses."""
 
+import signal
+import threading
+import time
 from dataclasses import replace
 from functools import cache, partial
 
@@ -205,6 +208,18 @@ def test_wrong_tasks_are_refused():
     for name in ("fixed", "ground"):
         with row(name), pytest.raises(st.ModelError, match="paper_plan"):
             paper_plan(zoo.model(name), **good)
+
+
+def test_ctrl_c_ends_a_search_without_a_plan():
+    """It comes while IPOPT runs, which cannot stop a torso at 60 rad/s, and would return a plan."""
+    q, v = start(rat())
+    v[3:6] = 60.0, 1.0, 2.0
+    paper()
+    threading.Timer(0.7, signal.raise_signal, [signal.SIGINT]).start()
+    begun = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        paper_plan(rat(), (q, v), DURATION, LIMITS, nodes=201)
+    assert time.monotonic() - begun < 20
 
 
 # What the righting study reports.
