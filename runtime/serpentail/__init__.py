@@ -33,6 +33,7 @@ _HOME = {
     "Plan": "planning.result.plan",
     "Gains": "planning.gains.gains",
     "Mpc": "mpc.mpc",
+    "MpcFlag": "mpc.mpc",
     "Pfl": "simulation.controllers.pfl",
     "Sequence": "sequence.sequence",
     "SequenceRun": "sequence.run",

@@ -52,7 +52,10 @@ def _info(parts: Sequence[dict[str, Any]]) -> dict[str, Any]:
             info[name] = sum(part.get(name, 0) for part in parts)
     controlled = [part["mpc"] for part in parts if "mpc" in part]
     if controlled:
-        info["mpc"] = {name: sum(each[name] for each in controlled) for name in controlled[0]}
+        info["mpc"] = {  # counts, and a list of flags
+            name: sum((each[name] for each in controlled[1:]), controlled[0][name])
+            for name in controlled[0]
+        }
     if all("events" in part for part in parts):
         info["events"] = [event for part in parts for event in part["events"]]
     info["warnings"] = list(dict.fromkeys(w for part in parts for w in part.get("warnings", [])))

@@ -10,12 +10,12 @@ from ..basics.checks import shown
 from ..basics.errors import PlanningError
 from ..basics.files import refuse_unwritable, replacing
 from ..model.model import Model
-from .kernel import FUNCTIONS, NATIVE, SIZES, SOURCES, TaskRecord
+from .kernel import FUNCTIONS, SIZES, SOURCES, task_fields, text_of
 from .settings import NEEDED
 from .task import MpcTask
 
 ARRAYS = [
-    *("parameters", "times", "plan", "most_torque", "most_angle", "torque_weight", "rate_weight"),
+    *("parameters", "times", "plan", "most_torque", "most_tail", "torque_weight", "rate_weight"),
     *("goal", "end_state", "end_weight", "track_weight"),
 ]
 A_LINE = 4  # numbers
@@ -23,7 +23,7 @@ INCLUDE = re.compile(r'^#include "[^"]*"\n', re.MULTILINE)
 NAME = re.compile(r"\b(mpc_|MPC_)")
 USE = """/* The predictive controller of {prefix}, for one plan.
 
-   static double memory[{upper}_MPC_MEMORY];
+   static {real} memory[{upper}_MPC_MEMORY];
    static {prefix}_mpc_state state;
 
    At the start of the flight call {prefix}_mpc_begin(&state, &{prefix}_mpc_plan, memory).  Then, at
@@ -60,7 +60,7 @@ static int call_momentum(const void *parameters, const double *q, const double *
 
 
 def write_c(model: Model, task: MpcTask, memory: int, folder: str | os.PathLike[str]) -> list[Path]:
-    """Write <model>_mpc.h and .c to a folder; return their paths; memory: in doubles.
+    """Write <model>_mpc.h and .c to a folder; return their paths; memory: in numbers.
 
     A missing folder is made.  PlanningError if it is not a path, NotWritten if the system refuses.
     """
@@ -70,7 +70,7 @@ def write_c(model: Model, task: MpcTask, memory: int, folder: str | os.PathLike[
         needs = "the path of a folder"
         raise PlanningError(f"write_c: folder: value {shown(folder)}: needs {needs}") from None
     texts = {
-        f"{model.name}_mpc.h": header(model.name, memory),
+        f"{model.name}_mpc.h": header(model.name, task.real, memory),
         f"{model.name}_mpc.c": source(model.name, task),
     }
     for name, text in texts.items():
@@ -80,28 +80,27 @@ def write_c(model: Model, task: MpcTask, memory: int, folder: str | os.PathLike[
     return [target / name for name in texts]
 
 
-def header(prefix: str, memory: int) -> str:
+def header(prefix: str, real: str, memory: int) -> str:
     """Return the header of a model's controller."""
-    own = _renamed((NATIVE / "mpc.h").read_text(encoding="utf-8"), prefix)
+    own = _renamed(text_of("mpc.h", real), prefix)
     begin, end = own.rsplit("#ifdef __cplusplus", 1)
     plan = (
-        f"/* doubles that the plan below needs */\n"
+        f"/* {real}s that the plan below needs */\n"
         f"enum {{ {prefix.upper()}_MPC_MEMORY = {memory} }};\n\n"
         f"extern const {prefix}_mpc_task {prefix}_mpc_plan;\n\n#ifdef __cplusplus{end}"
     )
-    return USE.format(prefix=prefix, upper=prefix.upper()) + begin + plan
+    return USE.format(prefix=prefix, upper=prefix.upper(), real=real) + begin + plan
 
 
 def source(prefix: str, task: MpcTask) -> str:
     """Return its source: the controller, then the plan."""
     names = ("mpc_layout.h", *SOURCES)
-    parts = [INCLUDE.sub("", (NATIVE / name).read_text(encoding="utf-8")) for name in names]
+    parts = [INCLUDE.sub("", text_of(name, task.real)) for name in names]
     includes = f'#include "{prefix}.h"\n#include "{prefix}_mpc.h"\n\n'
     code = _renamed("\n".join(parts), prefix)
-    arrays = "\n".join(_array(name, task.arrays[name]) for name in ARRAYS)
-    return (
-        includes + code + DATA.format(prefix=prefix, **NEEDED) + "\n" + arrays + _plan(prefix, task)
-    )
+    calls = DATA.format(prefix=prefix, **NEEDED).replace("double", task.real)
+    arrays = "\n".join(_array(name, task) for name in ARRAYS)
+    return includes + code + calls + "\n" + arrays + _plan(prefix, task)
 
 
 def _renamed(text: str, prefix: str) -> str:
@@ -110,17 +109,23 @@ def _renamed(text: str, prefix: str) -> str:
     return NAME.sub(lambda found: marks[found[0]], text)
 
 
-def _array(name: str, values: np.ndarray) -> str:
+def _array(name: str, task: MpcTask) -> str:
     """Return an array as C; an empty one as a single 0 that is never read."""
-    flat = [repr(float(value)) for value in values.ravel()] or ["0.0"]
+    flat = [_literal(value, task.real) for value in task.arrays[name].ravel().tolist()] or ["0"]
     rows = (", ".join(flat[k : k + A_LINE]) for k in range(0, len(flat), A_LINE))
-    return f"static const double {name}[{len(flat)}] = {{\n    " + ",\n    ".join(rows) + "};\n"
+    head = f"static const {task.real} {name}[{len(flat)}] = {{\n    "
+    return head + ",\n    ".join(rows) + "};\n"
+
+
+def _literal(value: float, real: str) -> str:
+    """Return a number as C of its type."""
+    return repr(float(value)) if real == "double" else f"{float(np.float32(value))!r}f"
 
 
 def _plan(prefix: str, task: MpcTask) -> str:
     """Return the task, member by member."""
     values = {name: f"call_{name}" for name in FUNCTIONS} | {name: name for name in ARRAYS}
     for name, number in task.numbers.items():
-        values[name] = str(int(number)) if name in SIZES else repr(float(number))
-    rows = ",\n".join(f"    {values[name]} /* {name} */" for name, *_ in TaskRecord._fields_)
+        values[name] = str(int(number)) if name in SIZES else _literal(number, task.real)
+    rows = ",\n".join(f"    {values[name]} /* {name} */" for name, _ in task_fields(None))
     return f"\nconst {prefix}_mpc_task {prefix}_mpc_plan = {{\n{rows}\n}};\n"

@@ -1,70 +1,109 @@
-"""The controller's C, compiled once, and its structures for ctypes."""
+"""The controller's C for a type of numbers, compiled once, and its structures for ctypes."""
 
 import ctypes
+import hashlib
+import re
 from functools import cache
 from pathlib import Path
+from typing import Any, NamedTuple
 
 from ..basics.errors import CompilerNotFound, PlanningError
-from ..compiling.compiler import compile_library, opened
+from ..compiling.cache import cache_folder
+from ..compiling.compiler import library_of, opened
 
 NATIVE = Path(__file__).parent / "native"
-SOURCES = ("plan.c", "motion.c", "least_squares.c", "box_qp.c", "controller.c")
+HEADERS = ("mpc.h", "mpc_layout.h")
+SOURCES = (
+    *("plan.c", "motion.c", "least_squares.c", "quadratic.c", "gauss_newton.c"),
+    "controller.c",
+)
 FLAGS = ("-O3",)  # loops along rows of matrices
-_pointer, _int, _double = ctypes.c_void_p, ctypes.c_int, ctypes.c_double
-INTEGERS = ("tail", "intervals", "steps", "late_steps", "iterations", "goal_rows")
-SIZES = (*INTEGERS, "pieces", "powers", "work")
+REALS = {"double": ctypes.c_double, "float": ctypes.c_float}
+LITERAL = re.compile(r"\b\d+(?:\.\d+(?:e[-+]?\d+)?|e[-+]?\d+)\b")
+SINGLE = {"double": "float", "doubles": "floats", "DBL_EPSILON": "FLT_EPSILON"}
+SINGLE |= {"sqrt": "sqrtf", "fabs": "fabsf"}
+WORD = re.compile(rf"\b({'|'.join(SINGLE)})\b")
+_pointer, _int = ctypes.c_void_p, ctypes.c_int
+SIZES = (
+    *("tail", "intervals", "steps", "late_steps", "iterations", "goal_rows"),
+    *("pieces", "powers", "work"),
+)
 TIMES = ("period", "delay", "horizon", "end", "last", "damping")
 FUNCTIONS = ("rates", "slopes", "momentum")
 
 
-class TaskRecord(ctypes.Structure):
-    """``mpc_task`` of native/mpc.h."""
+COUNTS = ("ticks", "failed", "steps", "trials", "set_changes")
 
-    _fields_ = (
+
+class Kernel(NamedTuple):
+    """The C of one type of numbers: its functions, and the structures of native/mpc.h."""
+
+    code: ctypes.CDLL
+    real: Any  # of ctypes
+    task: type[ctypes.Structure]
+    simulation: type[ctypes.Structure]
+
+
+def text_of(name: str, real: str) -> str:
+    """Return a file of the controller for numbers of this type ("double" or "float")."""
+    text = (NATIVE / name).read_text(encoding="utf-8")
+    if real == "double":
+        return text
+    return WORD.sub(lambda word: SINGLE[word[0]], LITERAL.sub(r"\g<0>f", text))
+
+
+def task_fields(real: Any) -> list[tuple[str, Any]]:
+    """Return the members of ``mpc_task`` with their types."""
+    return [
         *((name, _int) for name in SIZES),
-        *((name, _double) for name in TIMES),
+        *((name, real) for name in TIMES),
         *((name, _pointer) for name in (*FUNCTIONS, "parameters", "times", "plan")),
-        *((name, _pointer) for name in ("most_torque", "most_angle")),
+        *((name, _pointer) for name in ("most_torque", "most_tail")),
+        *((name, real) for name in ("near", "miss")),
         *((name, _pointer) for name in ("torque_weight", "rate_weight")),
-        *((name, _double) for name in ("angle_weight", "attitude_weight")),
+        ("attitude_weight", real),
         *((name, _pointer) for name in ("goal", "end_state", "end_weight", "track_weight")),
-    )
+    ]
 
 
-class StateRecord(ctypes.Structure):
-    """``mpc_state``."""
-
-    _fields_ = (
-        ("task", _pointer),
-        ("memory", _pointer),
-        *((name, ctypes.c_long) for name in ("tick", "ticks", "failed", "set_changes")),
+def state_fields(real: Any) -> list[tuple[str, Any]]:
+    """Return the members of ``mpc_state`` with their types."""
+    return [
+        *((name, _pointer) for name in ("task", "memory")),
+        *((name, ctypes.c_long) for name in ("tick", *COUNTS)),
+        ("flags", _int),
+        ("log", _pointer),
+        ("room", ctypes.c_long),
         ("newest", _int),
-        ("begin", _double * 2),
-        ("width", _double * 2),
-        ("cost", _double),
-    )
-
-
-class Simulation(ctypes.Structure):
-    """``mpc_simulation``."""
-
-    _fields_ = (("state", StateRecord), ("step_begin", _pointer), ("clock", _double))
+        *((name, real * 2) for name in ("begin", "width")),
+        ("off", real),
+    ]
 
 
 @cache
-def kernel() -> ctypes.CDLL:
+def kernel(real: str) -> Kernel:
     """The controller in C, compiled once; PlanningError if no compiler works."""
+    texts = {name: text_of(name, real).encode() for name in (*HEADERS, *SOURCES)}
+    digests = {name: hashlib.sha256(text).hexdigest() for name, text in texts.items()}
     try:
-        sources = [NATIVE / name for name in SOURCES]
-        made = opened(lambda: compile_library(sources, NATIVE, flags=FLAGS))
+        code = opened(lambda: library_of(digests, lambda: texts, "fast", cache_folder(None), FLAGS))
     except CompilerNotFound as error:
         raise PlanningError(f"Mpc: {error}") from error
-    made.mpc_memory_size.restype = ctypes.c_size_t
-    made.mpc_memory_size.argtypes = (_pointer,)
-    made.mpc_begin.argtypes = (_pointer,) * 3
-    made.mpc_tick.argtypes = (_pointer, _double, _pointer, _pointer)
-    made.mpc_torque.argtypes = (_pointer, _double, _double, _pointer)
-    made.mpc_control.argtypes = (_pointer, _double, _double, *(_pointer,) * 3)
-    made.mpc_quadratic.argtypes = (_int, *(_pointer,) * 7)
-    made.mpc_begin.restype = made.mpc_torque.restype = made.mpc_control.restype = None
-    return made
+    number = REALS[real]
+    code.mpc_memory_size.restype = ctypes.c_size_t
+    code.mpc_memory_size.argtypes = (_pointer,)
+    code.mpc_begin.argtypes = (_pointer,) * 3
+    code.mpc_tick.argtypes = (_pointer, number, _pointer, _pointer)
+    code.mpc_torque.argtypes = (_pointer, number, number, _pointer)
+    code.mpc_control.argtypes = (_pointer, number, number, *(_pointer,) * 3)
+    code.mpc_quadratic.argtypes = (_pointer,)
+    code.mpc_begin.restype = code.mpc_torque.restype = code.mpc_control.restype = None
+    return Kernel(code, number, *_structures(number))
+
+
+def _structures(real: Any) -> tuple[type[ctypes.Structure], type[ctypes.Structure]]:
+    """Return the structures ``mpc_task`` and ``mpc_simulation``."""
+    task = type("mpc_task", (ctypes.Structure,), {"_fields_": task_fields(real)})
+    state = type("mpc_state", (ctypes.Structure,), {"_fields_": state_fields(real)})
+    members = [("state", state), ("step_begin", _pointer), ("clock", real)]
+    return task, type("mpc_simulation", (ctypes.Structure,), {"_fields_": members})

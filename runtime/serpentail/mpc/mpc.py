@@ -1,6 +1,7 @@
 """``Mpc``: a controller that corrects the rest of a planned flight at each tick."""
 
 import ctypes
+from enum import IntFlag
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -16,28 +17,57 @@ from ..model.model import Model
 from ..planning.result.plan import Plan
 from ..simulation.controllers.parts import ControllerState, NativeTorque, Parts
 from .emission import write_c
-from .kernel import Simulation, kernel
+from .kernel import COUNTS, kernel
 from .settings import checked_settings, refuse_unable
 from .task import MpcTask, task_of
 
 RATE = 100.0  # Hz
-COUNTS = ("ticks", "failed", "set_changes")
+
+
+class MpcFlag(IntFlag):
+    """What happened at a tick of ``Mpc``; several may hold.
+
+    Attributes
+    ----------
+    SECOND
+        The predicted end was far off after a step, more than about 0.5 degrees of the torso, so
+        there was another one.
+    LIMIT
+        A quadratic program ended at its limit of changes; torques are within their bounds.
+    BOUND
+        An angle or a rate of the tail is beyond its bound, or will be.
+    MISS
+        The end is predicted to miss the target, by more than about 1 degree of the torso.
+    KEPT
+        The tick failed, for instance because the state was not finite: it changed nothing.
+    OPEN
+        It failed, and no earlier correction acts: the torques are the plan's.
+
+    Examples
+    --------
+    >>> st.MpcFlag(9)
+    <MpcFlag.SECOND|MISS: 9>
+    """
+
+    SECOND, LIMIT, BOUND, MISS, KEPT, OPEN = (1 << bit for bit in range(6))
 
 
 class Mpc:
     """Model-predictive control of a planned flight: a controller for ``simulate``.
 
-    At each tick it measures the state and computes a correction of the plan's torques by one
-    Gauss-Newton step. The correction is constant in each of some intervals, stays within the
-    plan's torque bounds, and brings the end nearest to the plan's goal. The motion until the new
-    torques act is predicted. A tick that fails, for instance because the state is not finite,
-    changes nothing.
+    At each tick it measures the state and computes a correction of the plan's torques by a
+    Gauss-Newton step, and another one while the predicted end is far off. The correction is
+    constant in each of some intervals and brings the end nearest to the plan's goal. Bounds of
+    torques, and of the tail's angles and rates in the predicted motion, are hard. The motion until
+    the new torques act is predicted. A tick that fails, for instance because the state is not
+    finite, changes nothing. Each tick has flags that tell what happened.
 
     Parameters
     ----------
     model : Model
         The model that the controller uses; it needs "airborne_rates",
-        "airborne_rates_derivatives" and "momentum", computes with double, and has a free base.
+        "airborne_rates_derivatives" and "momentum", and has a free base. The controller computes
+        with the model's type of numbers, double or float.
     plan : Plan
         The plan, with ``attitude="quaternion"``.
     rate : float, default 100
@@ -49,12 +79,18 @@ class Mpc:
         Number of intervals of the correction.
     delay : float, default 0
         Time from a tick until its torques act (s), at most the time between ticks.
-    iterations : int, default 1
-        Number of Gauss-Newton steps at a tick.
+    iterations : int, default 2
+        Most Gauss-Newton steps at a tick.
     step : float, default 0.005
         Longest Runge-Kutta step of the prediction (s).
     rest : float, optional
         Time before the plan's end without ticks (s). Default: the time between two ticks.
+    bounds : Bounds, optional
+        Bounds of angles, rates and torques; it keeps no bounds of torque rates. Default: the
+        plan's.
+    ignore_path : bool, default False
+        Fly a plan that has path constraints or a clearance, which corrections do not keep. Without
+        it such a plan is refused.
 
     Raises
     ------
@@ -87,7 +123,7 @@ class Mpc:
         refuse_unable(model, plan)
         given = {"rate": rate, "horizon": horizon} | settings
         self.model, self.plan = model, plan
-        self.settings = checked_settings(plan, given)
+        self.settings = checked_settings(model, plan, given)
         self.task = task_of(model, plan, self.settings)
         self._own = ControllerMemory(self.task)
 
@@ -97,8 +133,9 @@ class Mpc:
         return f"Mpc({self.model.name}, {rate:g} Hz, {ahead:.4g} s in {self.settings.intervals})"
 
     @property
-    def info(self) -> dict[str, int]:
-        """Counts since ``begin``: ticks, failed ticks, and changes of active sets.
+    def info(self) -> dict[str, Any]:
+        """Counts since ``begin``: ticks, failed ticks, Gauss-Newton steps, motions that were tried
+        for them, changes of active sets; and flags, a list with the sum of ``MpcFlag`` of each tick.
 
         They count calls of this object only; a simulation's counts are in its ``info["mpc"]``.
         """
@@ -106,7 +143,7 @@ class Mpc:
 
     @property
     def memory_size(self) -> int:
-        """Number of doubles of its workspace."""
+        """How many numbers its workspace has, of the model's type."""
         return len(self._own.memory)
 
     def begin(self) -> None:
@@ -158,7 +195,7 @@ class Mpc:
             needs = f"a model of {self.model.layout.nt} tail coordinates, as the controller's"
             raise refusal("Mpc: tail coordinates", nt, needs, SimulationError)
         memory = ControllerMemory(self.task)
-        native = NativeTorque(kernel().mpc_simulated, ctypes.addressof(memory.run))
+        native = NativeTorque(memory.code.mpc_simulated, ctypes.addressof(memory.run))
         state = ControllerState(
             memory.begin_run, lambda: {"mpc": memory.info()}, lambda *_: self.stops()
         )
@@ -200,7 +237,7 @@ class Mpc:
         """Return q and v as arrays of the right size; their values may be anything."""
         arrays = []
         for name, value, size in (("q", q, self.model.nq), ("v", v, self.model.nv)):
-            array = np.ascontiguousarray(value, float)
+            array = np.ascontiguousarray(value, self._own.real)
             if array.shape != (size,):
                 raise refusal(f"Mpc: {name}", value, f"{size} numbers", SimulationError)
             arrays.append(array)
@@ -211,22 +248,29 @@ class ControllerMemory:
     """The memory of one controller at work, and the C code that uses it."""
 
     def __init__(self, task: MpcTask):
-        self.task, self.code = task, kernel()
+        made = kernel(task.real)
+        self.task, self.code, self.real = task, made.code, made.real
         self.place = ctypes.addressof(task.record)
-        self.memory = aligned(self.code.mpc_memory_size(self.place), np.dtype(float))
-        self.run = Simulation()
+        self.memory = aligned(self.code.mpc_memory_size(self.place), np.dtype(made.real))
+        self.run = made.simulation()
         self.state = ctypes.addressof(self.run)  # its first member is the controller's state
-        self.tau = np.zeros(task.record.tail)
+        self.tau = np.zeros(int(task.numbers["tail"]), made.real)
+        self.log = np.zeros(int(task.numbers["last"] / task.numbers["period"]) + 2, np.uint8)
         self.begin()
 
     def begin(self) -> None:
         """Forget all ticks."""
         self.code.mpc_begin(self.state, self.place, self.memory.ctypes.data)
+        self.run.state.log, self.run.state.room = self.log.ctypes.data, len(self.log)
 
     def begin_run(self, record: Any, clock: float) -> None:
         """Begin a run of the generated C whose time is ``clock`` (s) at the controller's time 0."""
-        if type(record).t.size != ctypes.sizeof(ctypes.c_double):
-            raise SimulationError("Mpc: the simulated model computes with float: needs double")
+        if type(record).t.size != ctypes.sizeof(self.real):
+            simulated = "float" if self.task.real == "double" else "double"
+            raise SimulationError(
+                f"Mpc: the simulated model computes with {simulated}, the controller's model with "
+                f"{self.task.real}: give both the same type"
+            )
         self.begin()
         self.run.step_begin = ctypes.addressof(record) + type(record).t.offset
         self.run.clock = clock
@@ -238,14 +282,15 @@ class ControllerMemory:
     def torque(self, t: float) -> np.ndarray:
         """Return the torques at t."""
         self.code.mpc_torque(self.state, t, t, self.tau.ctypes.data)
-        return self.tau.copy()
+        return self.tau.astype(float)
 
     def control(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Return the torques at t; compute a correction if a tick is due."""
         places = (q.ctypes.data, v.ctypes.data, self.tau.ctypes.data)
         self.code.mpc_control(self.state, t, t, *places)
-        return self.tau.copy()
+        return self.tau.astype(float)
 
-    def info(self) -> dict[str, int]:
-        """Return counts."""
-        return {name: int(getattr(self.run.state, name)) for name in COUNTS}
+    def info(self) -> dict[str, Any]:
+        """Return counts, and the flags of each tick."""
+        counts = {name: int(getattr(self.run.state, name)) for name in COUNTS}
+        return counts | {"flags": self.log[: counts["ticks"]].tolist()}

@@ -8,13 +8,16 @@ import numpy as np
 from ..basics.checks import none_of, number, refusal, shown
 from ..basics.errors import PlanningError
 from ..model.model import Model
+from ..planning.goal import Bounds
+from ..planning.magnitudes import checked_bounds
 from ..planning.result.plan import Plan
 from .kernel import FUNCTIONS
 
 NEEDED = dict(
     zip(FUNCTIONS, ("airborne_rates", "airborne_rates_derivatives", "momentum"), strict=True)
 )
-DEFAULTS = {"intervals": 6, "delay": 0.0, "iterations": 1, "step": 5e-3, "rest": None}
+DEFAULTS: dict[str, Any] = {"intervals": 6, "delay": 0.0, "iterations": 2, "step": 5e-3}
+DEFAULTS |= {"rest": None, "bounds": None, "ignore_path": False}
 NAMES = ("rate", "horizon", *DEFAULTS)
 MOST = 100  # intervals, Gauss-Newton steps
 MOST_STEPS = 1000  # of Runge-Kutta, in an interval
@@ -23,7 +26,7 @@ MOST_TICKS = 100_000
 
 @dataclass(frozen=True)
 class MpcSettings:
-    """Checked settings of ``Mpc``; horizon: s, inf for the rest of the plan."""
+    """Checked settings of ``Mpc``; horizon: s, inf for the rest of the plan; bounds: arrays."""
 
     rate: float
     horizon: float
@@ -32,15 +35,19 @@ class MpcSettings:
     iterations: int
     step: float
     rest: float
+    bounds: Bounds
 
 
-def checked_settings(plan: Plan, given: dict[str, Any]) -> MpcSettings:
+def checked_settings(model: Model, plan: Plan, given: dict[str, Any]) -> MpcSettings:
     """Return the settings, with defaults for those left out; PlanningError if one is wrong."""
     for name in given:
         unknown = none_of("Mpc: setting", name, NAMES)
         if unknown:
             raise PlanningError(unknown)
     given = DEFAULTS | given
+    _refuse_path(plan, given["ignore_path"])
+    bounds = given["bounds"]
+    bounds = plan.problem.bounds if bounds is None else checked_bounds(model, bounds)
     rate = _number("rate", given["rate"], above=0)
     if rate * plan.duration > MOST_TICKS:
         needs = f"at most {MOST_TICKS / plan.duration:.3g} Hz: {MOST_TICKS} ticks"
@@ -60,7 +67,7 @@ def checked_settings(plan: Plan, given: dict[str, Any]) -> MpcSettings:
         needs = f"at most {MOST_STEPS} steps in an interval: make it longer"
         raise refusal("Mpc: step", step, needs, PlanningError)
     iterations = _count("iterations", given["iterations"])
-    return MpcSettings(rate, horizon, intervals, delay, iterations, step, rest)
+    return MpcSettings(rate, horizon, intervals, delay, iterations, step, rest, bounds)
 
 
 def refuse_unable(model: Model, plan: Plan) -> None:
@@ -71,8 +78,6 @@ def refuse_unable(model: Model, plan: Plan) -> None:
         raise PlanningError(
             f"Mpc: the model lacks {', '.join(missing)}: add them to the scene's functions"
         )
-    if model.manifest["real"] != "double":
-        raise PlanningError(f"Mpc: the model computes with {model.manifest['real']}: needs double")
     if model.library is None:
         raise PlanningError("Mpc: the model was loaded with compiled=False: load it again with C")
     if not isinstance(plan, Plan):
@@ -86,6 +91,18 @@ def refuse_unable(model: Model, plan: Plan) -> None:
     if tail != model.layout.nt:
         raise PlanningError(
             f"Mpc: the plan has {tail} tail coordinates, the model {model.layout.nt}"
+        )
+
+
+def _refuse_path(plan: Plan, ignored: Any) -> None:
+    """PlanningError if the plan has constraints that corrections do not know of, unless ignored."""
+    if not isinstance(ignored, bool):
+        raise refusal("Mpc: ignore_path", ignored, "True or False", PlanningError)
+    if plan.problem.path and not ignored:
+        raise PlanningError(
+            f"Mpc: the plan has {len(plan.problem.path)} constraints of path or clearance, which "
+            "its corrections do not keep: give ignore_path=True to fly without them, or plan with "
+            "bounds of angles and rates in their place"
         )
 
 

@@ -7,29 +7,34 @@ from typing import Any
 import numpy as np
 
 from ..model.model import Model
+from ..planning.goal import Bounds
 from ..planning.nlp.coordinates import attitude
 from ..planning.nlp.direct import goal_matrix
 from ..planning.problem import PlanningProblem
 from ..planning.result.curve import Curve
 from ..planning.result.plan import Plan
-from .kernel import FUNCTIONS, TaskRecord
+from .kernel import FUNCTIONS, kernel
 from .settings import NEEDED, MpcSettings
 
 # errors at the end that weigh as much as a correction by the largest torque all the time
 TURN, TURN_RATE = 1e-3, 0.1  # rad, rad/s: of the torso
 ANGLE, RATE = 1e-2, 1.0  # rad, rad/s: of the tail
-BEYOND = 1e-2  # rad beyond an angle's bound
-NONE = 1e300  # no bound
+# distances from the target: beyond NEAR a tick takes another step, beyond MISS it has a flag
+NEAR, MISS = np.radians([0.5, 1.0]) / TURN
+NONE = 1e30  # no bound
 BLOCKS = ("torque", "attitude", "tail", "tail_rate")
 
 
 @dataclass(frozen=True, eq=False)
 class MpcTask:
-    """A task's numbers and arrays by the names of ``mpc_task``; record: the same for ctypes."""
+    """A task's numbers and arrays by the names of ``mpc_task``; record: the same for ctypes; real:
+    the type of its numbers, "double" or "float".
+    """
 
+    real: str
     numbers: dict[str, float]
     arrays: dict[str, np.ndarray]
-    record: TaskRecord
+    record: ctypes.Structure
 
 
 def task_of(model: Model, plan: Plan, settings: MpcSettings) -> MpcTask:
@@ -37,12 +42,13 @@ def task_of(model: Model, plan: Plan, settings: MpcSettings) -> MpcTask:
     problem, duration = plan.problem, plan.duration
     horizon = min(settings.horizon, duration)
     times, polynomials = polynomials_of(plan.curve)
-    most = _most_torque(plan)
+    bounds = settings.bounds
+    most = _most_torque(plan, bounds)
     arrays = {
         "times": times,
         "plan": polynomials,
-        "most_torque": np.full_like(most, NONE) if problem.bounds.torque is None else most,
-        "most_angle": _most_angle(problem, len(most)),
+        "most_torque": most if bounds.torque is not None else np.full_like(most, NONE),
+        "most_tail": np.concatenate([_limits(bounds.angle, most), _limits(bounds.rate, most)]),
         "torque_weight": 1 / most**2 / duration,
         "rate_weight": (problem.smoothing / most) ** 2 / duration,
         "track_weight": np.repeat([1 / ANGLE**2, 1 / RATE**2], len(most)),
@@ -64,15 +70,18 @@ def task_of(model: Model, plan: Plan, settings: MpcSettings) -> MpcTask:
         "end": duration,
         "last": duration - settings.rest - settings.delay,
         "damping": problem.damping,
-        "angle_weight": 1 / BEYOND**2,
+        "near": NEAR,
+        "miss": MISS,
         "attitude_weight": 1 / TURN**2,
     }
-    arrays = {name: np.ascontiguousarray(array, float) for name, array in arrays.items()}
+    real = model.manifest["real"]
+    made = kernel(real)
+    arrays = {name: np.ascontiguousarray(array, made.real) for name, array in arrays.items()}
     places: dict[str, Any] = {name: array.ctypes.data for name, array in arrays.items()}
     for name in FUNCTIONS:
         function = getattr(model.library, f"{model.name}_{NEEDED[name]}")
         places[name] = ctypes.cast(function, ctypes.c_void_p).value
-    return MpcTask(numbers, arrays, TaskRecord(**numbers, **places))
+    return MpcTask(real, numbers, arrays, made.task(**numbers, **places))
 
 
 def polynomials_of(curve: Curve) -> tuple[np.ndarray, np.ndarray]:
@@ -95,18 +104,16 @@ def _steps(time: float, step: float) -> int:
     return int(np.ceil(time / step - 1e-9))
 
 
-def _most_torque(plan: Plan) -> np.ndarray:
+def _most_torque(plan: Plan, bounds: Bounds) -> np.ndarray:
     """Return the bounds of torques (2m,); without bounds, the largest torques of the plan."""
-    bound = plan.problem.bounds.torque
-    if bound is not None:
-        return np.asarray(bound, float)
+    if bounds.torque is not None:
+        return np.asarray(bounds.torque, float)
     used = np.abs(plan.trajectory.tau).max(axis=0)
     return np.maximum(used, max(float(used.max()), 1e-12) / 10)
 
 
-def _most_angle(problem: PlanningProblem, size: int) -> np.ndarray:
-    bound = problem.bounds.angle
-    return np.full(size, NONE) if bound is None else np.asarray(bound, float)
+def _limits(bound: np.ndarray | None, most: np.ndarray) -> np.ndarray:
+    return np.full_like(most, NONE) if bound is None else bound
 
 
 def _goal(problem: PlanningProblem, size: int) -> dict[str, np.ndarray]:

@@ -1,23 +1,14 @@
 /* Ticks compute a correction of the plan's torques from a measured state; torques between ticks. */
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
 #include "mpc_layout.h"
 
-static const double NEVER = 1e300, SAME = 1e-6; /* of a period: closer times count as equal */
-static const double ROUNDING = 1e-9;            /* relative, of a sum of squares */
-enum { HALVINGS = 4 };
+static const double SAME = 1e-6 + 4096 * DBL_EPSILON; /* of a period: closer times count as equal */
 
-/* The arrays of a tick. */
-typedef struct {
-    mpc_motion motion;
-    mpc_program program;
-    double *x0, *fresh, *trial, *lower, *upper, *d, *factors;
-    int *set;
-} workspace;
-
-static double *next(double **memory, size_t count)
+static double *next(double **memory, int count)
 {
     double *own = *memory;
     if (own != NULL) {
@@ -28,35 +19,45 @@ static double *next(double **memory, size_t count)
 
 /* Place a tick's arrays behind the two corrections and return the size; with memory NULL only
    return the size. */
-static size_t lay_out(const mpc_task *task, double *memory, workspace *w)
+static int lay_out(const mpc_task *task, double *memory, mpc_workspace *w)
 {
-    const size_t m = (size_t)task->tail, n = m * (size_t)task->intervals;
-    const size_t x = (size_t)states_of(task), y = x + MPC_TURN, z = x + m;
-    const size_t counts[] = {2 * n, x, x * n, x, x * n, x, x * n, x * n, y, y * z, m, z, n,
-                             (size_t)task->work, n, n * n, x, n, n, n, n, n, n * (n + 3),
-                             (n * sizeof(int) + sizeof(double) - 1) / sizeof(double)};
+    const int m = task->tail, n = m * task->intervals, rows = 2 * n;
+    const int x = states_of(task), y = x + MPC_TURN, z = x + m;
+    const int ints = (3 * n + rows) * (int)sizeof(int), real = (int)sizeof(double);
+    const int counts[] = {2 * n, x, x * n, x, x * n, x, x * n, rows, rows * n, y, y * z, m, z, n + x,
+                          task->work, n, n * n, x, n, n, n, n, rows, n + rows, n + rows, n,
+                          2 * n * (n + 2), (ints + real - 1) / real};
     mpc_motion *motion = &w->motion;
+    mpc_bounded *qp = &w->qp;
     double *corrections, *set;
     double **arrays[] = {&corrections, &motion->x, &motion->S, &motion->x_at, &motion->S_at,
-                         &motion->sum, &motion->S_sum, &motion->K, &motion->y, &motion->J,
-                         &motion->tau, &motion->table, &motion->row, &motion->work,
-                         &w->program.g, &w->program.H, &w->x0, &w->fresh, &w->trial, &w->lower, &w->upper,
-                         &w->d, &w->factors, &set};
-    size_t sum = 0;
+                         &motion->sum, &motion->S_sum, &motion->extreme, &motion->S_extreme,
+                         &motion->y, &motion->J, &motion->tau, &motion->table, &motion->row,
+                         &motion->work, &w->program.c, &w->program.R, &w->x0, &w->fresh, &w->trial,
+                         &w->lower, &w->upper, &w->limit, &w->low, &w->high, &qp->d, &qp->memory,
+                         &set};
+    int sum = 0;
     for (size_t k = 0; k < sizeof counts / sizeof *counts; k++) {
         *arrays[k] = next(&memory, counts[k]);
         sum += counts[k];
     }
-    w->set = (int *)(void *)set;
     motion->task = task;
-    motion->variables = (int)n;
+    motion->variables = qp->n = n;
+    qp->rows = rows;
+    qp->most = mpc_most_changes(n);
+    qp->R = w->program.R;
+    qp->c = w->program.c;
+    qp->A = motion->S_extreme;
+    qp->lower = w->low;
+    qp->upper = w->high;
+    qp->set = (int *)(void *)set;
     return sum;
 }
 
 size_t mpc_memory_size(const mpc_task *task)
 {
-    workspace w;
-    return lay_out(task, NULL, &w);
+    mpc_workspace w;
+    return (size_t)lay_out(task, NULL, &w);
 }
 
 void mpc_begin(mpc_state *state, const mpc_task *task, double *memory)
@@ -65,11 +66,14 @@ void mpc_begin(mpc_state *state, const mpc_task *task, double *memory)
     state->task = task;
     state->memory = memory;
     state->tick = -1;
-    state->ticks = state->failed = state->set_changes = 0;
+    state->ticks = state->failed = state->steps = state->trials = state->set_changes = 0;
     state->newest = 0;
-    state->begin[0] = state->begin[1] = NEVER;
+    state->begin[0] = state->begin[1] = NONE;
     state->width[0] = state->width[1] = 1.0;
-    state->cost = 0.0;
+    state->off = 0.0;
+    state->flags = 0;
+    state->log = NULL;
+    state->room = 0;
 }
 
 static double *correction_of(const mpc_state *state, int which)
@@ -97,7 +101,7 @@ static void add_correction(const mpc_state *state, double clock, double t, doubl
         return;
     }
     const double place = (t - state->begin[which]) / state->width[which];
-    if (place < task->intervals * (1 + SAME)) {
+    if (place < (double)task->intervals * (1.0 + SAME)) {
         int k = place > 0.0 ? (int)place : 0;
         k = k < task->intervals ? k : task->intervals - 1;
         const double *row = correction_of(state, which) + k * task->tail;
@@ -121,7 +125,7 @@ void mpc_torque(const mpc_state *state, double clock, double t, double *tau)
 
 /* Compute x0, with a quaternion of norm 1, and the angular momentum from q, v; return 0 if all
    numbers are finite. */
-static int measured(workspace *w, const double *q, const double *v)
+static int measured(mpc_workspace *w, const double *q, const double *v)
 {
     const mpc_task *task = w->motion.task;
     const int m = task->tail;
@@ -147,13 +151,13 @@ static int measured(workspace *w, const double *q, const double *v)
 }
 
 /* Move x0 to the end of the delay, under the torques that act until then; return 0 for success. */
-static int foretell(const mpc_state *state, workspace *w, double t)
+static int foretell(const mpc_state *state, mpc_workspace *w, double t)
 {
     const mpc_task *task = state->task;
     const size_t states = (size_t)states_of(task);
     memcpy(w->motion.x, w->x0, states * sizeof(double));
     for (int k = 0; k < task->late_steps; k++) {
-        const double h = task->delay / task->late_steps, at = t + k * h;
+        const double h = task->delay / (double)task->late_steps, at = t + (double)k * h;
         memset(w->trial, 0, (size_t)task->tail * sizeof(double));
         add_correction(state, t, at, w->trial);
         if (mpc_step(&w->motion, at, h, w->trial, 0, 0) != 0) {
@@ -164,98 +168,22 @@ static int foretell(const mpc_state *state, workspace *w, double t)
     return 0;
 }
 
-/* Compute bounds of each number of the correction: those of the torque minus the plan's torque, at
-   both ends of all Runge-Kutta steps in its interval. */
-static void write_bounds(workspace *w)
-{
-    const mpc_motion *motion = &w->motion;
-    const mpc_task *task = motion->task;
-    const int m = task->tail;
-    for (int j = 0; j < task->intervals; j++) {
-        double *lower = w->lower + j * m, *upper = w->upper + j * m;
-        for (int a = 0; a < m; a++) {
-            lower[a] = -NEVER;
-            upper[a] = NEVER;
-        }
-        for (int i = 0; i <= task->steps; i++) {
-            const double part = (double)i / task->steps;
-            const double t = motion->begin + (j + part) * motion->width;
-            mpc_planned(task, t, t, 0, m, motion->table);
-            for (int a = 0; a < m; a++) {
-                const double down = -task->most_torque[a] - motion->table[a];
-                const double up = task->most_torque[a] - motion->table[a];
-                lower[a] = down > lower[a] ? down : lower[a];
-                upper[a] = up < upper[a] ? up : upper[a];
-            }
-        }
-        for (int a = 0; a < m; a++) { /* the plan itself exceeds the bounds */
-            if (lower[a] > upper[a]) {
-                lower[a] = upper[a] = 0.5 * (lower[a] + upper[a]);
-            }
-        }
-    }
-}
-
-static double between(double value, double lower, double upper)
-{
-    return value < lower ? lower : value > upper ? upper : value;
-}
-
 /* Guess the new correction: the last one at the middle of each new interval, within bounds. */
-static void write_guess(const mpc_state *state, workspace *w, double *correction)
+static void write_guess(const mpc_state *state, mpc_workspace *w, double *correction)
 {
     const mpc_task *task = state->task;
     memset(correction, 0, (size_t)w->motion.variables * sizeof(double));
     for (int j = 0; j < task->intervals; j++) {
-        const double middle = w->motion.begin + (j + 0.5) * w->motion.width;
+        const double middle = w->motion.begin + ((double)j + 0.5) * w->motion.width;
         add_correction(state, w->motion.begin, middle, correction + j * task->tail);
     }
     for (int i = 0; i < w->motion.variables; i++) {
-        correction[i] = between(correction[i], w->lower[i], w->upper[i]);
+        correction[i] = mpc_between(correction[i], w->lower[i], w->upper[i]);
     }
-}
-
-/* Lower the sum of squares by one Gauss-Newton step from the correction; return 0 for success. */
-static int improve(mpc_state *state, workspace *w, double *correction)
-{
-    const int n = w->motion.variables;
-    mpc_program trial = {0.0, NULL, NULL};
-    w->motion.correction = correction;
-    if (mpc_program_of(&w->motion, w->x0, &w->program) != 0) {
-        return 1;
-    }
-    for (int i = 0; i < n; i++) {
-        w->lower[i] -= correction[i];
-        w->upper[i] -= correction[i];
-    }
-    const int changes = mpc_quadratic(n, w->program.H, w->program.g, w->lower, w->upper, w->d,
-                                      w->set, w->factors);
-    for (int i = 0; i < n; i++) {
-        w->lower[i] += correction[i];
-        w->upper[i] += correction[i];
-    }
-    if (changes < 0) {
-        return 1;
-    }
-    state->set_changes += changes;
-    double part = 1.0;
-    w->motion.correction = w->trial;
-    for (int k = 0; k <= HALVINGS; k++, part /= 2) {
-        for (int i = 0; i < n; i++) {
-            w->trial[i] = between(correction[i] + part * w->d[i], w->lower[i], w->upper[i]);
-        }
-        if (mpc_program_of(&w->motion, w->x0, &trial) == 0
-            && trial.cost <= w->program.cost * (1 + ROUNDING)) {
-            memcpy(correction, w->trial, (size_t)n * sizeof *correction);
-            state->cost = trial.cost;
-            return 0;
-        }
-    }
-    return 1;
 }
 
 /* Compute the correction from q, v at t and store it in w->fresh; return 0 for success. */
-static int computed(mpc_state *state, workspace *w, double t, const double *q, const double *v)
+static int computed(mpc_state *state, mpc_workspace *w, double t, const double *q, const double *v)
 {
     const mpc_task *task = state->task;
     mpc_motion *motion = &w->motion;
@@ -264,32 +192,49 @@ static int computed(mpc_state *state, workspace *w, double t, const double *q, c
     }
     const double rest = task->end - (t + task->delay);
     motion->begin = t + task->delay;
-    motion->width = (rest < task->horizon ? rest : task->horizon) / task->intervals;
+    motion->width = (rest < task->horizon ? rest : task->horizon) / (double)task->intervals;
     if (!(motion->width > 0.0)) {
         return 1;
     }
-    write_bounds(w);
+    mpc_write_bounds(w);
     write_guess(state, w, w->fresh);
-    if (improve(state, w, w->fresh) != 0) {
+    if (mpc_improve(state, w, w->fresh) != 0) {
         return 1;
     }
     for (int k = 1; k < task->iterations; k++) { /* if no step improves it, it is the best */
-        if (improve(state, w, w->fresh) != 0) {
+        if (state->off <= task->near && !(state->flags & MPC_BOUND)) {
+            break;
+        }
+        state->flags |= MPC_SECOND;
+        if (mpc_improve(state, w, w->fresh) != 0) {
             break;
         }
     }
+    state->flags |= state->off > task->miss ? MPC_MISS : 0;
     return 0;
+}
+
+/* Note that a tick of these flags ended. */
+static void note(mpc_state *state)
+{
+    if (state->ticks < state->room) {
+        state->log[state->ticks] = (unsigned char)state->flags;
+    }
+    state->ticks++;
 }
 
 int mpc_tick(mpc_state *state, double t, const double *q, const double *v)
 {
-    workspace w;
+    mpc_workspace w;
     lay_out(state->task, state->memory, &w);
-    state->ticks++;
+    state->flags = 0;
     if (computed(state, &w, t, q, v) != 0) {
         state->failed++;
+        state->flags |= acting(state, t + state->task->delay) < 0 ? MPC_KEPT | MPC_OPEN : MPC_KEPT;
+        note(state);
         return 1;
     }
+    note(state);
     /* it replaces the correction that does not act now */
     const int place = acting(state, t) == state->newest ? 1 - state->newest : state->newest;
     memcpy(correction_of(state, place), w.fresh, (size_t)w.motion.variables * sizeof(double));

@@ -34,41 +34,29 @@ int mpc_node(mpc_motion *motion, double t, const double *x, const double *correc
     return failed;
 }
 
-/* K = J_x S_at; J_tau is added in the columns of interval block. */
-static void turn_slopes(mpc_motion *motion, int block, int columns)
+/* Turn column c of S_at into its slope J_x S_at, plus J_tau of coordinate a if a >= 0; add weight
+   times that to S_sum, and let S_at be S plus part times that. */
+static void turn_column(mpc_motion *motion, int c, int a, double weight, double part)
 {
     const mpc_task *task = motion->task;
     const int m = task->tail, states = states_of(task), zeta = arguments_of(task);
-    const size_t n = (size_t)motion->variables;
-    for (int i = 0; i < states; i++) {
-        const double *J = motion->J + (size_t)i * (size_t)zeta;
-        double *row = motion->K + (size_t)i * n;
-        for (int c = 0; c < columns; c++) {
-            row[c] = 0.0;
-        }
-        for (int j = 0; j < states; j++) {
-            const double factor = J[j], *S = motion->S_at + (size_t)j * n;
-            for (int c = 0; c < columns; c++) {
-                row[c] += factor * S[c];
+    const double *S = motion->S + c * states;
+    double *at = motion->S_at + c * states, *sum = motion->S_sum + c * states;
+    const double *J = motion->J;
+    for (int i = 0; i < states; i++, J += zeta) {
+        double slope = a < 0 ? 0.0 : J[states + a];
+        if (i >= MPC_ATTITUDE && i < MPC_ATTITUDE + m) { /* a coordinate's rate is a state */
+            slope = at[i + m];
+        } else {
+            for (int j = 0; j < states; j++) {
+                slope += J[j] * at[j];
             }
         }
-        for (int a = 0; a < m; a++) {
-            row[block * m + a] += J[states + a];
-        }
+        motion->row[i] = slope;
     }
-}
-
-/* to = from + factor * slope, for matrices whose rows begin apart numbers after each other. */
-static void shift(int rows, int columns, size_t apart, const double *from, double factor,
-                  const double *slope, double *to)
-{
-    for (int i = 0; i < rows; i++) {
-        for (int c = 0; c < columns; c++) {
-            to[c] = from[c] + factor * slope[c];
-        }
-        from += apart;
-        slope += apart;
-        to += apart;
+    for (int i = 0; i < states; i++) {
+        sum[i] += weight * motion->row[i];
+        at[i] = S[i] + part * motion->row[i];
     }
 }
 
@@ -76,35 +64,27 @@ int mpc_step(mpc_motion *motion, double t, double h, const double *correction, i
              int columns)
 {
     const int states = states_of(motion->task);
-    const size_t n = (size_t)motion->variables;
+    const int m = motion->task->tail;
+    const size_t size = (size_t)(columns * states) * sizeof(double);
     memcpy(motion->x_at, motion->x, (size_t)states * sizeof(double));
     memcpy(motion->sum, motion->x, (size_t)states * sizeof(double));
-    if (columns > 0) {
-        memcpy(motion->S_at, motion->S, (size_t)states * n * sizeof(double));
-        memcpy(motion->S_sum, motion->S, (size_t)states * n * sizeof(double));
-    }
+    memcpy(motion->S_at, motion->S, size);
+    memcpy(motion->S_sum, motion->S, size);
     for (int s = 0; s < 4; s++) {
         if (mpc_node(motion, t + NODES[s] * h, motion->x_at, correction, columns > 0) != 0) {
             return 1;
         }
-        const double *k = motion->y;
-        shift(1, states, 0, motion->sum, WEIGHTS[s] * h, k, motion->sum);
-        if (columns > 0) {
-            turn_slopes(motion, block, columns);
-            shift(states, columns, n, motion->S_sum, WEIGHTS[s] * h, motion->K, motion->S_sum);
+        const double weight = WEIGHTS[s] * h, part = s < 3 ? NODES[s + 1] * h : 0.0;
+        for (int i = 0; i < states; i++) {
+            motion->sum[i] += weight * motion->y[i];
+            motion->x_at[i] = motion->x[i] + part * motion->y[i];
         }
-        if (s < 3) {
-            const double part = NODES[s + 1] * h;
-            shift(1, states, 0, motion->x, part, k, motion->x_at);
-            if (columns > 0) {
-                shift(states, columns, n, motion->S, part, motion->K, motion->S_at);
-            }
+        for (int c = 0; c < columns; c++) {
+            turn_column(motion, c, c < block * m ? -1 : c - block * m, weight, part);
         }
     }
     memcpy(motion->x, motion->sum, (size_t)states * sizeof(double));
-    if (columns > 0) {
-        memcpy(motion->S, motion->S_sum, (size_t)states * n * sizeof(double));
-    }
+    memcpy(motion->S, motion->S_sum, size);
     for (int i = 0; i < states; i++) {
         if (!isfinite(motion->x[i])) {
             return 1;

@@ -5,6 +5,8 @@
 
 #include "mpc.h"
 
+static const double NONE = 1e30; /* no bound, no time */
+
 /* Arrays of a tick: x and S = dx / d(correction) along the motion, and workspace. */
 typedef struct {
     const mpc_task *task;
@@ -12,17 +14,29 @@ typedef struct {
     double begin, width;         /* s, start of the correction, length of an interval */
     const double *correction;    /* (N, m) */
     double h[3];                 /* angular momentum */
-    double *x, *S;               /* (states), (states, n) */
+    double *x, *S;               /* (states), (n, states): S by columns */
     double *x_at, *S_at;         /* the same at a Runge-Kutta stage */
-    double *sum, *S_sum, *K;     /* weighted sums of the stages; slope of S */
+    double *sum, *S_sum;         /* weighted sums of the stages */
+    double *extreme, *S_extreme; /* (N 2m), (N 2m, n): largest angles and rates of each interval */
     double *y, *J, *tau, *table, *row, *work;
 } mpc_motion;
 
-/* The program of a correction: the sum of squares and its derivatives. */
+/* The program of a correction: the sum of squares |R d + c|^2 / 2 + constant, near the correction. */
 typedef struct {
-    double cost;
-    double *g, *H; /* (n), (n, n); NULL if only the cost is wanted */
+    double cost, off; /* at d = 0; square of the distance from the target */
+    double *c, *R;    /* (n), (n, n), upper triangle; NULL if only the cost is wanted */
 } mpc_program;
+
+/* The arrays of a tick. */
+typedef struct {
+    mpc_motion motion;
+    mpc_program program;
+    mpc_bounded qp;
+    double *x0, *fresh, *trial;
+    double *lower, *upper; /* (n): bounds of the correction */
+    double *limit;         /* (N 2m): bounds of the tail that can hold */
+    double *low, *high;    /* (n + N 2m): bounds of the quadratic program */
+} mpc_workspace;
 
 static inline int states_of(const mpc_task *task)
 {
@@ -51,5 +65,16 @@ int mpc_node(mpc_motion *motion, double t, const double *x, const double *correc
 /* least_squares.c: compute the cost of a motion from x0, with derivatives if the program has arrays for
    them; return 0 if all numbers are finite */
 int mpc_program_of(mpc_motion *motion, const double *x0, mpc_program *program);
+
+/* quadratic.c: compute the rotation that turns (a, b) into (norm, 0); return the norm */
+double mpc_rotation(double a, double b, double *cosine, double *sine);
+
+/* gauss_newton.c: compute bounds of each number of the correction: those of the torque minus the
+   plan's torque, at both ends of all Runge-Kutta steps in its interval */
+void mpc_write_bounds(mpc_workspace *w);
+double mpc_between(double value, double lower, double upper);
+/* lower the sum of squares, plus the price of what exceeds bounds, by one Gauss-Newton step from the
+   correction; return 0 for success */
+int mpc_improve(mpc_state *state, mpc_workspace *w, double *correction);
 
 #endif
