@@ -198,16 +198,21 @@ static int computed(mpc_state *state, mpc_workspace *w, double t, const double *
     }
     mpc_write_bounds(w);
     write_guess(state, w, w->fresh);
-    if (mpc_improve(state, w, w->fresh) != 0) {
-        return 1;
-    }
-    for (int k = 1; k < task->iterations; k++) { /* if no step improves it, it is the best */
-        if (state->off <= task->near && !(state->flags & MPC_BOUND)) {
-            break;
+    int failed = mpc_improve(state, w, w->fresh), k = 1;
+    if (failed == MPC_FAR && k++ < task->iterations) { /* again, without torques */
+        for (int i = 0; i < w->motion.variables; i++) {
+            w->fresh[i] = 0.5 * (w->lower[i] + w->upper[i]);
         }
         state->flags |= MPC_SECOND;
+        failed = mpc_improve(state, w, w->fresh);
+    }
+    if (failed) {
+        return 1;
+    }
+    while (k++ < task->iterations && (state->off > task->near || state->flags & MPC_BOUND)) {
+        state->flags |= MPC_SECOND;
         if (mpc_improve(state, w, w->fresh) != 0) {
-            break;
+            break; /* it is the best */
         }
     }
     state->flags |= state->off > task->miss ? MPC_MISS : 0;

@@ -100,7 +100,7 @@ int mpc_improve(mpc_state *state, mpc_workspace *w, double *correction)
     mpc_program trial = {0.0, 0.0, NULL, NULL};
     w->motion.correction = correction;
     if (mpc_program_of(&w->motion, w->x0, &w->program) != 0) {
-        return 1;
+        return MPC_FAR;
     }
     const int widened = write_limits(w, correction);
     const double excess = excess_of(w);

@@ -74,7 +74,8 @@ double mpc_rotation(double a, double b, double *cosine, double *sine);
 void mpc_write_bounds(mpc_workspace *w);
 double mpc_between(double value, double lower, double upper);
 /* lower the sum of squares, plus the price of what exceeds bounds, by one Gauss-Newton step from the
-   correction; return 0 for success */
+   correction; return 0 for success, MPC_FAR if the correction's own motion is not finite */
+enum { MPC_FAR = 2 };
 int mpc_improve(mpc_state *state, mpc_workspace *w, double *correction);
 
 #endif
