@@ -8,9 +8,10 @@ import numpy as np
 import serpentail as st
 from checks.embedded.boards import BOARDS, HERE, PROFILES, WARNINGS, Board
 from checks.embedded.image import BARE, C_LINES, CASE, Image, command, compiled, manifest_of
-from checks.embedded.results import run
+from checks.embedded.results import Result, run
 
 TIMES = (0.0, 0.1, 0.2)  # s, times of the ticks
+TRIALS = 3  # MPC_TRIALS
 SHOWN = 4  # number of times at which the torques of a tick are read
 HEAD = (
     """/* States at which ticks are computed: t, then q, v, then q, v of the next tick. */
@@ -20,16 +21,16 @@ HEAD = (
 #include <stdint.h>
 
 #include "{prefix}.h"
-#include "{prefix}_mpc.h"
+#include "{prefix}_mpc.c" /* with its inner functions */
 
-typedef double real;
-#define REAL_IS_FLOAT 0
+typedef {real} real;
+#define REAL_IS_FLOAT {single}
 enum {{ STATES = {states}, NQ = {nq}, NV = {nv}, NT = NV - 6, INPUTS = 1 + 2 * (NQ + NV) }};
-enum {{ SHOWN = {shown}, OUTPUTS = SHOWN * NT, WORK = 1, CASES = 4 }};
+enum {{ SHOWN = {shown}, OUTPUTS = SHOWN * NT, WORK = 1, CASES = 8 }};
 
 """
     + CASE
-    + """static double memory[{upper}_MPC_MEMORY];
+    + """static real memory[{upper}_MPC_MEMORY];
 static {prefix}_mpc_state controller;
 
 static void prepare(void)
@@ -43,7 +44,7 @@ static void prepare(void)
 static int torques(real t, real *outputs)
 {{
   for (int k = 0; k < SHOWN; ++k) {{
-    const real at = t + k * ({prefix}_mpc_plan.end - t) / SHOWN;
+    const real at = t + (real)k * ({prefix}_mpc_plan.end - t) / (real)SHOWN;
     {prefix}_mpc_torque(&controller, at, at, outputs + k * NT);
   }}
   return (int)controller.failed;
@@ -68,11 +69,57 @@ static int call_two_ticks(const real *state, real *outputs, real *work)
   return torques(later, outputs);
 }}
 
+/* The parts of a tick: what comes first; a motion; one with slopes; a quadratic program. */
+static {prefix}_mpc_workspace tick;
+
+static int call_first(const real *state, real *outputs, real *work)
+{{
+  (void)outputs;
+  (void)work;
+  {prefix}_mpc_begin(&controller, &{prefix}_mpc_plan, memory);
+  lay_out(&{prefix}_mpc_plan, memory, &tick);
+  if (prepared(&controller, &tick, state[0], state + 1, state + 1 + NQ) != 0) {{
+    return 1;
+  }}
+  tick.motion.correction = tick.fresh;
+  return 0;
+}}
+
+static int call_motion(const real *state, real *outputs, real *work)
+{{
+  {prefix}_mpc_program plain = {{0, 0, NULL, NULL}};
+  return call_first(state, outputs, work) + {prefix}_mpc_program_of(&tick.motion, tick.x0, &plain);
+}}
+
+static int call_derivatives(const real *state, real *outputs, real *work)
+{{
+  return call_first(state, outputs, work)
+         + {prefix}_mpc_program_of(&tick.motion, tick.x0, &tick.program);
+}}
+
+/* Torques have so little room that most bounds are active; returns the changes. */
+static int call_quadratic(const real *state, real *outputs, real *work)
+{{
+  if (call_derivatives(state, outputs, work) != 0) {{
+    return 0;
+  }}
+  for (int i = 0; i < tick.qp.n; ++i) {{
+    tick.lower[i] = tick.fresh[i] - (real)(1 + i % 3) / 100000;
+    tick.upper[i] = tick.fresh[i] + (real)(1 + i % 3) / 100000;
+  }}
+  {prefix}_mpc_write_limits(&tick, tick.fresh);
+  return {prefix}_mpc_quadratic(&tick.qp);
+}}
+
 static const struct a_case cases[CASES] = {{
   {{"nothing", call_nothing, 0}},
   {{"room", call_room, 0}},
   {{"tick", call_tick, OUTPUTS}},
   {{"two_ticks", call_two_ticks, OUTPUTS}},
+  {{"first", call_first, 0}},
+  {{"motion", call_motion, 0}},
+  {{"slopes", call_derivatives, 0}},
+  {{"quadratic", call_quadratic, 0}},
 }};
 
 static const real states[STATES][INPUTS] = {{
@@ -82,13 +129,15 @@ static const real states[STATES][INPUTS] = {{
 
 @dataclass(frozen=True)
 class Ticks:
-    """Ticks on a board: whether their bits are the host's, instructions of one, the most, bytes of
-    stack, of code with constants, and of memory; torques as (states, times * 2m).
+    """Ticks on a board: whether their bits are the host's; instructions of those that were made,
+    and the most of any tick; bytes of stack, of code with constants, and of memory; torques as
+    (states, times * 2m).
     """
 
     same_bits: bool
     failed: int
     instructions: int
+    most: int
     stack: int
     code: int
     memory: int
@@ -125,11 +174,25 @@ def ticks(folder: Path, mpc: st.Mpc, board: str, output: Path, profile: str) -> 
         same,
         max(max(result.statuses) for result in own),
         max(own[0].instructions),
+        most_instructions(found, mpc),
         max(own[0].depths),
         int(size[0]) + int(size[1]),
-        8 * mpc.memory_size,
+        mpc.memory_size * (4 if manifest_of(folder)["real"] == "float" else 8),
         found["two_ticks"].values,
     )
+
+
+def most_instructions(found: dict[str, Result], mpc: st.Mpc) -> int:
+    """Return the most instructions of a tick: all its steps, each with all its trials and changes
+    of the active set, from those of the parts.
+    """
+    first, motion, slopes, quadratic = (
+        max(found[name].instructions) for name in ("first", "motion", "slopes", "quadratic")
+    )
+    n = mpc.settings.intervals * mpc.model.layout.nt
+    change = (quadratic - slopes) / min(found["quadratic"].statuses)
+    step = slopes - first + TRIALS * (motion - first) + (4 * n + 10) * change
+    return int(first + mpc.settings.iterations * step)
 
 
 def built(folder: Path, mpc: st.Mpc, board: Board, output: Path, profile: str) -> Image:
@@ -143,6 +206,7 @@ def built(folder: Path, mpc: st.Mpc, board: Board, output: Path, profile: str) -
     strict = ("-std=c99", *WARNINGS, *flags)
     model = folder / "src" / f"{prefix}.c"
     objects = [compiled(board, path, output, strict, folder) for path in (model, controller)]
+    objects.pop()  # the check includes the controller
     for name in ("check.c", board.port):
         objects.append(compiled(board, HERE / name, output, (*C_LINES, *flags), folder))
     image = output / "image.elf"
@@ -154,8 +218,11 @@ def built(folder: Path, mpc: st.Mpc, board: Board, output: Path, profile: str) -
 def cases(mpc: st.Mpc, states: np.ndarray) -> str:
     """Return the text of cases.h."""
     prefix, model = mpc.model.name, mpc.model
+    real = model.manifest["real"]
     text = HEAD.format(
         prefix=prefix,
+        real=real,
+        single=int(real == "float"),
         upper=prefix.upper(),
         states=len(states),
         nq=model.nq,
@@ -163,5 +230,6 @@ def cases(mpc: st.Mpc, states: np.ndarray) -> str:
         shown=SHOWN,
     )
     for row in states:
-        text += f"  {{{', '.join(float(x).hex() for x in row)}}},\n"
+        suffix = "f" if real == "float" else ""
+        text += f"  {{{', '.join(float(x).hex() + suffix for x in row)}}},\n"
     return text + "};\n\n#endif\n"

@@ -182,8 +182,10 @@ static void write_guess(const mpc_state *state, mpc_workspace *w, double *correc
     }
 }
 
-/* Compute the correction from q, v at t and store it in w->fresh; return 0 for success. */
-static int computed(mpc_state *state, mpc_workspace *w, double t, const double *q, const double *v)
+/* Compute the state at which new torques act, their bounds and a first guess of the correction, which
+   is stored in w->fresh; return 0 for success. */
+static int prepared(const mpc_state *state, mpc_workspace *w, double t, const double *q,
+                    const double *v)
 {
     const mpc_task *task = state->task;
     mpc_motion *motion = &w->motion;
@@ -198,6 +200,16 @@ static int computed(mpc_state *state, mpc_workspace *w, double t, const double *
     }
     mpc_write_bounds(w);
     write_guess(state, w, w->fresh);
+    return 0;
+}
+
+/* Compute the correction from q, v at t and store it in w->fresh; return 0 for success. */
+static int computed(mpc_state *state, mpc_workspace *w, double t, const double *q, const double *v)
+{
+    const mpc_task *task = state->task;
+    if (prepared(state, w, t, q, v) != 0) {
+        return 1;
+    }
     int failed = mpc_improve(state, w, w->fresh), k = 1;
     if (failed == MPC_FAR && k++ < task->iterations) { /* again, without torques */
         for (int i = 0; i < w->motion.variables; i++) {

@@ -47,10 +47,7 @@ void mpc_write_bounds(mpc_workspace *w)
     }
 }
 
-/* Compute bounds of the quadratic program from a correction.  A bound of the tail that no torque can
-   keep is widened to what can be reached, in the first interval at least to the state's own value.
-   Return whether one was. */
-static int write_limits(mpc_workspace *w, const double *correction)
+int mpc_write_limits(mpc_workspace *w, const double *correction)
 {
     const mpc_motion *motion = &w->motion;
     const int n = w->qp.n, both = 2 * motion->task->tail;
@@ -102,7 +99,7 @@ int mpc_improve(mpc_state *state, mpc_workspace *w, double *correction)
     if (mpc_program_of(&w->motion, w->x0, &w->program) != 0) {
         return MPC_FAR;
     }
-    const int widened = write_limits(w, correction);
+    const int widened = mpc_write_limits(w, correction);
     const double excess = excess_of(w);
     w->qp.price = PRICE;
     const int changes = mpc_quadratic(&w->qp);

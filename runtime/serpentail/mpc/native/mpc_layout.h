@@ -73,6 +73,10 @@ double mpc_rotation(double a, double b, double *cosine, double *sine);
    plan's torque, at both ends of all Runge-Kutta steps in its interval */
 void mpc_write_bounds(mpc_workspace *w);
 double mpc_between(double value, double lower, double upper);
+/* compute bounds of the quadratic program from a correction.  A bound of the tail that no torque can
+   keep is widened to what can be reached, in the first interval at least to the state's own value.
+   Return whether one was */
+int mpc_write_limits(mpc_workspace *w, const double *correction);
 /* lower the sum of squares, plus the price of what exceeds bounds, by one Gauss-Newton step from the
    correction; return 0 for success, MPC_FAR if the correction's own motion is not finite */
 enum { MPC_FAR = 2 };
