@@ -26,7 +26,7 @@ HEAD = (
 typedef {real} real;
 #define REAL_IS_FLOAT {single}
 enum {{ STATES = {states}, NQ = {nq}, NV = {nv}, NT = NV - 6, INPUTS = 1 + 2 * (NQ + NV) }};
-enum {{ SHOWN = {shown}, OUTPUTS = SHOWN * NT, WORK = 1, CASES = 8 }};
+enum {{ SHOWN = {shown}, OUTPUTS = SHOWN * NT, WORK = 1, CASES = 9 }};
 
 """
     + CASE
@@ -97,18 +97,29 @@ static int call_derivatives(const real *state, real *outputs, real *work)
          + {prefix}_mpc_program_of(&tick.motion, tick.x0, &tick.program);
 }}
 
-/* Torques have so little room that most bounds are active; returns the changes. */
-static int call_quadratic(const real *state, real *outputs, real *work)
+/* Return the changes of a quadratic program whose torques have some room (N m). */
+static int solve(const real *state, real room, real *outputs, real *work)
 {{
   if (call_derivatives(state, outputs, work) != 0) {{
     return 0;
   }}
   for (int i = 0; i < tick.qp.n; ++i) {{
-    tick.lower[i] = tick.fresh[i] - (real)(1 + i % 3) / 100000;
-    tick.upper[i] = tick.fresh[i] + (real)(1 + i % 3) / 100000;
+    tick.lower[i] = tick.fresh[i] - room * (real)(1 + i % 3);
+    tick.upper[i] = tick.fresh[i] + room * (real)(1 + i % 3);
   }}
   {prefix}_mpc_write_limits(&tick, tick.fresh);
   return {prefix}_mpc_quadratic(&tick.qp);
+}}
+
+static int call_free(const real *state, real *outputs, real *work)
+{{
+  return solve(state, 1000, outputs, work);
+}}
+
+/* most bounds are active */
+static int call_bounded(const real *state, real *outputs, real *work)
+{{
+  return solve(state, (real)1 / 100000, outputs, work);
 }}
 
 static const struct a_case cases[CASES] = {{
@@ -119,7 +130,8 @@ static const struct a_case cases[CASES] = {{
   {{"first", call_first, 0}},
   {{"motion", call_motion, 0}},
   {{"slopes", call_derivatives, 0}},
-  {{"quadratic", call_quadratic, 0}},
+  {{"free", call_free, 0}},
+  {{"bounded", call_bounded, 0}},
 }};
 
 static const real states[STATES][INPUTS] = {{
@@ -186,12 +198,12 @@ def most_instructions(found: dict[str, Result], mpc: st.Mpc) -> int:
     """Return the most instructions of a tick: all its steps, each with all its trials and changes
     of the active set, from those of the parts.
     """
-    first, motion, slopes, quadratic = (
-        max(found[name].instructions) for name in ("first", "motion", "slopes", "quadratic")
-    )
+    parts = ("first", "motion", "slopes", "free", "bounded")
+    first, motion, slopes, free, bounded = (max(found[name].instructions) for name in parts)
     n = mpc.settings.intervals * mpc.model.layout.nt
-    change = (quadratic - slopes) / min(found["quadratic"].statuses)
-    step = slopes - first + TRIALS * (motion - first) + (4 * n + 10) * change
+    changes = min(found["bounded"].statuses) - max(found["free"].statuses)
+    program = free - slopes + (3 * n + 10) * (bounded - free) / changes
+    step = slopes - first + TRIALS * (motion - first) + program
     return int(first + mpc.settings.iterations * step)
 
 

@@ -7,7 +7,7 @@ from functools import cache
 
 import casadi as ca
 import numpy as np
-from scipy.optimize import lsq_linear
+from scipy.optimize import minimize
 
 import serpentail as st
 from serpentail.mpc import task as weights
@@ -55,8 +55,12 @@ class Reference:
         horizon = min(settings.horizon, plan.duration)
         self.steps = int(np.ceil(horizon / self.N / settings.step - 1e-9))
         d = ca.MX.sym("d", self.N * self.nt)
-        r = self._residuals(np.concatenate([q[3:7], q[7:], v[6:]]), d, end)
+        self.most = np.full(2 * self.nt, np.inf)
+        if plan.problem.bounds.angle is not None:
+            self.most[: self.nt] = np.pi / 3
+        r, tail = self._residuals(np.concatenate([q[3:7], q[7:], v[6:]]), d, end)
         self.of = ca.Function("residuals", [d], [r, ca.jacobian(r, d)])
+        self.tail = ca.Function("tail", [d], [tail, ca.jacobian(tail, d)])
 
     def _planned(self, t):
         return self.plan.curve.at(np.array([t]))
@@ -64,7 +68,7 @@ class Reference:
     def _residuals(self, x, d, end):
         plan, nt, h = self.plan, self.nt, self.width / self.steps
         smoothing, duration = plan.problem.smoothing, plan.duration
-        rows = [np.sqrt(self.width / duration) / TORQUE * d]
+        rows, tail = [np.sqrt(self.width / duration) / TORQUE * d], []
         for j in range(self.N):
             own = d[j * nt : (j + 1) * nt]
             for i in range(self.steps):
@@ -72,10 +76,9 @@ class Reference:
                 x = self._step(x, own, t, h)
                 off = x[4 + nt :] - self._planned(t + h)["tail_rate"][0]
                 rows.append(np.sqrt(h / duration) * smoothing / TORQUE * off)
-            over = ca.fmax(ca.fabs(x[4 : 4 + nt]) - np.pi / 3, 0)
-            rows.append(over / weights.BEYOND)
+                tail.append(x[4:])
         rows.append(self._end(x, d[(self.N - 1) * nt :], end))
-        return ca.vertcat(*rows)
+        return ca.vertcat(*rows), ca.vertcat(*tail)
 
     def _step(self, x, own, t, h):
         def rate(t, x):
@@ -116,12 +119,48 @@ class Reference:
         rows = np.array([[self._planned(t)["torque"][0] for t in row] for row in times])
         return (-TORQUE - rows).max(axis=1).ravel(), (TORQUE - rows).min(axis=1).ravel()
 
+    def largest(self, d):
+        """Return the largest angles and rates of each interval, with their slopes, and bounds."""
+        tail, slopes = (np.array(part) for part in self.tail(d))
+        tail = tail.reshape(self.N, self.steps, -1)
+        at = np.abs(tail).argmax(axis=1)
+        j, a = np.indices(at.shape)
+        slopes = slopes.reshape(*tail.shape, -1)[j, at, a].reshape(at.size, -1)
+        return tail[j, at, a].ravel(), slopes, np.tile(self.most, self.N)
+
     def step(self, d):
         """Return the correction after a Gauss-Newton step, by SciPy."""
         r, J = (np.array(part) for part in self.of(d))
         lower, upper = self.bounds()
-        found = lsq_linear(J, -r.ravel(), (lower - d, upper - d), method="bvls", tol=1e-15)
-        return d + found.x
+        tail, slopes, most = self.largest(d)
+        finite = np.isfinite(most)
+        tail, slopes, most = tail[finite], slopes[finite] * TORQUE, most[finite]
+        Q, R = np.linalg.qr(J * TORQUE)  # in units of the torque
+        rooms = [(most - tail, -slopes), (most + tail, slopes)]
+        sides = np.stack([lower - d, upper - d], 1) / TORQUE
+        return d + TORQUE * least_squares(R, Q.T @ r.ravel(), sides, rooms)
+
+
+def least_squares(R, c, sides, rooms) -> np.ndarray:
+    """Return x that minimises |R x + c|^2 with bounds of x (n, 2), and room + slope x >= 0 for each
+    (room, slope) of ``rooms``, by SciPy.
+    """
+    scale, x = 1 / np.abs(R).max() ** 2, np.zeros(len(c))
+    rows = [
+        {"type": "ineq", "fun": lambda x, a=a, A=A: a + A @ x, "jac": lambda _, A=A: A}
+        for a, A in rooms
+    ]
+    for _ in range(4):  # it stops early where the sum is flat
+        x = minimize(
+            lambda x: scale * ((R @ x + c) ** 2).sum() / 2,
+            x,
+            jac=lambda x: scale * R.T @ (R @ x + c),
+            bounds=sides,
+            constraints=rows,
+            method="SLSQP",
+            options={"ftol": 1e-18, "maxiter": 1000},
+        ).x
+    return x
 
 
 def correction_of(mpc: st.Mpc) -> np.ndarray:

@@ -81,7 +81,7 @@ class Mpc:
         Time from a tick until its torques act (s), at most the time between ticks.
     iterations : int, default 2
         Most Gauss-Newton steps at a tick.
-    step : float, default 0.005
+    step : float, default 0.01
         Longest Runge-Kutta step of the prediction (s).
     rest : float, optional
         Time before the plan's end without ticks (s). Default: the time between two ticks.

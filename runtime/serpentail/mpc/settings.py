@@ -16,7 +16,7 @@ from .kernel import FUNCTIONS
 NEEDED = dict(
     zip(FUNCTIONS, ("airborne_rates", "airborne_rates_derivatives", "momentum"), strict=True)
 )
-DEFAULTS: dict[str, Any] = {"intervals": 6, "delay": 0.0, "iterations": 2, "step": 5e-3}
+DEFAULTS: dict[str, Any] = {"intervals": 6, "delay": 0.0, "iterations": 2, "step": 1e-2}
 DEFAULTS |= {"rest": None, "bounds": None, "ignore_path": False}
 NAMES = ("rate", "horizon", *DEFAULTS)
 MOST = 100  # intervals, Gauss-Newton steps

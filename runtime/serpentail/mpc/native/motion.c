@@ -48,8 +48,8 @@ static void turn_column(mpc_motion *motion, int c, int a, double weight, double 
         if (i >= MPC_ATTITUDE && i < MPC_ATTITUDE + m) { /* a coordinate's rate is a state */
             slope = at[i + m];
         } else {
-            for (int j = 0; j < states; j += 2) { /* states is even */
-                slope += J[j] * at[j] + J[j + 1] * at[j + 1];
+            for (int j = 0; j < states; j++) {
+                slope += J[j] * at[j];
             }
         }
         motion->row[i] = slope;

@@ -149,7 +149,7 @@ int mpc_quadratic(mpc_bounded *program);
 
 static inline int mpc_most_changes(int n)
 {
-    return 4 * n + 10;
+    return 3 * n + 10;
 }
 
 #ifdef __cplusplus

@@ -152,7 +152,6 @@ static void leave(const mpc_bounded *qp, dual *w, int out)
 {
     const int n = qp->n, q = --w->active;
     double cosine, sine;
-    w->closed[w->which[out]] = 0;
     for (int k = out; k < q; k++) {
         w->which[k] = w->which[k + 1];
         w->side[k] = w->side[k + 1];
@@ -173,15 +172,16 @@ static void leave(const mpc_bounded *qp, dual *w, int out)
     }
 }
 
-/* Raise the multiplier of bound p until it is active, or given up because that costs too much;
-   return the number of changes, at most most + 1. */
+/* Raise the multiplier of bound p until it is active, or given up because that costs too much.  On
+   the way others become inactive, or are given up: what these cost stays in the sum.  Return the
+   number of changes, at most most + 1. */
 static int enforce(mpc_bounded *qp, dual *w, int p, int side, double excess, int most)
 {
     double own = 0.0;
     for (int changes = 1; changes <= most; changes++) {
         const double left = write_steps(qp, w, p, side);
         double step = p < qp->n ? NONE : qp->price - own;
-        int out = -1, joins = 0;
+        int out = -1, joins = 0, dear = 0;
         if (left > 0.0 && excess / left < step) {
             step = excess / left;
             joins = 1;
@@ -190,6 +190,12 @@ static int enforce(mpc_bounded *qp, dual *w, int p, int side, double excess, int
             if (w->r[k] > 0.0 && w->multiplier[k] < step * w->r[k]) {
                 step = w->multiplier[k] / w->r[k];
                 out = k;
+                dear = 0;
+            } else if (w->r[k] < 0.0 && w->which[k] >= qp->n
+                       && qp->price - w->multiplier[k] < -step * w->r[k]) {
+                step = (qp->price - w->multiplier[k]) / -w->r[k];
+                out = k;
+                dear = 1;
             }
         }
         if (!(step < NONE)) {
@@ -205,7 +211,10 @@ static int enforce(mpc_bounded *qp, dual *w, int p, int side, double excess, int
         own += step;
         excess -= step * left;
         if (out >= 0) {
+            const int row = w->which[out];
             leave(qp, w, out);
+            w->closed[row] = dear;
+            qp->paid = dear ? qp->price : qp->paid;
         } else {
             if (joins) {
                 join(qp, w, p, side, own);
