@@ -110,7 +110,7 @@ def test_a_tick_is_the_gauss_newton_step_of_casadi_and_scipy():
             assert mpc.tick(t, q, v)
             found = correction_of(mpc)
             assert bool(mpc.info["set_changes"]) == bound
-            np.testing.assert_allclose(found, wanted, atol=1e-4 * TORQUE)
+            np.testing.assert_allclose(found, wanted, atol=1e-8 * TORQUE)
             tail, slopes, most = reference.largest(np.zeros(reference.N * 2))
             assert (np.abs(tail + slopes @ found) <= most * (1 + 1e-9)).all()
 
@@ -151,16 +151,20 @@ def test_a_tick_takes_another_step_while_the_end_is_far_off():
 
 
 def test_floats_compute_what_doubles_do():
-    single, pitched = zoo.model("single_ground"), disturbed(0.3, 0)
-    for settings in ({}, {"horizon": 0.15}, {"delay": 5e-3}):
+    single = zoo.model("single_ground")
+    for t, size, settings in (
+        (0.0, 0.3, {}),
+        (0.0, 0.3, {"delay": 5e-3}),
+        (0.053, 0.1, {"horizon": 0.15}),
+        (0.307, 0.1, {"horizon": 0.15}),
+    ):
         mpcs = [st.Mpc(model, plan_of(0), **settings) for model in (rat(), single)]
-        for t in (0.0, 0.1):
-            assert all(mpc.tick(t, *pitched) for mpc in mpcs)
-            times = t + 0.01 + np.arange(8) * (DURATION - t - 0.01) / 8
+        times = t + 0.01 + np.arange(8) * (DURATION - t - 0.01) / 8
+        with row(t, size, settings):
+            assert all(mpc.tick(t, *disturbed(size, 0)) for mpc in mpcs)
             double, float_ = (np.array([mpc.torque(at) for at in times]) for mpc in mpcs)
-            with row(settings, t):
-                np.testing.assert_allclose(float_, double, atol=0.02 * TORQUE)
-        assert mpcs[0].info["flags"] == mpcs[1].info["flags"]
+            np.testing.assert_allclose(float_, double, atol=0.05 * TORQUE)
+            assert mpcs[0].info["flags"] == mpcs[1].info["flags"]
     q, v = start(rat(), 0)
     flights = [
         st.simulate(model, q, v, controller=st.Mpc(model, plan_of(0)), t_span=DURATION)

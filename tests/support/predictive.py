@@ -145,22 +145,23 @@ def least_squares(R, c, sides, rooms) -> np.ndarray:
     """Return x that minimises |R x + c|^2 with bounds of x (n, 2), and room + slope x >= 0 for each
     (room, slope) of ``rooms``, by SciPy.
     """
-    scale, x = 1 / np.abs(R).max() ** 2, np.zeros(len(c))
+    turned = np.linalg.inv(R)  # x = turned y, so that the sum is |y + c|^2
+    rooms = [*rooms, (-sides[:, 0], np.eye(len(c))), (sides[:, 1], -np.eye(len(c)))]
     rows = [
-        {"type": "ineq", "fun": lambda x, a=a, A=A: a + A @ x, "jac": lambda _, A=A: A}
+        {"type": "ineq", "fun": lambda y, a=a, A=A @ turned: a + A @ y, "jac": lambda _, A=A @ turned: A}
         for a, A in rooms
     ]
-    for _ in range(4):  # it stops early where the sum is flat
-        x = minimize(
-            lambda x: scale * ((R @ x + c) ** 2).sum() / 2,
-            x,
-            jac=lambda x: scale * R.T @ (R @ x + c),
-            bounds=sides,
+    scale, y = 1 / (1 + c @ c), np.zeros(len(c))
+    for _ in range(3):  # it stops early where the sum is flat
+        y = minimize(
+            lambda y: scale * ((y + c) ** 2).sum() / 2,
+            y,
+            jac=lambda y: scale * (y + c),
             constraints=rows,
             method="SLSQP",
             options={"ftol": 1e-18, "maxiter": 1000},
         ).x
-    return x
+    return turned @ y
 
 
 def correction_of(mpc: st.Mpc) -> np.ndarray:
