@@ -9,6 +9,8 @@ from tempfile import TemporaryDirectory
 from checks.embedded.boards import BOARDS, ToolchainMissing
 from checks.embedded.costs import deepest, flash
 from checks.embedded.image import build
+from checks.embedded.mpc_costs import HEAD as TICK_HEAD
+from checks.embedded.mpc_costs import tick_costs
 from checks.embedded.results import run
 from serpentail.basics.progress import Stage
 from serpentail_codegen.pipeline import generate
@@ -78,6 +80,8 @@ def report(parent: Path) -> str:
             rows[board] += costs(tail, form, board, parent)
     for board, real in REAL.items():
         lines += [f"### {BOARDS[board].title}, `{real}`", "", *markdown(HEAD, rows[board]), ""]
+    lines += ["### A tick of predictive control, (1, 3)", ""]
+    lines += [*markdown(TICK_HEAD, tick_costs(parent)), ""]
     return "\n".join(lines)
 
 

@@ -6,6 +6,7 @@ contact         motions on the ground (Sects. 4, 4.4): films, plots and a table
 landing         kicks that the tail rights onto the feet, planned and passive
 morphology      plans of righting for tails of many shapes, from many tumbles: 20400
 replanning      bodies unlike the planned one: the plan's torques, PFL, predictive control
+pushed          hard pushes in flight: predictive control, and new plans where its flags ask
 identification  how often the intervals of identified parameters cover the truth
 
 The work is done in parallel, as many processes as $SERPENTAIL_THREADS says or there are cores. Each
@@ -19,6 +20,7 @@ from examples import front
 OPTIONS = {
     "righting": {"starts": (front.count, 200, "random starts of the tail (1, 3)")},
     "replanning": {"starts": (front.count, 12, "tumbling starts")},
+    "pushed": {"starts": (front.count, 100, "tumbling starts")},
     "morphology": {
         "points": (front.count, 6800, "tails and tumbles, each with three numbers of segments"),
         "executor": (str, None, "where to run, such as processes:4 or dask:HOST:PORT"),

@@ -57,7 +57,10 @@ def test_quadratic_programs_are_solved_as_by_scipy():
             lower, upper = random.uniform(0.01, 1) * random.uniform(0, 1, (2, n)) * [[-1], [1]]
             lower[0] = 0.0
             A = random.normal(size=(rows, n))
-            low, high = A @ random.uniform(lower, upper) + random.uniform(0, 0.3, (2, rows)) * [[-1], [1]]
+            low, high = A @ random.uniform(lower, upper) + random.uniform(0, 0.3, (2, rows)) * [
+                [-1],
+                [1],
+            ]
             found, changes, _ = solved(R, Q.T @ b, A, [*lower, *low], [*upper, *high])
             if rows:
                 sides = np.stack([lower, upper], 1)
@@ -126,7 +129,11 @@ def test_bounds_of_angles_and_rates_are_kept_and_flags_tell_where_not():
         reference = Reference(mpc, 0.003, q, v, DURATION)
         tail = np.array(reference.tail(correction_of(mpc))[0]).reshape(-1, 4)
         given = plan.problem.bounds if bounds is None else bounds
-        most = np.array([1.1, 40.0]) if not held else np.array([np.max(given.angle), np.max(given.rate)])
+        most = (
+            np.array([1.1, 40.0])
+            if not held
+            else np.array([np.max(given.angle), np.max(given.rate)])
+        )
         within = np.abs(tail).reshape(-1, 2, 2).max(axis=(0, 2)) <= 1.003 * most
         flags = MpcFlag(mpc.info["flags"][0])
         with row(bounds, flags):

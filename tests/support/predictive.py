@@ -148,7 +148,11 @@ def least_squares(R, c, sides, rooms) -> np.ndarray:
     turned = np.linalg.inv(R)  # x = turned y, so that the sum is |y + c|^2
     rooms = [*rooms, (-sides[:, 0], np.eye(len(c))), (sides[:, 1], -np.eye(len(c)))]
     rows = [
-        {"type": "ineq", "fun": lambda y, a=a, A=A @ turned: a + A @ y, "jac": lambda _, A=A @ turned: A}
+        {
+            "type": "ineq",
+            "fun": lambda y, a=a, A=A @ turned: a + A @ y,
+            "jac": lambda _, A=A @ turned: A,
+        }
         for a, A in rooms
     ]
     scale, y = 1 / (1 + c @ c), np.zeros(len(c))
