@@ -16,12 +16,12 @@ NODE = ("airborne_rates", "airborne_rates_derivatives", "airborne_rates_hessian"
 PLANNED = (*NODE, *RIGHTING.split(","))  # what a plan needs
 CASES = (("m7", "double", 480), ("m7", "float", 480), ("m4", "float", 168))  # MHz of a usual chip
 HEAD = ("board", "type", "code, bytes", "memory, bytes", "stack, bytes")
-HEAD += ("instructions, one step", "at most", "ticks a second")
+HEAD += ("instructions, measured", "at most", "ticks a second")
 
 
 def tick_costs(parent: Path) -> list[tuple]:
-    """Return rows: board, type of numbers, bytes, instructions of a tick of one step and the most
-    of any tick, and the ticks a second at one instruction a cycle.
+    """Return rows: board, type of numbers, bytes, instructions of the longest tick measured and the
+    most of any tick, and the ticks a second at one instruction a cycle.
     """
     folders = {real: _made(parent, real) for real in ("double", "float")}
     models = {real: st.load(folder) for real, folder in folders.items()}

@@ -108,6 +108,10 @@ static int solve(const real *state, real room, real *outputs, real *work)
     tick.upper[i] = tick.fresh[i] + room * (real)(1 + i % 3);
   }}
   {prefix}_mpc_write_limits(&tick, tick.fresh);
+  for (int i = tick.qp.n; i < tick.qp.n + tick.qp.rows; ++i) {{ /* only torques are bounded */
+    tick.low[i] = -NONE;
+    tick.high[i] = NONE;
+  }}
   return {prefix}_mpc_quadratic(&tick.qp);
 }}
 
@@ -201,7 +205,7 @@ def most_instructions(found: dict[str, Result], mpc: st.Mpc) -> int:
     parts = ("first", "motion", "slopes", "free", "bounded")
     first, motion, slopes, free, bounded = (max(found[name].instructions) for name in parts)
     n = mpc.settings.intervals * mpc.model.layout.nt
-    changes = min(found["bounded"].statuses) - max(found["free"].statuses)
+    changes = min(found["bounded"].statuses)  # those of "free" have none
     program = free - slopes + (3 * n + 10) * (bounded - free) / changes
     step = slopes - first + TRIALS * (motion - first) + program
     return int(first + mpc.settings.iterations * step)

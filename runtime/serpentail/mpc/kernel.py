@@ -35,7 +35,7 @@ FUNCTIONS = ("rates", "slopes", "momentum")
 COUNTS = ("ticks", "failed", "steps", "trials", "set_changes")
 
 
-class Kernel(NamedTuple):
+class ControllerCode(NamedTuple):
     """The C of one type of numbers: its functions, and the structures of native/mpc.h."""
 
     code: ctypes.CDLL
@@ -81,7 +81,7 @@ def state_fields(real: Any) -> list[tuple[str, Any]]:
 
 
 @cache
-def kernel(real: str) -> Kernel:
+def kernel(real: str) -> ControllerCode:
     """The controller in C, compiled once; PlanningError if no compiler works."""
     texts = {name: text_of(name, real).encode() for name in (*HEADERS, *SOURCES)}
     digests = {name: hashlib.sha256(text).hexdigest() for name, text in texts.items()}
@@ -98,7 +98,7 @@ def kernel(real: str) -> Kernel:
     code.mpc_control.argtypes = (_pointer, number, number, *(_pointer,) * 3)
     code.mpc_quadratic.argtypes = (_pointer,)
     code.mpc_begin.restype = code.mpc_torque.restype = code.mpc_control.restype = None
-    return Kernel(code, number, *_structures(number))
+    return ControllerCode(code, number, *_structures(number))
 
 
 def _structures(real: Any) -> tuple[type[ctypes.Structure], type[ctypes.Structure]]:

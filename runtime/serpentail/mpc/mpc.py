@@ -135,7 +135,8 @@ class Mpc:
     @property
     def info(self) -> dict[str, Any]:
         """Counts since ``begin``: ticks, failed ticks, Gauss-Newton steps, motions that were tried
-        for them, changes of active sets; and flags, a list with the sum of ``MpcFlag`` of each tick.
+        for them, changes of active sets; and flags, a list: for each tick the sum of its
+        ``MpcFlag``, for at most as many as a flight has.
 
         They count calls of this object only; a simulation's counts are in its ``info["mpc"]``.
         """
