@@ -13,6 +13,7 @@ from serpentail_codegen.scene.parse import scene_for
 
 DURATION, STEP = 0.4, 0.017  # s: of the plan; longest Runge-Kutta step
 NODE = ("airborne_rates", "airborne_rates_derivatives", "airborne_rates_hessian")
+START = 903  # seed
 PLANNED = (*NODE, *RIGHTING.split(","))  # what a plan needs
 CASES = (("m7", "double", 480), ("m7", "float", 480), ("m4", "float", 168))  # MHz of a usual chip
 HEAD = ("board", "type", "code, bytes", "memory, bytes", "stack, bytes")
@@ -28,13 +29,10 @@ def tick_costs(parent: Path) -> list[tuple]:
     model = models["double"]
     plan = st.plan(
         model,
-        start=tumbling(model, 900),
+        start=tumbling(model, START),
         duration=DURATION,
         goal=st.Goal(torso_rate=None),
         bounds=st.Bounds(angle=np.pi / 3, torque=TORQUE),
-        intervals=11,
-        tolerance=None,
-        track=False,
     )
     rows = []
     for board, real, clock in CASES:

@@ -202,11 +202,12 @@ def most_instructions(found: dict[str, Result], mpc: st.Mpc) -> int:
     """Return the most instructions of a tick: all its steps, each with all its trials and changes
     of the active set, from those of the parts.
     """
-    parts = ("first", "motion", "slopes", "free", "bounded")
-    first, motion, slopes, free, bounded = (max(found[name].instructions) for name in parts)
+    parts = ("first", "motion", "slopes", "free")
+    first, motion, slopes, free = (max(found[name].instructions) for name in parts)
     n = mpc.settings.intervals * mpc.model.layout.nt
-    changes = min(found["bounded"].statuses)  # those of "free" have none
-    program = free - slopes + (3 * n + 10) * (bounded - free) / changes
+    changes = zip(found["bounded"].instructions, found["bounded"].statuses, strict=True)
+    change = max((bounded - free) / count for bounded, count in changes)
+    program = free - slopes + (3 * n + 10) * change
     step = slopes - first + TRIALS * (motion - first) + program
     return int(first + mpc.settings.iterations * step)
 

@@ -118,7 +118,7 @@ def test_floats_compute_what_doubles_do():
         st.simulate(single, q, v, controller=st.Mpc(single, plan_of(0)), legs=legs, **alone),
     ]
     np.testing.assert_allclose(flights[1].q[-1], flights[0].q[-1], atol=2e-3)
-    assert flights[1].info["mpc"]["ticks"] == 39 and flights[1].info["mpc"]["failed"] == 0
+    assert flights[1].info["mpc"]["ticks"] == 40 and flights[1].info["mpc"]["failed"] == 0
 
 
 def test_ticks_measure_the_state_at_their_times(plan):
