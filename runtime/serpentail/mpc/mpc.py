@@ -45,6 +45,7 @@ class MpcFlag(IntFlag):
 
     Examples
     --------
+    >>> import serpentail as st
     >>> st.MpcFlag(9)
     <MpcFlag.SECOND|MISS: 9>
     """
