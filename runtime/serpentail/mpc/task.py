@@ -7,10 +7,8 @@ from typing import Any
 import numpy as np
 
 from ..model.model import Model
-from ..planning.goal import Bounds
-from ..planning.nlp.coordinates import attitude
-from ..planning.nlp.direct import goal_matrix
 from ..planning.problem import PlanningProblem
+from ..planning.program.end import goal_matrix
 from ..planning.result.curve import Curve
 from ..planning.result.plan import Plan
 from .kernel import FUNCTIONS, kernel
@@ -130,7 +128,7 @@ def _goal(problem: PlanningProblem, size: int) -> dict[str, np.ndarray]:
     units = np.repeat([unit for *_, unit in parts], [count for _, count, _ in parts])
     given = np.isfinite(values)
     return {
-        "goal": goal_matrix(goal.attitude, attitude("quaternion")),
+        "goal": goal_matrix(goal.attitude),
         "end_state": np.where(given, values, 0.0),
         "end_weight": given / units**2,
     }

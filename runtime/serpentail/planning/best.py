@@ -5,16 +5,15 @@ from dataclasses import replace
 
 from ..basics.progress import Stage
 from ..model.model import Model
+from ..optimal.fork_gate import forks_wait
+from ..optimal.interrupt import stoppable
 from ..simulation.simulate import read_clocks
-from .mesh_refinement import Search
 from .momentum import refuse_impossible
-from .nlp.equations import equations_of_motion
-from .nlp.fork_gate import forks_wait
-from .nlp.interrupt import stoppable
 from .paths_at_start import refuse_violated
 from .problem import PlanningProblem
 from .result.plan import Plan
 from .round import Round
+from .search import Search
 from .settings import PlanSettings
 from .softening import SOFTENING
 
@@ -38,7 +37,6 @@ def best_plan(
     refuse_impossible(model, problem)
     refuse_violated(model, problem)
     with forks_wait(), Stage("plan", model.name) as stage:
-        equations = equations_of_motion(model, settings.dynamics, problem.design)
         with stoppable(settings.time_limit, stage.tell):
             if problem.objective in SOFTENING and settings.guess is None:
                 # these objectives are seldom solved from passive flight
@@ -46,11 +44,11 @@ def best_plan(
                     replace(problem, objective="effort"),
                     replace(settings, track=False),
                 )
-                easier = Search(model, calm, untracked, equations)
+                easier = Search(model, calm, untracked)
                 found = rounds_of(easier, stage)
                 guess = easier.plan(easier.best(found), len(found), begun)
                 settings = replace(settings, guess=guess)
-            search = Search(model, problem, settings, equations, easier)
+            search = Search(model, problem, settings, easier)
             rounds = rounds_of(search, stage, watch, begun)
         return search.plan(search.best(rounds), len(rounds), begun)
 

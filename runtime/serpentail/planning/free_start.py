@@ -28,7 +28,7 @@ PARTS: dict[str, tuple[int, slice]] = {
 }
 
 
-def checked_free_start(model: Model, value: Any, attitude: Any) -> dict[str, Range]:
+def checked_free_start(model: Model, value: Any) -> dict[str, Range]:
     """Return the ranges of parts, SI; the attitude's are those of pitch, roll and yaw."""
     if value is None:
         return {}
@@ -40,10 +40,6 @@ def checked_free_start(model: Model, value: Any, attitude: Any) -> dict[str, Ran
         if unknown:
             raise PlanningError(unknown)
         ranges[name] = _range(name, pair, model.layout.nt if name.startswith("tail") else 3)
-    if "attitude" in ranges and attitude != "euler":
-        raise PlanningError(
-            "free_start.attitude: is of pitch, roll and yaw: plan with attitude='euler'"
-        )
     for angles in ranges.get("tail", ()):
         behind = behind_stops(model.parameters, angles[None])
         if behind:

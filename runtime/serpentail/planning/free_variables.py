@@ -5,33 +5,32 @@ from typing import Any
 
 import numpy as np
 
-from serpentail_scene.layout import OMEGA, POSITION, TAIL_Q, TAIL_V, VELOCITY
-
 from ..model.model import Model
+from ..optimal.samples import MeshSamples
 from .free_start import part_of, with_parts
-from .nlp.coordinates import attitude
-from .nlp.program import NonlinearProgram
 from .problem import PlanningProblem
+from .program.build import PlanProgram
+from .result.full_state import start_carrying
 
 Flown = tuple[Model, PlanningProblem]  # the problem's start is the one that is flown
 
 
-def flown(model: Model, problem: PlanningProblem, nlp: NonlinearProgram, w: np.ndarray) -> Flown:
-    """Return the model with the parameters of the unknowns w, and the problem with their start."""
-    if not problem.is_free or not np.isfinite(w).all():
+def flown(model: Model, problem: PlanningProblem, program: PlanProgram, found: MeshSamples) -> Flown:
+    """Return the model with the parameters of a motion, and the problem with its start."""
+    if not problem.is_free or not found.is_motion:
         return model, problem
-    variables, indices, design = nlp.variables, nlp.indices, problem.design
-    parts: dict[str, np.ndarray] = {}
-    for blocks, places in (
-        (variables.at_start, indices.at_start),
-        (variables.states, indices.states[0]),
-    ):
-        values, first = w[places] * variables.scale(blocks), 0
-        for name, size in blocks:
-            parts[name] = values[first : first + size]
-            first += size
-    chosen = w[indices.common[: design.size]] * design.units
-    return _changed(model, problem, chosen, parts)
+    variables, design = program.variables, problem.design
+    constants = variables.split(variables.constants, found.constants)
+    if design.size:
+        # a solver may exceed bounds by rounding errors
+        inside = np.clip(constants["design"], design.least, design.most)
+        model = model._varied(design.split(inside))
+    if not problem.free_start:
+        return model, problem
+    blocks = variables.split(variables.states, found.states[0])
+    start = start_carrying(model, blocks, constants, (problem.q0, problem.v0))
+    parts = {name: part_of(start, name) for name in problem.free_start}
+    return model, _with_start(problem, parts)
 
 
 def guessed(
@@ -40,28 +39,24 @@ def guessed(
     """Return the model and the start of a first guess: the given ones, or others at random."""
     if not problem.is_free:
         return model, problem
-    design = problem.design
-    if random is None:
-        return _changed(model, problem, design.of(model.parameters), {})
-    chosen = random.uniform(design.least, design.most)
-    parts = {
-        name: random.uniform(least, most) for name, (least, most) in problem.free_start.items()
-    }
-    return _changed(model, problem, chosen, parts)
-
-
-def _changed(
-    model: Model, problem: PlanningProblem, chosen: np.ndarray, parts: dict[str, np.ndarray]
-) -> Flown:
-    """Return a model and a problem with numbers of the design, and with parts of the start."""
-    design, free = problem.design, problem.free_start
+    design, parts = problem.design, {}
+    numbers = design.of(model.parameters)
+    if random is not None:
+        numbers = random.uniform(design.least, design.most)
+        parts = {
+            name: random.uniform(least, most) for name, (least, most) in problem.free_start.items()
+        }
     if design.size:
-        # a solver may exceed bounds by rounding errors
-        inside = np.clip(chosen, design.least, design.most)
-        model = model._varied(design.split(inside))
-    parts = {name: np.clip(parts[name], *free[name]) for name in free if name in parts}
-    q0, v0 = with_parts((problem.q0, problem.v0), parts)
-    return model, replace(problem, q0=q0, v0=v0)
+        model = model._varied(design.split(numbers))
+    return model, _with_start(problem, parts)
+
+
+def _with_start(problem: PlanningProblem, parts: dict[str, np.ndarray]) -> PlanningProblem:
+    """Return the problem with free parts of its start, moved into their ranges."""
+    free = problem.free_start
+    inside = {name: np.clip(parts[name], *free[name]) for name in free if name in parts}
+    q0, v0 = with_parts((problem.q0, problem.v0), inside)
+    return replace(problem, q0=q0, v0=v0)
 
 
 def chosen(problem: PlanningProblem, model: Model) -> dict[str, Any]:
@@ -77,15 +72,3 @@ def start_found(problem: PlanningProblem) -> dict[str, list[float]]:
     """Return the free parts of a problem's start, ready for JSON."""
     start = problem.q0, problem.v0
     return {name: part_of(start, name).tolist() for name in problem.free_start}
-
-
-def start_blocks(problem: PlanningProblem) -> dict[str, np.ndarray]:
-    """Return the blocks of a problem's start, SI."""
-    return {
-        "position": problem.q0[POSITION],
-        "attitude": attitude(problem.attitude).coordinates(problem.q0[None])[0],
-        "tail": problem.q0[TAIL_Q],
-        "velocity": problem.v0[VELOCITY],
-        "torso_rate": problem.v0[OMEGA],
-        "tail_rate": problem.v0[TAIL_V],
-    }

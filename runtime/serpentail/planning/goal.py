@@ -19,9 +19,6 @@ class Goal:
         Tail coordinates (rad); single numbers may be None. Default: free.
     tail_rate : array_like, shape (2m,), optional
         Their rates (rad/s); single numbers may be None. Default: free.
-    turns : (int, int), optional
-        Whole turns of pitch and roll at an upright end, only with ``attitude="euler"`` of the
-        plan. Default: those nearest to the guess, as in Sect. 3.2.
 
     Examples
     --------
@@ -34,7 +31,6 @@ class Goal:
     torso_rate: Any = (0.0, 0.0, 0.0)
     tail: Any = None
     tail_rate: Any = None
-    turns: Any = None
 
 
 GOALS = {"upright": Goal()}  # by name

@@ -12,8 +12,8 @@ from serpentail_scene.layout import OMEGA, VELOCITY
 from ..basics.attitude import rotation_matrix
 from ..basics.errors import PlanningError
 from ..model.model import Model
-from .nlp.coordinates import IDENTITY_POSE
 from .problem import PlanningProblem
+from .program.coordinates import IDENTITY_POSE
 
 SMALL = 1e-3  # of the angular momentum: largest difference at the end that is not refused
 YAWS = np.linspace(0.0, 2 * np.pi, 73)

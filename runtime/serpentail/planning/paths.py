@@ -8,7 +8,7 @@ import numpy as np
 from ..basics.checks import number, numbers_in, refusal, shown
 from ..basics.errors import PlanningError
 from ..model.model import Model
-from .nlp.point import any_legs, body_heights
+from .program.point import any_legs, body_heights
 
 PathConstraint = tuple[Callable[[Any], Any], float, float]  # function of a point, least, most
 

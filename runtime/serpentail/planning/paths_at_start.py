@@ -4,16 +4,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from serpentail_scene.layout import OMEGA, QUATERNION, TAIL_Q, TAIL_V
+
 from ..basics.errors import PlanningError
 from ..model.model import Model
 from .design import Design
-from .free_variables import start_blocks
-from .nlp.body import BodyFunctions
-from .nlp.coordinates import attitude, rotated
-from .nlp.point import PathPoint, asked, point_of
-from .nlp.start import conserved_of
 from .problem import START_SLACK, PlanningProblem
+from .program.body import BodyFunctions
+from .program.point import PathPoint, asked, point_of
 from .result.excess import SLACK
+from .result.full_state import com_at_start
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -50,17 +50,22 @@ def _start(model: Model, problem: PlanningProblem) -> "tuple[PathPoint, ca.SX]":
     """Return the point of a known start, and the symbols of what is not known there."""
     import casadi as ca
 
-    # the state
-    blocks = {name: ca.SX(ca.DM(part)) for name, part in start_blocks(problem).items()}
-    blocks["quaternion"] = attitude(problem.attitude).quaternion(blocks["attitude"])
+    # the state, and what its flight conserves
+    state = {
+        "attitude": problem.q0[QUATERNION],
+        "tail": problem.q0[TAIL_Q],
+        "tail_rate": problem.v0[TAIL_V],
+        "torso_rate": problem.v0[OMEGA],
+    }
+    blocks = {name: ca.SX(ca.DM(part)) for name, part in state.items()}
+    blocks["quaternion"] = blocks["attitude"]
+    com, com_velocity = com_at_start(model, (problem.q0, problem.v0))
     body = BodyFunctions(model, Design(), None)
-    _, com, com_velocity = conserved_of(body, blocks)
-    blocks["drift"] = rotated(blocks["quaternion"], blocks["velocity"] - com_velocity, -1)
 
     # torques, and times
     torque, duration = ca.SX.sym("torque", model.layout.nt), ca.SX.sym("duration")
     least, most = problem.duration
     blocks |= {"torque": torque, "time": ca.SX(0)}
     blocks["duration"] = duration if least < most else ca.SX(most)
-    point = point_of(body, blocks, ca.vertcat(com, com_velocity), problem.legs)
+    point = point_of(body, blocks, ca.SX(ca.DM(np.append(com, com_velocity))), problem.legs)
     return point, ca.vertcat(torque, duration)

@@ -31,12 +31,9 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     path: Sequence[PathConstraint] = (),
     clearance: float | None = None,
     legs: Legs | None = None,
-    formulation: str = "airborne",
-    attitude: str = "quaternion",
     design: Mapping[str, Any] | None = None,
     free_start: Mapping[str, Any] | None = None,
     # the mesh
-    rule: str = "radau",
     degree: int | None = None,
     intervals: int | None = None,
     most_intervals: int | None = None,
@@ -46,9 +43,8 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     tail_tolerance: float | None = 0.1,
     rate_tolerance: float | None = 0.1,
     # the solver
-    solver: str = "ipopt",
+    solver: str = "auto",
     options: dict[str, Any] | None = None,
-    dynamics: str = "auto",
     time_limit: float | None = None,
     # where it begins
     guess: Plan | Trajectory | None = None,
@@ -97,18 +93,13 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     legs : Legs, optional
         Legs of a model with feet, for path constraints on its ``contact_points``; they stay as
         they are at 0 s.
-    formulation : {"airborne", "translation-free", "full"}, default "airborne"
-        Unknowns of the program: "airborne" conserves angular momentum by construction; "full" is
-        the paper's.
-    attitude : {"quaternion", "euler"}, default "quaternion"
-        Coordinates of the attitude.
     design : mapping, optional
         Parameters of the model that the planner chooses: name to (least, most), each one number
         or all numbers of the parameter (SI, or text with a unit).
     free_start : mapping, optional
         Parts of the start that the planner chooses: "tail", "tail_rate", "torso_rate",
-        "position", "velocity", or "attitude" (pitch, roll, yaw, only with
-        ``attitude="euler"``), to (least, most), each one number or all of the part (SI).
+        "position", "velocity", or "attitude" (pitch, roll, yaw), to (least, most), each one
+        number or all of the part (SI).
         ``start`` is then the first guess of these parts.
 
     Returns
@@ -118,20 +109,17 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
 
     Other Parameters
     ----------------
-    rule : {"radau", "lobatto", "hermite-simpson", "trapezoidal"}, default "radau"
-        Collocation rule; "trapezoidal" is the paper's.
     degree : int, optional
-        Degree of "radau" and "lobatto", from 1 to 5. Default: 3.
+        Degree of Radau's collocation rule, from 1 to 5. Default: 3.
     intervals : int, optional
-        Number of intervals of the first mesh. Default: 12. With the solver "fatrop" each control
-        interval has 1 if the tail has up to two segments, 4 up to four segments, else 12; a
-        search that finds no true plan begins again with 12.
-    most_intervals : int, optional
-        Largest number of intervals. Default: 200, or 400 with the solver "fatrop".
-    controls : int, optional
+        Number of intervals of the first mesh. Default: in each control interval 1 if the tail has
+        up to two segments, 4 up to four segments, else 12; a search that finds no true plan begins
+        again with 12.
+    most_intervals : int, default 400
+        Largest number of intervals.
+    controls : int, default 12
         Number of equal control intervals; in each, the torques are one polynomial, however fine
-        the mesh is. Default: the intervals of the mesh, or 12 with the solver "fatrop". With the
-        objective "time" torques are linear in each interval.
+        the mesh is. With the objective "time" torques are linear in each.
     rounds : int, default 6
         Largest number of refinements.
     tolerance : float or None, default 0.01
@@ -140,13 +128,11 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
         Largest error of the true tail coordinates at the end (deg); None for no demand.
     rate_tolerance : float or None, default 0.1
         Largest error of the true rates of torso and tail at the end (rad/s); None for no demand.
-    solver : str, default "ipopt"
-        "ipopt", another solver of ``casadi.nlpsol``, or "fatrop", which solves airborne problems
-        in stages: with known starts and parameters, and neither paths nor own objectives.
+    solver : {"auto", "fatrop", "ipopt"}, default "auto"
+        What solves the program. "auto" is FATROP, and IPOPT from the same guesses if FATROP finds
+        nothing; ``report["solver"]`` says which.
     options : dict, optional
-        Options of ``casadi.nlpsol``, such as ``{"ipopt.max_iter": 500}``.
-    dynamics : {"auto", "compiled", "symbolic"}, default "auto"
-        Source of the dynamics and its derivatives: compiled C or CasADi operations.
+        Options of the solvers, such as ``{"fatrop.max_iter": 500, "ipopt.max_iter": 500}``.
     time_limit : float, optional
         Time for the search (s). If it leaves no time to track the plan, the report has no errors
         of tracking.
@@ -180,9 +166,8 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     A point, which objectives and path constraints receive, has the CasADi blocks ``tail``,
     ``tail_rate``, ``torso_rate``, ``torque``, ``attitude``, ``quaternion``, ``time``,
     ``duration``, ``position``, ``height``, ``tip``, ``tail_points``, ``center_of_mass``,
-    ``contact_points`` and ``body_points`` in SI units, the model's ``parameters`` by name, and
-    the blocks of its formulation. ``torso_rate`` is in body axes; quaternions are (w, x, y, z),
-    from torso to world.
+    ``contact_points`` and ``body_points`` in SI units, ``drift`` and the model's ``parameters``
+    by name. ``torso_rate`` is in body axes; quaternions are (w, x, y, z), from torso to world.
 
     Between nodes, bounds hold to one part in 1000.
 
@@ -206,7 +191,6 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     if watch is not None and not callable(watch):
         refused.add("watch", needed("watch", watch, "a function of a Plan, or None"))
     settings = PlanSettings(
-        rule=rule,
         degree=degree,
         intervals=intervals,
         most_intervals=most_intervals,
@@ -217,7 +201,6 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
         rate_tolerance=rate_tolerance,
         solver=solver,
         options={} if options is None else options,
-        dynamics=dynamics,
         time_limit=time_limit,
         guess=guess,
         guess_damping=guess_damping,
@@ -234,8 +217,6 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
         "path": path,
         "clearance": clearance,
         "legs": legs,
-        "formulation": formulation,
-        "attitude": attitude,
         "design": design,
         "free_start": free_start,
     }

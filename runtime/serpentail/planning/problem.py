@@ -1,6 +1,6 @@
 """A planning problem, checked field by field before anything is derived."""
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -19,8 +19,6 @@ from .design import Design, checked_design
 from .free_start import Range, checked_free_start, moved_inside, within_bounds
 from .goal import GOALS, Bounds, Goal
 from .magnitudes import HUGE, checked_bounds, checked_duration
-from .nlp.coordinates import KINDS
-from .nlp.node import FORMULATIONS
 from .paths import PathConstraint, checked_clearance, checked_path, clear_of_ground
 
 OBJECTIVES = ("effort", "energy", "time")
@@ -44,8 +42,6 @@ class PlanningProblem:
     path: tuple[PathConstraint, ...]  # including that of the clearance
     clearance: float | None
     legs: Legs | None
-    formulation: str
-    attitude: str
     design: Design = field(default_factory=Design)
     free_start: Mapping[str, Range] = field(default_factory=dict)  # q0, v0 are then the guess's
     __repr__ = brief
@@ -67,7 +63,7 @@ def checked_problem(
     attempt, tail, settings = refused.attempt, model.layout.nt, dict(settings)
     free = settings.pop("free_start", None)
     design = attempt("design", checked_design, model, settings.pop("design", None))
-    free = attempt("free_start", checked_free_start, model, free, settings["attitude"])
+    free = attempt("free_start", checked_free_start, model, free)
     start = attempt("start", _start, model, task[0])
     if start is not None and free is not None:
         start = moved_inside(start, free)
@@ -143,13 +139,11 @@ def checked_goal(goal: Any, tail: int) -> Goal:
         quaternion = _vector("goal.attitude", attitude, 4)
         attitude = _unit_quaternion("goal.attitude", quaternion)
     rate = None if goal.torso_rate is None else _vector("goal.torso_rate", goal.torso_rate, 3)
-    turns = None if goal.turns is None else np.round(_vector("goal.turns", goal.turns, 2))
     return Goal(
         attitude,
         rate,
         _partly_free("goal.tail", goal.tail, tail),
         _partly_free("goal.tail_rate", goal.tail_rate, tail),
-        turns,
     )
 
 
@@ -217,11 +211,6 @@ def _work(name: str) -> Callable[[Any], float]:
     return partial(number, name, error=PlanningError, least=0, most=HUGE)
 
 
-def _name(field: str, names: Collection[str]) -> Callable[[Any], str]:
-    """Return the check of one of the names."""
-    return partial(one_of, field, names=names, error=PlanningError)
-
-
 SETTINGS: dict[str, Callable[[Any], Any]] = {  # of the problem, and their checks
     "objective": _objective,
     "smoothing": _work("smoothing"),
@@ -229,6 +218,4 @@ SETTINGS: dict[str, Callable[[Any], Any]] = {  # of the problem, and their check
     "path": checked_path,
     "clearance": checked_clearance,
     "legs": _legs,
-    "formulation": _name("formulation", FORMULATIONS),
-    "attitude": _name("attitude", KINDS),
 }

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..model.model import Model
+from ..optimal.solution import Solution
 from .flight import State
-from .nlp.program import NonlinearProgram
-from .nlp.solver import Solution
 from .problem import PlanningProblem
+from .program.build import PlanProgram
 from .result.curve import Curve
 from .result.excess import Excess
 
@@ -24,7 +24,7 @@ class Round:
 
     model: Model
     problem: PlanningProblem
-    nlp: NonlinearProgram
+    program: PlanProgram
     solution: Solution
     curve: Curve
     planned: tuple[np.ndarray, np.ndarray]
@@ -39,4 +39,4 @@ class Round:
         return self.problem.q0, self.problem.v0
 
     def __str__(self) -> str:
-        return f"{self.nlp.mesh.intervals} intervals, {self.errors['attitude']:.2g} deg off"
+        return f"{self.program.mesh.intervals} intervals, {self.errors['attitude']:.2g} deg off"

@@ -1,5 +1,6 @@
 """How to search for a plan: settings of rule, mesh, solver and guesses, and their checks."""
 
+import re
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -10,8 +11,8 @@ from ..basics.checks import Refusals, needed, number, one_of, shown, whole_numbe
 from ..basics.errors import PlanningError
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
+from ..optimal.rules import collocation_rule
 from .magnitudes import HUGE
-from .nlp.rules import collocation_rule
 
 WHOLE_NUMBERS = {  # least and most of each; beyond the most a search would not end
     "rounds": (0, 1000),
@@ -21,14 +22,13 @@ WHOLE_NUMBERS = {  # least and most of each; beyond the most a search would not 
 }
 # None: the planner chooses
 CHOSEN = dict.fromkeys(("intervals", "most_intervals", "controls"), (1, 10_000))
-DYNAMICS = ("auto", "compiled", "symbolic")
+SOLVERS = ("auto", "fatrop", "ipopt")
 
 
 @dataclass(frozen=True)
 class PlanSettings:
     """How to search for a plan: collocation rule, mesh, tolerances, solver, guesses."""
 
-    rule: str
     degree: int | None
     intervals: int | None
     most_intervals: int | None
@@ -39,7 +39,6 @@ class PlanSettings:
     rate_tolerance: float | None  # rad/s; None: no demand
     solver: str
     options: dict[str, Any]
-    dynamics: str
     time_limit: float | None  # s
     guess: Any  # a Plan or a Trajectory
     guess_damping: float  # N m s
@@ -47,6 +46,15 @@ class PlanSettings:
     retries: int
     seed: int
     track: bool
+
+    @property
+    def first_solver(self) -> str:
+        """The solver that is tried first."""
+        return "ipopt" if self.solver == "ipopt" else "fatrop"
+
+    def options_of(self, solver: str) -> dict[str, Any]:
+        """Options whose names begin with a solver's."""
+        return {k: v for k, v in self.options.items() if str(k).startswith(f"{solver}.")}
 
     @property
     def allowed(self) -> dict[str, float]:
@@ -69,16 +77,14 @@ def check_settings(model: Model, settings: PlanSettings, refused: Refusals) -> N
     for name in ("tolerance", "tail_tolerance", "rate_tolerance", "time_limit"):
         if getattr(settings, name) is not None:
             refused.attempt(name, _check_positive, name, getattr(settings, name))
-    if not isinstance(settings.options, dict):
-        needs = "a dict, such as {'ipopt.max_iter': 500}"
-        refused.add("options", needed("options", settings.options, needs))
+    refused.attempt("options", _check_options, settings.options)
     refused.attempt("guess", _check_guess, model, settings.guess)
     damping = partial(number, error=PlanningError, least=0, most=HUGE)
     refused.attempt("guess_damping", damping, "guess_damping", settings.guess_damping)
     if not isinstance(settings.track, bool | np.bool_):
         refused.add("track", needed("track", settings.track, "True or False"))
-    refused.attempt("dynamics", one_of, "dynamics", settings.dynamics, DYNAMICS, PlanningError)
-    refused.attempt("rule", collocation_rule, settings.rule, settings.degree)
+    refused.attempt("solver", one_of, "solver", settings.solver, SOLVERS, PlanningError)
+    refused.attempt("degree", collocation_rule, settings.degree)
 
 
 def _check_whole(name: str, value: Any, least: int, most: int) -> None:
@@ -89,6 +95,18 @@ def _check_whole(name: str, value: Any, least: int, most: int) -> None:
 def _check_positive(name: str, value: Any) -> None:
     """PlanningError unless a value is a number above 0."""
     number(name, value, PlanningError, above=0)
+
+
+def _check_options(options: Any) -> None:
+    """PlanningError unless options are a dict of settings of FATROP and IPOPT."""
+    needs = "a dict, such as {'fatrop.max_iter': 500, 'ipopt.max_iter': 500}"
+    if not isinstance(options, dict):
+        raise PlanningError(needed("options", options, needs))
+    for name in options:
+        if not re.fullmatch(r"(ipopt|fatrop)\.\w+", str(name)):
+            raise PlanningError(
+                f"options: {shown(name)}: needs a name that begins with 'fatrop.' or 'ipopt.'"
+            )
 
 
 def _check_guess(model: Model, guess: Any) -> None:

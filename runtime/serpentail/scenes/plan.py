@@ -11,14 +11,12 @@ from ..basics import extras
 from ..basics.checks import Refusals, needed, refusal, shown
 from ..basics.errors import PlanningError
 from ..model.model import Model
+from ..optimal.rules import MOST_DEGREE
 from ..planning.goal import GOALS, Bounds, Goal
-from ..planning.nlp.coordinates import KINDS
-from ..planning.nlp.node import FORMULATIONS
-from ..planning.nlp.rules import FAMILIES, MOST_DEGREE
 from ..planning.planner import plan
 from ..planning.problem import OBJECTIVES
 from ..planning.result.plan import Plan
-from ..planning.settings import CHOSEN, DYNAMICS, WHOLE_NUMBERS
+from ..planning.settings import CHOSEN, SOLVERS, WHOLE_NUMBERS
 from .file import UNSIZED, model_of, read_scene, size_of, subtable, values_of
 from .keys import sized
 
@@ -48,7 +46,6 @@ GOAL = {
     "torso_rate": _or_free("rad/s"),
     "tail": _or_free("rad"),
     "tail_rate": _or_free("rad/s"),
-    "turns": _or_free("1"),
 }
 BOUNDS = {
     "angle": _bound("rad"),
@@ -80,21 +77,17 @@ PLAN = Key(
         "smoothing": WORK,
         "damping": WORK,
         "clearance": Key("m"),
-        "formulation": one_word(*FORMULATIONS),
-        "attitude": one_word(*KINDS),
         "design": Key(form=RANGES),
         "free_start": Key(keys=FREE_START),
         # of the search
         **{name: _whole(*bounds) for name, bounds in (WHOLE_NUMBERS | CHOSEN).items()},
-        "rule": one_word(*FAMILIES),
         "degree": _whole(1, MOST_DEGREE),
         "tolerance": Key("deg", words=(FREE,)),
         "tail_tolerance": Key("deg", words=(FREE,)),
         "rate_tolerance": Key("rad/s", words=(FREE,)),
-        "solver": Key(form={"type": "string", "pattern": "^[a-z]+$"}),
+        "solver": one_word(*SOLVERS),
         "options": Key(form={"type": "object"}),
         "guess_damping": WORK,
-        "dynamics": one_word(*DYNAMICS),
         "time_limit": Key("s", usual=False),
         "track": Key(form={"type": "boolean"}),
     },

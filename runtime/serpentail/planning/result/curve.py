@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...basics.short_repr import brief
-from ..nlp.program import NonlinearProgram
-from ..nlp.rules import CollocationRule
+from ...optimal.rules import CollocationRule
+from ...optimal.samples import MeshSamples
+from ..program.build import PlanProgram
 
 
 @dataclass(frozen=True, eq=False)
@@ -14,8 +15,7 @@ class Curve:
     """Collocation polynomials of all intervals, by block, SI.
 
     ends (N + 1,): s. starts (N, size): states at the beginning of intervals; increments (N, K,
-    size): their rates at the nodes times the interval's duration; nodes (N, K, size): torques and
-    algebraic unknowns.
+    size): their rates at the nodes times the interval's duration; nodes (N, K, size): torques.
     """
 
     ends: np.ndarray
@@ -61,30 +61,20 @@ class Curve:
         }
 
 
-def curve(nlp: NonlinearProgram, w: np.ndarray, p: np.ndarray) -> Curve:
-    """Return the curve of the unknowns w; p: the program's parameters."""
-    indices, rule, variables, mesh = nlp.indices, nlp.rule, nlp.variables, nlp.mesh
-    scale = variables.scale(variables.states)
-    at_nodes = np.arange(mesh.intervals)[:, None] * rule.steps + np.arange(len(rule.nodes))
-
-    # states at the beginning of intervals, and the increments by their rates at the nodes
-    states = w[indices.states[: -1 : rule.steps]] * scale
-    rates = nlp.rates(w, p) * scale
-    increments = rates[at_nodes] * mesh.widths[:, None, None]
-
-    # torques and algebraic unknowns at the nodes
-    blocks = (*variables.algebraic, ("torque", variables.units["torque"].size))
-    others = (w[indices.others] * variables.scale(blocks))[at_nodes]
+def curve(program: PlanProgram, samples: MeshSamples) -> Curve:
+    """Return the curve of a motion on a program's mesh: rates are those of its polynomials."""
+    variables, rule, mesh = program.variables, program.rule, program.mesh
+    K = len(rule.nodes)
+    points = np.arange(mesh.intervals)[:, None] * K + np.arange(K + 1)
+    states = samples.states[points]
+    blocks = variables.split(variables.states, states)
+    torque = blocks.pop("torque")[:, 1:] if variables.torque_is_state else None
+    if torque is None:
+        torque = samples.controls * variables.units["torque"]
     return Curve(
-        mesh.ends * w[0],
+        mesh.ends * samples.duration,
         rule,
-        _split(states, variables.states),
-        _split(increments, variables.states),
-        _split(others, blocks),
+        {name: values[:, 0] for name, values in blocks.items()},
+        {name: np.einsum("ij,kjx->kix", rule.states, x) for name, x in blocks.items()},
+        {"torque": torque},
     )
-
-
-def _split(rows: np.ndarray, blocks: tuple[tuple[str, int], ...]) -> dict[str, np.ndarray]:
-    """Columns of the last axis by block."""
-    ends = np.cumsum([size for _, size in blocks])[:-1]
-    return dict(zip((name for name, _ in blocks), np.split(rows, ends, axis=-1), strict=True))

@@ -2,10 +2,13 @@
 
 import numpy as np
 
-from ..nlp.node import Node
-from ..nlp.program import NonlinearProgram
-from ..nlp.transcription import Transcription
+from serpentail_scene.layout import OMEGA
+
+from ...optimal.samples import MeshSamples
+from ..flight import State
+from ..program.build import PlanProgram
 from .curve import Curve
+from .full_state import full_state
 from .truth import planned_torques
 
 SAMPLES = 33  # of an interval, its ends among them
@@ -14,13 +17,13 @@ SLACK = 1e-3  # of a bound: a successful plan may exceed it by this part
 Excess = dict[str, np.ndarray]
 
 
-def excess(nlp: NonlinearProgram, curve: Curve, p: np.ndarray, w: np.ndarray) -> Excess:
+def excess(program: PlanProgram, curve: Curve, samples: MeshSamples, start: State) -> Excess:
     """Return by what part (N,) of a bound each interval exceeds it, by name; 0 or less inside it.
 
     Names: "torque", "torque_rate", "angle", "rate", "path", if they are bounded. For a path
-    constraint it is a part of the larger limit. p: the program's parameters; w: its unknowns.
+    constraint it is a part of the larger limit. start: of the motion.
     """
-    bounds, N = nlp.problem.bounds, nlp.mesh.intervals
+    bounds, N = program.problem.bounds, program.mesh.intervals
     k, s = np.repeat(np.arange(N), SAMPLES), np.tile(np.linspace(0, 1, SAMPLES), N)
     blocks = curve.inside(k, s)
     found = {
@@ -33,10 +36,10 @@ def excess(nlp: NonlinearProgram, curve: Curve, p: np.ndarray, w: np.ndarray) ->
         if bound is not None
     }
     if bounds.torque_rate is not None:
-        found["torque_rate"] = _beyond(_slopes(nlp, curve, k, s) / bounds.torque_rate, N)
-    if isinstance(nlp, Transcription) and nlp.problem.path:
+        found["torque_rate"] = _beyond(_slopes(curve, k, s) / bounds.torque_rate, N)
+    if program.problem.path:
         times = curve.ends[k] + s * np.diff(curve.ends)[k]
-        found["path"] = _path(nlp, w, times, blocks, p)
+        found["path"] = _path(program, samples, times, blocks, start)
     return found
 
 
@@ -57,12 +60,12 @@ def _beyond(ratios: np.ndarray, intervals: int) -> np.ndarray:
     return np.abs(ratios).reshape(intervals, -1).max(axis=1) - 1
 
 
-def _slopes(nlp: NonlinearProgram, curve: Curve, k: np.ndarray, s: np.ndarray) -> np.ndarray:
+def _slopes(curve: Curve, k: np.ndarray, s: np.ndarray) -> np.ndarray:
     """Slopes of torques (N SAMPLES, 2m), N m/s; of torques that are constant in intervals, their
     steps over the distance of nodes.
     """
     torques, width = planned_torques(curve), np.diff(curve.ends)
-    if len(nlp.rule.nodes) == 1:
+    if len(curve.rule.nodes) == 1:
         steps = np.diff(torques.coefficients[..., 0], axis=0) / width[1:, None]
         return np.vstack([0 * steps[:1], steps])[k]
     c, x = torques.coefficients[k], (s * width[k])[:, None]
@@ -70,30 +73,38 @@ def _slopes(nlp: NonlinearProgram, curve: Curve, k: np.ndarray, s: np.ndarray) -
 
 
 def _path(
-    nlp: Transcription,
-    w: np.ndarray,
+    program: PlanProgram,
+    samples: MeshSamples,
     times: np.ndarray,
     blocks: dict[str, np.ndarray],
-    p: np.ndarray,
+    start: State,
 ) -> np.ndarray:
     """Excess (N,) of the path constraints, over the larger of their limits."""
-    variables, node, count = nlp.variables, nlp.node, len(times)
-    names = [name for name, _ in (*variables.states, *variables.algebraic, ("torque", 0))]
-    parts = [blocks[name] / variables.units[name] for name in names]
-    shared = np.append(w[0], w[nlp.indices.common])
-    zeta = np.column_stack([np.tile(shared, (count, 1)), *parts])
-    own = np.column_stack([np.tile(p, (count, 1)), times / w[0]])
-    values = _path_values(node, zeta, own)
-    least, most = node.each_path(np.array([row[1:] for row in nlp.problem.path]).T)
+    values = path_values(program, samples, times, blocks, start)
+    least, most = program.each_path()
     sizes = np.where(np.isfinite([least, most]), np.abs([least, most]), 0).max(axis=0)
     over = np.maximum(values - most, least - values) / np.where(sizes > 0, sizes, 1.0)
-    return over.reshape(nlp.mesh.intervals, -1).max(axis=1)
+    return over.reshape(program.mesh.intervals, -1).max(axis=1)
 
 
-def _path_values(node: Node, zeta: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """Values (n, path) of the path constraints, which no call of the dynamics has a part in."""
-    count, function = len(zeta), node.function
-    results = [np.zeros((function.size1_in(k), count)) for k in range(2, function.n_in())]
-    y = function.map(count)(zeta.T, p.T, *results)
-    first = node.rates + node.residuals
-    return np.array(y)[first : first + node.path].T
+def path_values(
+    program: PlanProgram,
+    samples: MeshSamples,
+    times: np.ndarray,
+    blocks: dict[str, np.ndarray],
+    start: State,
+) -> np.ndarray:
+    """Return the values (K, path) of the path constraints at times (K,) with blocks (K, ..)."""
+    variables, node, count = program.variables, program.optimal.node, len(times)
+    parts = [blocks[name] for name, _ in variables.states]
+    if program.compiled:
+        parts.append(full_state(program.model, start, times, blocks)[1][:, OMEGA])
+    own = blocks["torque"]
+    parts.append(0 * own if variables.torque_is_state else own)
+    constants = samples.constants * variables.scale(variables.constants)
+    fractions = (times / samples.duration)[:, None]
+    more = [np.tile(row, (count, 1)) for row in (constants, node.numbers)]
+    e = np.column_stack([*parts, more[0], fractions, more[1]])
+    y = np.array(program.terms.terms.values.map(count)(e.T))
+    first = len(y) - 1 - node.rows
+    return y[first:-1].T

@@ -10,32 +10,23 @@ from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V,
 
 from ...basics.attitude import rotation_matrix
 from ...model.model import Model
-from ..nlp.coordinates import COM_ENTRIES, IDENTITY_POSE, Attitude
+from ..program.coordinates import COM_ENTRIES, IDENTITY_POSE
 
 State = tuple[np.ndarray, np.ndarray]  # q, v
 ROUNDING = 1e-12  # relative, of a bend
 
 
 def full_state(
-    model: Model,
-    start: State,
-    coordinates: Attitude,
-    times: np.ndarray,
-    blocks: dict[str, np.ndarray],
+    model: Model, start: State, times: np.ndarray, blocks: dict[str, np.ndarray]
 ) -> State:
     """Return q (K, nq), v (K, nv) at times (K,) s from the start (q0, v0)."""
-    quaternion = coordinates.as_quaternion(blocks["attitude"])
+    quaternion = blocks["attitude"] / np.linalg.norm(blocks["attitude"], axis=1, keepdims=True)
     tail, tail_rate = _within_range(model, blocks["tail"]), blocks["tail_rate"]
-    omega = blocks["torso_rate"]
     R, H = rotation_matrix(quaternion), model.mass_matrix(_at_identity(tail))
-    if "drift" in blocks:
-        h = np.einsum("kji,j->ki", R, model.momentum(*start)[1])
-        omega = _carrying(H, h, tail_rate)
-    if "position" in blocks:
-        position, velocity = blocks["position"], blocks["velocity"]
-    else:
-        rates = np.column_stack([omega, tail_rate])
-        position, velocity = _falling(model, start, times, (R, H), rates)
+    h = np.einsum("kji,j->ki", R, model.momentum(*start)[1])
+    omega = _carrying(H, h, tail_rate)
+    rates = np.column_stack([omega, tail_rate])
+    position, velocity = _falling(model, start, times, (R, H), rates)
     q = np.column_stack([position, quaternion, tail])
     return q, np.column_stack([velocity, omega, tail_rate])
 
@@ -92,6 +83,25 @@ def _falling(
     com, v_com = com_at_start(model, start)
     position = com + v_com * t + fall * t**2 / 2 - offset
     return position, v_com + fall * t + drift / mass
+
+
+def start_carrying(
+    model: Model, blocks: dict[str, np.ndarray], conserved: dict[str, np.ndarray], start: State
+) -> State:
+    """Return the state q, v with blocks of the start (size,) that has what is conserved.
+
+    start: gives position and velocity where the COM's are not among the conserved quantities.
+    """
+    quaternion = blocks["attitude"] / np.linalg.norm(blocks["attitude"])
+    R, H = rotation_matrix(quaternion), model.mass_matrix(_at_identity(blocks["tail"][None]))
+    omega = _carrying(H, (R.T @ conserved["momentum"])[None], blocks["tail_rate"][None])
+    position, velocity = start[0][POSITION], start[1][VELOCITY]
+    if "com" in conserved:
+        rates = np.append(omega[0], blocks["tail_rate"])
+        position = conserved["com"] - R @ _com(H)[0]
+        velocity = conserved["com_velocity"] - R @ H[0, VELOCITY, OMEGA.start :] @ rates / H[0, 0, 0]
+    q = np.concatenate([position, quaternion, blocks["tail"]])
+    return q, np.concatenate([velocity, omega[0], blocks["tail_rate"]])
 
 
 def com_at_start(model: Model, start: State) -> State:

@@ -17,12 +17,11 @@ from ...model.model import Model
 from ...motion.archive import origin
 from ...motion.text import SI, framed
 from ...motion.trajectory import Trajectory
+from ...optimal.mesh import Mesh
+from ...optimal.rules import CollocationRule
+from ...optimal.solution import Solution
 from ...simulation.controllers.controller import Controller, Damping, TorqueCurve
 from ..flight import flight
-from ..nlp.coordinates import attitude
-from ..nlp.mesh import Mesh
-from ..nlp.rules import CollocationRule
-from ..nlp.solver import Solution
 from ..problem import PlanningProblem
 from .curve import Curve
 from .full_state import full_state
@@ -91,7 +90,7 @@ class Plan:
         return framed(
             [
                 f"Plan of {self.trajectory.info['model']}, {moved}: {ended}",
-                f"{self.duration:.6g} s, {self.mesh.intervals} intervals by {self.rule.name} of "
+                f"{self.duration:.6g} s, {self.mesh.intervals} intervals by Radau's rule of "
                 f"degree {self.rule.degree}, {len(self.trajectory.t)} samples; {SI}",
                 f"effort {effort} N^2 m^2 s, energy {energy} J, peak power {power} W",
                 f"true attitude at the end: {to_plan} deg from the plan, {to_goal} from the goal",
@@ -250,7 +249,7 @@ def sampled(model: Model, problem: PlanningProblem, curve: Curve) -> Trajectory:
     """Return the planned motion as a trajectory."""
     times = sample_times(curve.ends)
     blocks = curve.at(times)
-    q, v = full_state(model, (problem.q0, problem.v0), attitude(problem.attitude), times, blocks)
+    q, v = full_state(model, (problem.q0, problem.v0), times, blocks)
     info = {"kind": "plan"} | origin(model)
     kinetic, potential = model.energy(q, v)
     linear, angular = model.momentum(q, v)

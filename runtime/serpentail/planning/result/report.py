@@ -14,13 +14,14 @@ from ...simulation.controllers.pfl import Pfl
 from ..flight import flight
 from ..free_variables import chosen, start_found
 from ..problem import PlanningProblem
+from ..program.objective import objective_unit
 from .curve import Curve
 from .excess import largest
 from .truth import attitude_errors, work
 
 if TYPE_CHECKING:
-    from ..mesh_refinement import Search
     from ..round import Round
+    from ..search import Search
 
 TRACKED_SAMPLES = 580  # of a tracked motion
 TRACKING_COST = 0.1  # about how long tracking takes (s), of the flight's duration
@@ -31,19 +32,17 @@ def report(search: "Search", best: "Round", planned: Trajectory) -> dict[str, An
 
     planned: the round's trajectory.
     """
-    problem, solution, nlp = best.problem, best.solution, best.nlp
+    problem, solution, program = best.problem, best.solution, best.program
     energy, power = work(best.model, best.curve, problem.damping, best.start)
     excess, of = largest(best.excess)
     values = {
         "converged": solution.success,
         "status": solution.status,
-        "formulation": problem.formulation,
-        "attitude": problem.attitude,
-        "rule": search.rule.name,
+        "solver": solution.solver,
         "degree": search.rule.degree,
-        "intervals": nlp.mesh.intervals,
-        "nodes": len(nlp.indices.others),
-        "dynamics": search.equations.source,
+        "intervals": program.mesh.intervals,
+        "nodes": program.mesh.intervals * search.rule.degree,
+        "dynamics": "compiled" if program.compiled else "symbolic",
         "duration_s": best.curve.duration,
         "objective": objective(best),
         "effort": effort(best.curve),
@@ -100,21 +99,20 @@ def objective(best: "Round") -> float:
     """The objective's value in SI units."""
     if best.problem.objective == "time":
         return best.curve.duration
-    return best.solution.value * objective_unit(best)
+    return best.solution.value * objective_unit_of(best)
 
 
 def slopes(best: "Round") -> dict[str, Any]:
     """Derivatives of the least objective by the design, SI, from multipliers; 0 inside a range."""
     design = best.problem.design
-    lam = best.solution.multipliers[0][best.nlp.indices.common[: design.size]]
-    found = design.split(-lam / design.units * objective_unit(best))
+    own = best.solution.slopes[: design.size]
+    found = design.split(own / design.units * objective_unit_of(best))
     return {name: np.asarray(slope).tolist() for name, slope in found.items()}
 
 
-def objective_unit(best: "Round") -> float:
+def objective_unit_of(best: "Round") -> float:
     """SI units of the program's objective."""
-    unit = float(best.nlp.variables.units["torque"].mean())
-    return {"effort": unit**2, "energy": 10 * unit}.get(str(best.problem.objective), 1.0)
+    return objective_unit(best.problem, best.program.variables.units["torque"])
 
 
 def effort(curve: Curve) -> float:

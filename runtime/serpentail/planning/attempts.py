@@ -1,0 +1,142 @@
+"""Attempts to solve a problem: by FATROP or IPOPT, from motions that are far or close."""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+
+from ..model.model import Model
+from ..optimal import fatrop, ipopt
+from ..optimal.interrupt import stop_reason
+from ..optimal.mesh import Mesh, uniform
+from ..optimal.rules import CollocationRule
+from ..optimal.solution import Solution
+from .free_variables import guessed
+from .problem import PlanningProblem
+from .program.build import PlanProgram, plan_program
+from .program.guess import GuessMotion, of_trajectory, passive, pushes, samples_of
+from .program.variables import torque_unit
+from .result.plan import Plan
+from .settings import PlanSettings
+
+FIRST_PUSH = 0.05  # of the torques' unit: takes the first guess out of a plane of symmetry
+DURATIONS = (1.0, 0.5, 0.75, 0.25)  # of guesses, in turn, from the least (0) to the most (1)
+CONTROL_INTERVALS, MOST = 12, 400  # control intervals, and the most intervals of a mesh
+# (most segments, intervals in each control interval at first): with fewer, optima of long tails
+# exploit the errors of the mesh
+PIECES = ((2, 1), (4, 4), (np.inf, 12))
+FINE = 12  # intervals in each, where a search begins again
+
+
+class Attempts:
+    """Attempts of one search, and what they and those of an earlier one have cost."""
+
+    def __init__(
+        self,
+        model: Model,
+        settings: PlanSettings,
+        rule: CollocationRule,
+        before: "Attempts | None" = None,
+    ):
+        self.model, self.settings, self.rule = model, settings, rule
+        self.spent = dict.fromkeys(("derive_s", "solve_cpu_s", "truth_s"), 0.0)
+        self.iterations = self.count = 0
+        if before is not None:
+            self.spent = dict(before.spent)
+            self.iterations, self.count = before.iterations, before.count
+        self.stopped: str | None = None
+
+    @contextmanager
+    def timed(self, name: str) -> Iterator[None]:
+        """Add the time of a part of the work to what was spent on it."""
+        begun = time.perf_counter()
+        yield
+        self.spent[name] += time.perf_counter() - begun
+
+    def is_stopped(self) -> bool:
+        """Tell, and note why, whether the search should end that is not done."""
+        self.stopped = stop_reason()
+        return self.stopped is not None
+
+    @property
+    def most_intervals(self) -> int:
+        """The most intervals of a mesh."""
+        return self.settings.most_intervals or MOST
+
+    def meshes(self) -> tuple[Mesh, ...]:
+        """Return the first mesh, and a finer one to begin with if no plan of that becomes true.
+
+        States have a mesh of their own: one or more intervals in each control interval.
+        """
+        settings = self.settings
+        guess = settings.guess
+        if isinstance(guess, Plan) and guess.rule is self.rule:
+            return (guess.mesh,)
+        if settings.intervals:
+            controls = settings.controls or min(CONTROL_INTERVALS, settings.intervals)
+            return (uniform(settings.intervals, controls),)
+        controls = settings.controls or CONTROL_INTERVALS
+        pieces = next(count for segments, count in PIECES if self.model.segments <= segments)
+        first, finer = (uniform(controls * each, controls) for each in (pieces, FINE))
+        if first.intervals < finer.intervals <= self.most_intervals:
+            return first, finer
+        return (first,)
+
+    def program(self, problem: PlanningProblem, mesh: Mesh, softening: float) -> PlanProgram:
+        """Return the program of a problem on a mesh."""
+        with self.timed("derive_s"):
+            return plan_program(self.model, problem, mesh, self.rule, softening)
+
+    def given(self, problem: PlanningProblem) -> tuple[GuessMotion, str]:
+        """Return the user's guess, or passive flight, and whether it is "far" or "close"."""
+        guess = self.settings.guess
+        if guess is None:
+            return self.pushed(problem, 0), "far"
+        if not isinstance(guess, Plan):
+            return of_trajectory(self.model, guess, problem.damping), "far"
+        model = self.model._varied(guess.design)
+        return GuessMotion(guess.duration, guess.curve.at, guess.start, model), "close"
+
+    def pushed(self, problem: PlanningProblem, k: int) -> GuessMotion:
+        """Passive flight; the tail is pushed a little for k = 0, or about at random."""
+        settings, (least, most) = self.settings, problem.duration
+        duration = least + (most - least) * DURATIONS[k % len(DURATIONS)]
+        size = float(torque_unit(problem).mean()) * (FIRST_PUSH if k == 0 else 1.0)
+        random = np.random.default_rng([settings.seed, k])
+        push = pushes(random, size, self.model)
+        own = guessed(self.model, problem, random if k else None)
+        return passive(*own, settings.guess_damping, duration, push)
+
+    def solved(
+        self,
+        program: PlanProgram,
+        motion: GuessMotion,
+        guess: str = "far",
+        solver: str = "fatrop",
+        quick: bool = False,
+    ) -> Solution:
+        """Solve from a motion that is "far" from a solution or "close" to one.
+
+        quick: with few iterations, to see whether that leads anywhere.
+        """
+        begin = samples_of(motion, program)
+        options = self.settings.options_of(solver)
+        threads = self.model.batch_library.threads
+        if solver == "ipopt":
+            found = ipopt.solve(program.optimal, begin, guess, options, threads)
+        else:
+            found = fatrop.solve(program.optimal, begin, guess, options, threads, quick)
+        self.spent["solve_cpu_s"] += found.cpu_s
+        self.iterations += found.iterations
+        self.count += 1
+        if not found.success:
+            self.is_stopped()
+        return found
+
+    def solved_near(
+        self, program: PlanProgram, motion: GuessMotion, solver: str = "fatrop"
+    ) -> Solution:
+        """Solve from a motion that is close to a solution; as from afar if that fails."""
+        found = self.solved(program, motion, "close", solver)
+        return found if found.success or self.stopped else self.solved(program, motion, solver=solver)

@@ -1,1 +1,0 @@
-"""The nonlinear program: mesh, nodes, constraints, derivatives, solver."""

@@ -1,1 +1,0 @@
-"""Nonlinear programs in stages for FATROP; each stage solves its collocation equations inside."""
