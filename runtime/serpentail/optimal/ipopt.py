@@ -65,8 +65,9 @@ class _Sparse:
         first = np.append(0, np.cumsum(own))
         rows, cols = [], []
         for k in range(stages + 1):
-            i, j = np.meshgrid(first[k] + np.arange(own[k]), ends[k] + np.arange(columns[k]),
-                               indexing="ij")
+            i, j = np.meshgrid(
+                first[k] + np.arange(own[k]), ends[k] + np.arange(columns[k]), indexing="ij"
+            )
             rows.append(i.ravel())
             cols.append(j.ravel())
         self.blocks = sum(part.size for part in rows)

@@ -50,11 +50,17 @@ class OcpRecord(ctypes.Structure):
         ("phase", PhaseRecord),
         *((name, _pointer) for name in ("start", "constants")),
         ("free", _int),
-        *((f"{which}_{name}", _pointer) for name in ("control", "state", "row", "constant")
-          for which in ("least", "most")),
+        *(
+            (f"{which}_{name}", _pointer)
+            for name in ("control", "state", "row", "constant")
+            for which in ("least", "most")
+        ),
         *((name, _pointer) for name in ("at_start", "at_end")),
         ("start_equalities", _int),
-        *((name, _pointer) for name in ("start_values", "end_values", "least_start", "most_start", "fixed")),
+        *(
+            (name, _pointer)
+            for name in ("start_values", "end_values", "least_start", "most_start", "fixed")
+        ),
         *((name, _double) for name in ("give", "scale")),
     )
 

@@ -139,4 +139,6 @@ class Attempts:
     ) -> Solution:
         """Solve from a motion that is close to a solution; as from afar if that fails."""
         found = self.solved(program, motion, "close", solver)
-        return found if found.success or self.stopped else self.solved(program, motion, solver=solver)
+        return (
+            found if found.success or self.stopped else self.solved(program, motion, solver=solver)
+        )

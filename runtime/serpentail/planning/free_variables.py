@@ -15,7 +15,9 @@ from .result.full_state import start_carrying
 Flown = tuple[Model, PlanningProblem]  # the problem's start is the one that is flown
 
 
-def flown(model: Model, problem: PlanningProblem, program: PlanProgram, found: MeshSamples) -> Flown:
+def flown(
+    model: Model, problem: PlanningProblem, program: PlanProgram, found: MeshSamples
+) -> Flown:
     """Return the model with the parameters of a motion, and the problem with its start."""
     if not problem.is_free or not found.is_motion:
         return model, problem

@@ -94,8 +94,11 @@ static int boundary_slopes(Program *program, const Node *node, int k, const doub
     for (int r = 0; r < count; r++) {
         const double *J = program->J + (size_t)(states + first + r) * zeta;
         double *row = slopes + (size_t)r * columns + own;
-        memcpy(row, J, (size_t)states * sizeof *row);
-        memcpy(row + states, J + skip, (size_t)program->ocp->free * sizeof *row);
+        if (has_x(program, k)) {
+            memcpy(row, J, (size_t)states * sizeof *row);
+            row += states;
+        }
+        memcpy(row, J + skip, (size_t)program->ocp->free * sizeof *row);
     }
     return 0;
 }
@@ -361,13 +364,13 @@ static int add_boundary(Program *program, const Node *node, int k, const double 
 {
     const int states = node->states, zeta = zeta_of(node), skip = states + node->controls;
     const int columns = columns_of(program, k), own = sizes_of(program, k).controls;
-    const int size = states + program->ocp->free;
+    const int x = has_x(program, k) ? states : 0, size = x + program->ocp->free;
     if (at_boundary(program, node, k, w, program->mu, 1) != 0) {
         return 1;
     }
     for (int i = 0; i < size; i++) {
         for (int j = 0; j < size; j++) {
-            const int a = i < states ? i : i - states + skip, b = j < states ? j : j - states + skip;
+            const int a = i < x ? i : i - x + skip, b = j < x ? j : j - x + skip;
             H[(size_t)(own + i) * columns + own + j] += program->H[(size_t)a * zeta + b];
         }
     }

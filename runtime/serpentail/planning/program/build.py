@@ -188,9 +188,7 @@ def _falls(model: Model, problem: PlanningProblem, compiled: bool) -> bool:
     return bool(ca.depends_on(ca.vertcat(*rows, own), flying))
 
 
-def _refuse_unused(
-    variables: PlanVariables, symbols: NodeSymbols, parts: "list[ca.SX]"
-) -> None:
+def _refuse_unused(variables: PlanVariables, symbols: NodeSymbols, parts: "list[ca.SX]") -> None:
     """PlanningError if neither the dynamics nor a function of points uses a design's parameter."""
     import casadi as ca
 
@@ -218,7 +216,11 @@ def _bounded(
     """Return which states have bounds, these (2, n), and whether the goal gives the state."""
     places, bounds = variables.places(variables.states), problem.bounds
     chosen, limits, fixed = [np.zeros(0, int)], [np.zeros((2, 0))], [np.zeros(0, bool)]
-    for name, bound in (("tail", bounds.angle), ("tail_rate", bounds.rate), ("torque", bounds.torque)):
+    for name, bound in (
+        ("tail", bounds.angle),
+        ("tail_rate", bounds.rate),
+        ("torque", bounds.torque),
+    ):
         if bound is None or name not in places:
             continue
         place = places[name]

@@ -45,7 +45,14 @@ def start_rows(flight: FlightDynamics) -> StartRows | None:
     given = {name: _given(problem, name) for name in parts}
     fixed = {name: least == most for name, (least, most) in given.items()}
     ranged = tuple(tuple(np.flatnonzero(~fixed[name])) for name in parts)
-    key = ("start", *flight.key, tuple(parts), ranged, problem.path, "attitude" in problem.free_start)
+    key = (
+        "start",
+        *flight.key,
+        tuple(parts),
+        ranged,
+        problem.path,
+        "attitude" in problem.free_start,
+    )
     made: NodeTerms = memoised(key, lambda: _terms(flight, fixed))
     units = [np.full(len(least), ROW_UNITS.get(name, 1.0)) for name, (least, _) in given.items()]
     equal = np.concatenate([u[fixed[name]] for u, name in zip(units, parts, strict=True)])
@@ -129,6 +136,4 @@ def angles_of(c: "ca.SX") -> "ca.SX":
     import casadi as ca
 
     R = ca.horzcat(*(rotated(c, ca.DM.eye(3)[:, k]) for k in range(3)))
-    return ca.vertcat(
-        ca.asin(R[2, 1]), ca.atan2(-R[2, 0], R[2, 2]), ca.atan2(-R[0, 1], R[1, 1])
-    )
+    return ca.vertcat(ca.asin(R[2, 1]), ca.atan2(-R[2, 0], R[2, 2]), ca.atan2(-R[0, 1], R[1, 1]))

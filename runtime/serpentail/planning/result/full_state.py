@@ -99,7 +99,9 @@ def start_carrying(
     if "com" in conserved:
         rates = np.append(omega[0], blocks["tail_rate"])
         position = conserved["com"] - R @ _com(H)[0]
-        velocity = conserved["com_velocity"] - R @ H[0, VELOCITY, OMEGA.start :] @ rates / H[0, 0, 0]
+        velocity = (
+            conserved["com_velocity"] - R @ H[0, VELOCITY, OMEGA.start :] @ rates / H[0, 0, 0]
+        )
     q = np.concatenate([position, quaternion, blocks["tail"]])
     return q, np.concatenate([velocity, omega[0], blocks["tail_rate"]])
 
