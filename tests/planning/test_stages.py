@@ -1,67 +1,92 @@
-"""Stages in C: collocation solved inside, exact derivatives of what they lead to, and threads; and
+"""Stages in C: collocation solved inside, exact derivatives of the whole program, and threads; and
 what they are of: collocation rules against exact integrals, and meshes.
 """
 
 import ctypes
 import os
 import threading
-from contextlib import contextmanager
 
+import casadi as ca
 import numpy as np
 import pytest
 from scipy.interpolate import BPoly
 
 import serpentail as st
-from serpentail.planning.nlp.mesh import Mesh, refined, uniform
-from serpentail.planning.nlp.rules import MOST_DEGREE, collocation_rule
-from serpentail.planning.staged import fatrop
-from serpentail.planning.staged import thread_pool as helpers
-from serpentail.planning.staged.fatrop import kernel
+from serpentail.optimal import fatrop
+from serpentail.optimal import thread_pool as helpers
+from serpentail.optimal.control_mesh import bernstein
+from serpentail.optimal.library import kernel
+from serpentail.optimal.mesh import Mesh, refined, uniform
+from serpentail.optimal.rules import MOST_DEGREE, collocation_rule
+from tests.support import zoo
 from tests.support.rows import row
-from tests.support.stages import first_stage
+from tests.support.stages import whole_program
 from tests.support.tumbling import AGAIN, rat, start
 
-H = np.array([1e-4, -2e-4, 5e-5])  # kg m^2/s
+DURATIONS = {"duration": (0.3, 0.5)}
+INERTIA = ((6e-5, 3.6e-5, 7e-5), (7e-5, 4e-5, 8e-5))
+DESIGN = {"design": {"tail_length": (0.08, 0.25), "torso_inertia": INERTIA}}
+FREE = {"tail": ((-0.4, -0.1), (0.4, 0.2)), "tail_rate": (-8, 8), "torso_rate": (-4, 4)}
+WHOLLY_FREE = FREE | {"attitude": (-0.1, 1), "position": (-1, 1), "velocity": (-4, 4)}
+STEEP = {"bounds": st.Bounds(angle=1.0, rate=30.0, torque_rate=1.0)}
+GOAL = st.Goal(attitude=(1, 0, 0, 0.1), tail=(0.1, None), tail_rate=(None, 0.0))
+
+
+def seen(point):
+    """What a path may see of a node, with a parameter of the model."""
+    turning = point.torso_rate[0] * point.time, ca.sumsqr(point.drift), point.torque[0]
+    length = point.parameters["tail_length"]
+    return ca.vertcat(point.tip * length, point.height, point.duration**2, *turning)
+
+
+def own(point):
+    """An objective of a model's parameter, too."""
+    inertia = point.parameters["torso_inertia"][1] / 4e-5
+    return ca.sumsqr(point.torque / 1e-3) * inertia + ca.sumsqr(point.torso_rate) * point.time
+
+
+PATH = {"path": ((seen, -50.0, 50.0),)}
+ALL = {"free_start": WHOLLY_FREE, "objective": own} | DESIGN | PATH | STEEP | DURATIONS
 CASES = [
-    ((1, 3), {}),
-    ((1, 3), {"controls": 2, "objective": "energy", "damping": 1e-4}),
-    ((1, 3), {"degree": 5, "objective": "time", "duration": (0.4, 0.4)}),
-    ((1, 3), {"degree": 1}),
-    ((2, 2), {"controls": 3, "damping": 1e-4}),
+    ("m1_n3", DURATIONS),
+    ("m1_n3", {"controls": 2, "objective": "energy", "damping": 1e-4}),
+    ("m1_n3", {"degree": 5, "objective": "time"} | DURATIONS),
+    ("m1_n3", {"degree": 1, "goal": GOAL}),
+    ("m2_n2", {"controls": 3, "damping": 1e-4}),
+    ("arcs1", {}),
+    ("elastic", {"objective": own}),
+    ("m1_n3", {"intervals": 3} | PATH | DURATIONS),
+    ("m1_n3", {"intervals": 3, "objective": own} | PATH | STEEP | DURATIONS),
+    *(
+        pytest.param("m1_n1", {"intervals": 3, "goal": None} | each, marks=pytest.mark.slow)
+        for each in (DESIGN, {"free_start": FREE})
+    ),
+    pytest.param("m1_n1", {"intervals": 3} | ALL, marks=pytest.mark.slow),
 ]
 LIMIT = 30  # s, of a test that waits for a thread
 
 
-def state(nt: int) -> np.ndarray:
-    random = np.random.default_rng(1)
-    tail, rate = 0.2 * random.normal(size=nt), 0.3 * random.normal(size=nt)
-    return np.concatenate([[0.9, 0.3, 0.2, -0.1], tail, rate])
-
-
-def variables(stage, x: np.ndarray) -> np.ndarray:
-    controls = 0.5 * np.random.default_rng(2).normal(size=stage.size - len(x) - 1)
-    return np.concatenate([controls, x, [0.4]])
-
-
-def differences(function, v, step=1e-5):
-    rows = [(function(v + step * e) - function(v - step * e)) / (2 * step) for e in np.eye(len(v))]
+def differences(function, w, step=1e-5):
+    rows = [(function(w + step * e) - function(w - step * e)) / (2 * step) for e in np.eye(len(w))]
     return np.stack(rows, axis=-1)
 
 
-def test_derivatives_are_central_differences():
-    for tail, settings in CASES:
-        model = rat(*tail)
-        x = state(model.layout.nt)
-        with row(tail, settings), first_stage(model, x, H, **settings) as stage:
-            v = variables(stage, x)
-            J = stage.slopes(v)
-            own = differences(stage.values, v)
-            np.testing.assert_allclose(J, own, atol=1e-6 * np.abs(J).max())
-            mu = np.random.default_rng(3).normal(size=len(J))
-            found = stage.hessian(v, mu)
-            np.testing.assert_array_equal(found, found.T)
-            wanted = mu @ np.moveaxis(differences(stage.slopes, v), 0, 1)
-            np.testing.assert_allclose(found, wanted, atol=1e-5 * np.abs(found).max())
+@pytest.mark.parametrize(("name", "asked"), CASES)
+def test_derivatives_are_central_differences(name, asked):
+    """Of the whole program, beside a guess; the Hessian has no entries between stages."""
+    random = np.random.default_rng(2)
+    with whole_program(zoo.model(name), **asked) as program:
+        w = program.w + 0.02 * random.normal(size=program.w.size)
+        J, wanted = program.slopes(w), differences(program.values, w)
+        largest = np.abs(wanted).max(axis=1, keepdims=True)
+        assert (np.abs(J - wanted) <= 2e-6 * np.maximum(largest, 1.0)).all()
+        weights = random.normal(size=len(J))
+        H, wanted = (
+            program.curvature(w, weights),
+            differences(lambda x: weights @ program.slopes(x), w),
+        )
+        np.testing.assert_array_equal(H, H.T)
+        np.testing.assert_allclose(H, wanted, atol=1e-6 * np.abs(H).max())
 
 
 def filling(number, status):
@@ -75,19 +100,23 @@ def filling(number, status):
     return ctypes.CFUNCTYPE(ctypes.c_int, *(ctypes.c_void_p,) * 6)(node)
 
 
-def test_a_stage_without_numbers_has_no_results_until_it_has_them_again():
-    model, x = rat(), state(2)
+def test_stages_without_numbers_have_no_results_until_they_have_them_again():
+    def lost(program, w):
+        found = np.abs(program.values(w)).max()
+        assert np.isnan(program.slopes(w)).any()
+        assert program.curvature(w, np.ones(1 + program.sparse.rows)) is None
+        return found >= 1e8  # a finite number that is worse than all others
+
     for given in ((np.nan, 0), (np.inf, 0), (1e300, 0), (0.0, 1)):
         functions = dict.fromkeys(("rates", "slopes", "curvature"), filling(*given))
-        with row(*given), first_stage(model, x, H, functions=functions) as stage:
-            v = variables(stage, x)
-            assert stage.values(v) is None and stage.slopes(v) is None
-            assert stage.hessian(v, np.ones(1000)) is None
-    with first_stage(model, x, H) as stage:
-        v = variables(stage, x)
-        wanted, far = stage.values(v), np.where(np.arange(len(v)) < 6, 1e9, v)
-        assert stage.values(far) is None
-        np.testing.assert_allclose(stage.values(v), wanted, atol=1e-10)
+        with row(*given), whole_program(rat(), functions=functions) as program:
+            assert lost(program, program.w)
+    with whole_program(rat()) as program:
+        w, far = program.w, np.where(np.arange(program.w.size) < 6, 1e9, program.w)
+        wanted = program.values(w)
+        assert lost(program, far)
+        np.testing.assert_allclose(program.values(w), wanted, atol=1e-10)
+        assert np.isfinite(program.slopes(w)).all()
 
 
 def test_linear_equations_are_solved_and_singular_ones_refused():
@@ -109,42 +138,21 @@ def test_linear_equations_are_solved_and_singular_ones_refused():
         assert code.factorise(len(singular), singular.ctypes.data, pivots.ctypes.data) == 1
 
 
-@contextmanager
-def program():
-    """Yield a function that evaluates six stages by a factor, the code and the program."""
-    model, x = rat(), state(2)
-    with first_stage(model, x, H) as stage:
-        code, own = kernel(), stage.size
-        code.program_slopes.argtypes = (ctypes.c_void_p,) * 2
-        w, nu = np.zeros(code.program_variables(stage.program)), own - len(x) - 1
-        w[nu] = 0.4
-        for k in range(1, 6):
-            first = k * own - len(x)
-            w[first + nu : first + own] = [*x, 0.4]
-
-        def slopes(factor=1.0):
-            code.program_slopes(stage.program, (factor * w).ctypes.data)
-            assert all(each.sloped for each in stage.all[:6])
-            shape = stage.stage.results, own
-            return [np.ctypeslib.as_array(each.Jr, shape).copy() for each in stage.all[:6]]
-
-        yield slopes, code, stage.program
-
-
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
 def test_stages_have_the_numbers_of_one_thread():
-    with program() as (slopes, *_):
-        wanted = slopes()
+    with whole_program(rat()) as program:
+        wanted = program.slopes(program.w)
     for crew in (1, 2, 5):
-        with program() as (slopes, code, own), helpers.helped(code, own, crew):
-            for a, b in zip(wanted, slopes(), strict=True):
-                np.testing.assert_array_equal(a, b)
-            child = os.fork()
-            if child == 0:  # evaluates alone
-                slopes(1.001)
-                pairs = zip(wanted, slopes(), strict=True)
-                os._exit(0 if all(np.allclose(a, b) for a, b in pairs) else 1)
-            assert os.waitpid(child, 0)[1] == 0
+        with whole_program(rat()) as program:
+            address = program.sparse.program
+            with helpers.helped(kernel(), address, crew):
+                np.testing.assert_array_equal(program.slopes(program.w), wanted)
+                child = os.fork()
+                if child == 0:  # evaluates alone
+                    program.slopes(1.001 * program.w)
+                    found = program.slopes(program.w)
+                    os._exit(0 if np.allclose(found, wanted) else 1)
+                assert os.waitpid(child, 0)[1] == 0
 
 
 def test_plans_have_as_many_threads_as_the_model_allows_and_do_not_depend_on_them(monkeypatch):
@@ -160,51 +168,46 @@ def test_plans_have_as_many_threads_as_the_model_allows_and_do_not_depend_on_the
         seen.clear()
     assert threading.active_count() == before
     assert found[0].report["iterations"] == found[1].report["iterations"]
-    np.testing.assert_array_equal(found[0].solution.w, found[1].solution.w)
-
-
-SCHEMES = [("trapezoidal", None), ("hermite-simpson", None)]
-SCHEMES += [(name, d) for name in ("lobatto", "radau") for d in range(1, MOST_DEGREE + 1)]
+    np.testing.assert_array_equal(
+        found[0].solution.samples.states, found[1].solution.samples.states
+    )
 
 
 def test_rules_are_exact_up_to_their_order_and_no_further():
     """Quadrature; and states of x = s^p from its rates at the nodes: p up to their number."""
-    for name, degree in SCHEMES:
-        found, s = collocation_rule(name, degree), np.linspace(0, 1, 5)
-        with row(name, degree):
+    for degree in range(1, MOST_DEGREE + 1):
+        found, s = collocation_rule(degree), np.linspace(0, 1, 5)
+        with row(degree):
             for power in range(found.order):
                 total = found.weights @ found.nodes**power
                 assert total == pytest.approx(1 / (power + 1), abs=1e-13)
             beyond = found.weights @ found.nodes**found.order - 1 / (found.order + 1)
             assert abs(beyond) > 1e-10
-            for power in range(1, len(found.nodes) + 1):
-                states, rates = found.supports**power, power * found.nodes ** (power - 1)
-                np.testing.assert_allclose(found.states @ states, found.slopes @ rates, atol=2e-12)
+            for power in range(1, degree + 1):
+                states, rates = found.nodes**power, power * found.nodes ** (power - 1)
+                defects = found.states @ np.append(0.0, states) - rates
+                np.testing.assert_allclose(defects, 0, atol=1e-11)
                 np.testing.assert_allclose(found.integrals(s) @ rates, s**power, atol=2e-12)
                 wanted = power * s ** (power - 1)
                 np.testing.assert_allclose(found.basis(s) @ rates, wanted, atol=2e-11)
-            values = np.random.default_rng(0).normal(size=len(found.nodes))
-            coefficients = found.bernstein() @ values  # beyond which no polynomial goes
-            inside = BPoly(coefficients[:, None], [0, 1])(s)
-            np.testing.assert_allclose(inside, found.basis(s) @ values, atol=1e-11)
+            values = np.random.default_rng(0).normal(size=degree)
+            by_powers = s[:, None] ** np.arange(degree) @ (values @ found.powers())
+            np.testing.assert_allclose(by_powers, found.basis(s) @ values, atol=1e-11)
+            inside = BPoly(values[:, None], [0, 1])(s)  # by coefficients, which it never exceeds
+            np.testing.assert_allclose(bernstein(s, degree) @ values, inside, atol=1e-13)
 
 
-def test_meshes_are_split_refined_and_guarded():
-    """Refinement splits where errors are and obeys the most; guards are for the intervals beside,
-    too, and stay.
-    """
-    mesh = Mesh(np.array([0.0, 0.2, 1.0]), np.array([True, False]), None).split(np.array([2, 1]))
+def test_meshes_are_split_and_refined():
+    """Refinement splits where errors are and obeys the most; controls keep their intervals."""
+    mesh = Mesh(np.array([0.0, 0.2, 1.0]), np.array([0, 1])).split(np.array([2, 1]))
     np.testing.assert_allclose(mesh.ends, [0, 0.1, 0.2, 1])
-    assert mesh.guarded.tolist() == [True, True, False]
-    points = mesh.points(collocation_rule("hermite-simpson"))
-    np.testing.assert_allclose(points, [0, 0.05, 0.1, 0.15, 0.2, 0.6, 1])
+    assert mesh.controls.tolist() == [0, 0, 1]
+    points, (a, b) = mesh.points(collocation_rule(2)), (0.1 / 3, 0.2 + 0.8 / 3)
+    np.testing.assert_allclose(points, [0, a, 0.1, 0.1 + a, 0.2, b, 1])
 
     errors = np.array([1e-8, 1e-8, 1e-3, 1e-8])
     mesh = refined(uniform(4), errors, 0.1, 5, 100)
     assert mesh.intervals > 4 and np.count_nonzero(mesh.widths < 0.25) == mesh.intervals - 3
     assert refined(uniform(4), errors, 1e-9, 5, 6).intervals <= 6
-
-    third, last = (np.arange(8) == k for k in (2, 7))
-    mesh = uniform(8).with_guards(third)
-    assert np.flatnonzero(mesh.guarded).tolist() == [1, 2, 3]
-    assert np.flatnonzero(mesh.with_guards(last).guarded).tolist() == [1, 2, 3, 6, 7]
+    halved = uniform(4).halved(np.array([False, True, True, False]), 5)
+    np.testing.assert_allclose(halved.ends, [0, 0.25, 0.375, 0.5, 0.75, 1])

@@ -1,124 +1,75 @@
-"""Stages of plans, called in C one by one."""
+"""Programs of plans in C: values, slopes and curvature of the whole, where a guess begins."""
 
-import ctypes
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import block_diag
 
 import serpentail as st
-from serpentail.planning.nlp.mesh import uniform
-from serpentail.planning.nlp.node import PARAMETERS
-from serpentail.planning.nlp.rules import collocation_rule
-from serpentail.planning.problem import PlanningProblem
-from serpentail.planning.staged.fatrop import kernel
-from serpentail.planning.staged.stages import stages_of
-from serpentail.planning.staged.task import task_of
-
-_numbers = ctypes.POINTER(ctypes.c_double)
-
-
-class Stage(ctypes.Structure):
-    """``Stage`` of native/stage.h."""
-
-    _fields_ = (
-        ("task", ctypes.c_void_p),
-        *((name, ctypes.c_int) for name in ("first", "pieces", "variables", "results")),
-        *((name, ctypes.c_int) for name in ("bounded", "first_bounded")),
-        *((name, _numbers) for name in ("v", "z", "y", "r", "J", "factors")),
-        ("pivots", ctypes.c_void_p),
-        *((name, _numbers) for name in ("slopes", "Jr", "from_v", "from_z", "scratch")),
-        *((name, ctypes.c_int) for name in ("known", "failed", "sloped", "factored")),
-        *((name, ctypes.c_long) for name in ("node_calls", "newton_steps")),
-        *((name, _numbers) for name in ("given", "mu", "H")),
-        ("curved", ctypes.c_int),
-    )
+from serpentail.optimal.ipopt import _Sparse
+from serpentail.optimal.library import in_c, kernel
+from serpentail.optimal.mesh import uniform
+from serpentail.optimal.problem import OcpInC
+from serpentail.optimal.rules import collocation_rule
+from serpentail.optimal.samples import packed
+from serpentail.planning.program.build import PlanProgram, plan_program
+from serpentail.planning.program.guess import passive, pushes, samples_of
+from tests.support.posed import posed
+from tests.support.tumbling import DURATION, start
 
 
-class Head(ctypes.Structure):
-    """The first members of ``Program`` in native/ocp.h."""
+@dataclass(frozen=True)
+class WholeProgram:
+    """A program of C at w, the variables of all stages, which are a guess at first."""
 
-    _fields_ = (("task", ctypes.c_void_p), ("stages", ctypes.POINTER(Stage)))
+    made: PlanProgram
+    sparse: _Sparse
+    w: np.ndarray
 
+    def values(self, w: np.ndarray) -> np.ndarray:
+        """Return the objective and all constraints."""
+        return np.append(*self.sparse.values(w))
 
-def problem(model, **changes) -> PlanningProblem:
-    """Return a checked problem of a model at rest."""
-    nt = model.layout.nt
-    q = np.zeros(model.nq)
-    q[3] = 1.0
-    bounds = st.Bounds(np.full(nt, 1.0), None, np.full(nt, 0.02), None)
-    settings = {
-        "q0": q,
-        "v0": np.zeros(model.nv),
-        "goal": st.Goal(torso_rate=np.zeros(3)),
-        "duration": (0.3, 0.5),
-        "bounds": bounds,
-        "objective": "effort",
-        "smoothing": 3e-4,
-        "damping": 0.0,
-        "path": (),
-        "clearance": None,
-        "legs": None,
-        "formulation": "airborne",
-        "attitude": "quaternion",
-    }
-    return PlanningProblem(**settings | changes)
+    def slopes(self, w: np.ndarray) -> np.ndarray:
+        """Return their Jacobian, dense; nan where there is none."""
+        gradient, entries = self.sparse.slopes(w)
+        return np.vstack([gradient, self.sparse.jacobian.matrix(entries).full()])
 
-
-class OneStage:
-    """The first stage of a problem from the state x (units), with results, slopes and Hessian."""
-
-    def __init__(self, program, task):
-        self.code, self.program, self.task = kernel(), program, task
-        for name in ("stage_values", "stage_slopes"):
-            getattr(self.code, name).argtypes = (ctypes.c_void_p, ctypes.c_void_p)
-        self.code.stage_hessian.argtypes = (ctypes.c_void_p,) * 4
-        self.all = ctypes.cast(program, ctypes.POINTER(Head)).contents.stages
-        self.stage = self.all[0]
-        self.address = ctypes.addressof(self.stage)
-        self.size = self.stage.variables
-
-    def values(self, v):
-        """Return the results (r,) at v, or None if there are none."""
-        v = np.ascontiguousarray(v)
-        if self.code.stage_values(self.address, v.ctypes.data):
+    def curvature(self, w: np.ndarray, weights: np.ndarray) -> np.ndarray | None:
+        """Return the Hessian of weights^T values, dense; None where there is none."""
+        sparse, sizes = self.sparse, np.zeros((self.made.optimal.stages + 1, 4), np.intc)
+        kernel().program_sizes(sparse.program, sizes.ctypes.data)
+        columns = sizes[:, :2].sum(axis=1).tolist()
+        blocks, lam = np.zeros(sparse.squares), np.ascontiguousarray(weights[1:])
+        given = (w.ctypes.data, float(weights[0]), lam.ctypes.data, blocks.ctypes.data)
+        if sparse.code.sparse_curve(sparse.program, *given):
             return None
-        return np.ctypeslib.as_array(self.stage.r, (self.stage.results,)).copy()
-
-    def slopes(self, v):
-        """Their Jacobian (r, v)."""
-        v = np.ascontiguousarray(v)
-        if self.code.stage_slopes(self.address, v.ctypes.data):
-            return None
-        return np.ctypeslib.as_array(self.stage.Jr, (self.stage.results, self.size)).copy()
-
-    def hessian(self, v, mu):
-        """The Hessian of mu^T results."""
-        v, mu = map(np.ascontiguousarray, (v, mu))
-        H = np.zeros((self.size, self.size))
-        if self.code.stage_hessian(self.address, v.ctypes.data, mu.ctypes.data, H.ctypes.data):
-            return None
-        return H
+        parts = np.split(blocks, np.cumsum(np.square(columns))[:-1])
+        return block_diag(*(part.reshape(n, n) for part, n in zip(parts, columns, strict=True)))
 
 
 @contextmanager
-def first_stage(model, x, momentum, controls=None, degree=3, functions=None, **changes):
-    """Yield the first of six intervals, or of control intervals, of a problem.
+def whole_program(
+    model: st.Model, degree: int = 3, intervals: int = 6, controls: int | None = None, **asked
+) -> Iterator[WholeProgram]:
+    """Yield the program of a plan on a uniform mesh, at passive flight and a random push.
 
-    functions: of the node, instead of the model's own.
+    asked: of st.plan; functions, if it is given: of the node, instead of the model's own.
     """
-    stages = stages_of(
-        model, problem(model, **changes), uniform(6, controls), collocation_rule("radau", degree)
-    )
-    if functions is not None:
-        stages = replace(stages, node=replace(stages.node, functions=functions))
-    p = np.zeros(PARAMETERS)
-    p[:3], p[PARAMETERS - 1] = momentum, 1e-3
-    task = task_of(stages, x, p, 1.0)
-    program = kernel().program_new(ctypes.byref(task.task))
-    guess = np.tile(x, (stages.mesh.intervals, degree, 1))
-    kernel().program_guess(program, guess.ctypes.data)
-    try:
-        yield OneStage(program, task)
-    finally:
-        kernel().program_free(program)
+    functions, softening = asked.pop("functions", {}), asked.pop("softening", 1e-3)
+    problem, _ = posed(model, **{"start": start(model), "duration": DURATION} | asked)
+    mesh, rule = uniform(intervals, controls), collocation_rule(degree)
+    made = plan_program(model, problem, mesh, rule, softening)
+    node = made.optimal.node
+    changed = replace(node, airborne=node.airborne | functions)
+    made = replace(made, optimal=replace(made.optimal, node=changed))
+
+    push = pushes(np.random.default_rng(1), 1e-3, model)
+    motion = passive(model, problem, 1e-4, problem.duration[1], push)
+    begin = samples_of(motion, made)
+    nodes = np.ascontiguousarray(begin.states[1:].reshape(intervals, degree, -1))
+    with in_c(OcpInC(made.optimal, 1.0, 1.0)) as program:
+        kernel().program_guess(program, nodes.ctypes.data)
+        yield WholeProgram(made, _Sparse(program), packed(made.optimal, begin))
