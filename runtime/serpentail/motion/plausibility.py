@@ -101,14 +101,11 @@ def _depth_of_torso(q: Array, axes: Array) -> Array:
 
 def _through_the_torso(model: Model, motion: "Trajectory") -> list[str]:
     """A tail that bends into the torso, or comes back into it."""
-    axes = semi_axes(model)
-    if "tail_points" not in model.kernels or not axes.all():
+    if not torso_is_known(model):
         return []
 
     def depth(rows: slice) -> Array:
-        q = motion.q[rows]
-        from_b = model.tail_points(q) - q[:, None, POSITION]
-        return sunk(np.einsum("kij,kpi->kpj", rotation_matrix(q[:, QUATERNION]), from_b) / axes)
+        return depth_in_torso(model, motion.q[rows])
 
     deepest, time = _largest(motion, depth)
     if not deepest > SUNK:
@@ -117,6 +114,18 @@ def _through_the_torso(model: Model, motion: "Trajectory") -> list[str]:
         f"tail: goes through the torso at t = {time:.4g} s, {deepest:.2g} of the way from its "
         f"surface to its centre too deep, more than {SUNK}: bend the tail less, or damp it more"
     ]
+
+
+def torso_is_known(model: Model) -> bool:
+    """Tell if it can be found whether the tail is in the torso."""
+    return "tail_points" in model.kernels and bool(semi_axes(model).all())
+
+
+def depth_in_torso(model: Model, q: Array) -> Array:
+    """Return how far tails go into the torso, (K,), of states q (K, nq); see ``sunk``."""
+    from_b = model.tail_points(q) - q[:, None, POSITION]
+    own = np.einsum("kij,kpi->kpj", rotation_matrix(q[:, QUATERNION]), from_b)
+    return sunk(own / semi_axes(model))
 
 
 def sunk(points: Array) -> Array:

@@ -6,6 +6,9 @@ from contextlib import contextmanager
 
 import numpy as np
 
+from serpentail_scene.layout import OMEGA, QUATERNION, TAIL_Q
+
+from ..basics.attitude import angle_deg
 from ..model.model import Model
 from ..optimal import fatrop, ipopt
 from ..optimal.interrupt import stop_reason
@@ -47,6 +50,11 @@ class Attempts:
             self.iterations, self.count = before.iterations, before.count
         self.stopped: str | None = None
 
+    def share(self, later: "Attempts") -> None:
+        """Count what a later search, that began with what this one had cost, has cost, too."""
+        self.spent, self.iterations, self.count = later.spent, later.iterations, later.count
+        self.stopped = self.stopped or later.stopped
+
     @contextmanager
     def timed(self, name: str) -> Iterator[None]:
         """Add the time of a part of the work to what was spent on it."""
@@ -73,6 +81,8 @@ class Attempts:
         guess = settings.guess
         if isinstance(guess, Plan) and guess.rule is self.rule:
             return (guess.mesh,)
+        if isinstance(guess, GuessMotion) and guess.mesh is not None:
+            return (guess.mesh,)
         if settings.intervals:
             controls = settings.controls or min(CONTROL_INTERVALS, settings.intervals)
             return (uniform(settings.intervals, controls),)
@@ -91,12 +101,25 @@ class Attempts:
     def given(self, problem: PlanningProblem) -> tuple[GuessMotion, str]:
         """Return the user's guess, or passive flight, and whether it is "far" or "close"."""
         guess = self.settings.guess
-        if guess is None:
+        if guess is None or isinstance(guess, tuple | list):
             return self.pushed(problem, 0), "far"
+        if isinstance(guess, GuessMotion):
+            return guess, "close"
         if not isinstance(guess, Plan):
             return of_trajectory(self.model, guess, problem.damping), "far"
-        model = self.model._varied(guess.design)
-        return GuessMotion(guess.duration, guess.curve.at, guess.start, model), "close"
+        return self.motion_of(guess), "close"
+
+    def motion_of(self, plan: Plan) -> GuessMotion:
+        """Return a plan as a guess."""
+        model = self.model._varied(plan.design)
+        return GuessMotion(plan.duration, plan.curve.at, plan.start, model)
+
+    def nearest(self, problem: PlanningProblem) -> GuessMotion | None:
+        """Return that of the user's stored plans whose start is nearest; None if there is none."""
+        plans = self.settings.guess
+        if not isinstance(plans, tuple | list) or not plans:
+            return None
+        return self.motion_of(min(plans, key=lambda plan: _apart(problem, plan)))
 
     def pushed(self, problem: PlanningProblem, k: int) -> GuessMotion:
         """Passive flight; the tail is pushed a little for k = 0, or about at random."""
@@ -142,3 +165,11 @@ class Attempts:
         return (
             found if found.success or self.stopped else self.solved(program, motion, solver=solver)
         )
+
+
+def _apart(problem: PlanningProblem, plan: Plan) -> float:
+    """Return how far two starts are apart: attitude and tail (rad), rates over a tenth of a second."""
+    (q, v), (q0, v0) = plan.start, (problem.q0, problem.v0)
+    turn = np.radians(angle_deg(q[QUATERNION], q0[QUATERNION]))
+    rates = 0.1 * np.linalg.norm(v[OMEGA.start :] - v0[OMEGA.start :])
+    return float(turn + np.linalg.norm(q[TAIL_Q] - q0[TAIL_Q]) + rates)

@@ -8,6 +8,7 @@ from ..model.model import Model
 from ..optimal.fork_gate import forks_wait
 from ..optimal.interrupt import stoppable
 from ..simulation.simulate import read_clocks
+from .continuation import with_bound
 from .momentum import refuse_impossible
 from .paths_at_start import refuse_violated
 from .problem import PlanningProblem
@@ -16,6 +17,7 @@ from .round import Round
 from .search import Search
 from .settings import PlanSettings
 from .softening import SOFTENING
+from .torso import goes_through_torso, off_torso
 
 NEEDED = (  # functions of the model
     *("mass_matrix", "inverse_dynamics", "forward_dynamics"),
@@ -50,7 +52,53 @@ def best_plan(
                 settings = replace(settings, guess=guess)
             search = Search(model, problem, settings, easier)
             rounds = rounds_of(search, stage, watch, begun)
-        return search.plan(search.best(rounds), len(rounds), begun)
+            best, tried = search.best(rounds), search
+            if not search.is_true(best):
+                best, tried = explained(search, best, stage)
+            if not settings.through_torso and search.is_true(best):
+                best, tried = kept_off(search, best, stage, watch, begun)
+        return tried.plan(best, len(rounds), begun)
+
+
+def explained(search: Search, best: Round, stage: Stage) -> tuple[Round, Search]:
+    """Return what a failed search ends with: the plan of an easier problem, and which bound it
+    needs, if that plan is true; else what it has.
+    """
+    found = search.led
+    if found is None or found.bracket is None or search.stopped:
+        return best, search
+    factor = found.bracket.suffices
+    easier = with_bound(search.problem, found.bracket.bound, factor)
+    motion = search.motion(found.program, found.solution)
+    rough = Search(search.model, easier, search.settings.roughly(motion), search)
+    last = rough.best(rounds_of(rough, stage))
+    if rough.is_true(last):
+        rough.advice = found.bracket.words(search.problem)
+        return last, rough
+    search.attempts.share(rough.attempts)
+    return best, search
+
+
+def kept_off(
+    search: Search,
+    best: Round,
+    stage: Stage,
+    watch: Callable[[Plan], object] | None,
+    begun: tuple[float, float],
+) -> tuple[Round, Search]:
+    """Return a plan whose tail stays out of the torso where that of the best round does not."""
+    if not goes_through_torso(best):
+        return best, search
+    problem = off_torso(search.model, search.problem)
+    if problem is None:
+        return best, search
+    motion = search.motion(best.program, best.solution)
+    again = Search(search.model, problem, replace(search.settings, guess=motion), search)
+    last = again.best(rounds_of(again, stage, watch, begun))
+    if again.is_true(last):
+        return last, again
+    search.attempts.share(again.attempts)
+    return best, search
 
 
 def rounds_of(

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Any
 
+HALF_TURN = "half turn"  # of each segment, a bound of its angles
+
 
 @dataclass(frozen=True)
 class Goal:
@@ -45,9 +47,9 @@ class Bounds:
 
     Parameters
     ----------
-    angle : float or array_like, optional
+    angle : float, array_like or "half turn", default "half turn"
         Tail coordinates (rad): the angle of each joint. A segment of n links bends by n times it.
-        Default: no bound.
+        "half turn" bends a segment by half a turn at most, or as far as start and goal ask for.
     rate : float or array_like, optional
         Their rates (rad/s). Default: no bound.
     torque : float or array_like, default 0.02
@@ -62,7 +64,7 @@ class Bounds:
     0.01
     """
 
-    angle: Any = None
+    angle: Any = HALF_TURN
     rate: Any = None
     torque: Any = 0.02
     torque_rate: Any = None

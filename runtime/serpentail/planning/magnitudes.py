@@ -1,17 +1,19 @@
 """Duration and bounds of a plan, also with units; those that no flight needs give a warning."""
 
 import warnings
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
+
+from serpentail_scene.layout import PER_SEGMENT
 
 from ..basics.checks import measured, number, numbers, shown
 from ..basics.errors import PlanningError, UnusualSize
 from ..basics.plausible_values import warn_of_unusual
 from ..model.model import Model
 from ..model.parameters import total_mass
-from .goal import Bounds
+from .goal import HALF_TURN, Bounds
 
 HUGE = 1e100  # beyond it squares overflow
 LONGEST = 5.0  # s: a fall from 120 m
@@ -47,9 +49,14 @@ def checked_duration(model: Model, duration: Any) -> tuple[float, float]:
 
 
 def checked_bounds(model: Model, bounds: Any) -> Bounds:
-    """Return bounds of every tail coordinate, None for no bound; UnusualSize for odd ones."""
+    """Return bounds of every tail coordinate, None for no bound; UnusualSize for odd ones.
+
+    A bound of angles of half a turn is that of each segment, which n joints share.
+    """
     if not isinstance(bounds, Bounds):
         raise PlanningError(f"bounds: value {shown(bounds)}: needs a serpentail.Bounds")
+    if isinstance(bounds.angle, str) and bounds.angle == HALF_TURN:
+        bounds = replace(bounds, angle=np.repeat(np.pi / model.joints_each, PER_SEGMENT))
     found = {
         entry.name: _bound(entry.name, getattr(bounds, entry.name), model.layout.nt)
         for entry in fields(Bounds)

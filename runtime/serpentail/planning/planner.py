@@ -47,13 +47,14 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     options: dict[str, Any] | None = None,
     time_limit: float | None = None,
     # where it begins
-    guess: Plan | Trajectory | None = None,
+    guess: Plan | Trajectory | Sequence[Plan] | None = None,
     guess_damping: float = 1e-3,
     multi_start: int = 1,
     retries: int = 4,
     seed: int = 0,
     # output
     track: bool = True,
+    through_torso: bool = False,
     watch: Callable[[Plan], object] | None = None,
     **unknown: Never,
 ) -> Plan:
@@ -136,18 +137,24 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     time_limit : float, optional
         Time for the search (s). If it leaves no time to track the plan, the report has no errors
         of tracking.
-    guess : Plan or Trajectory, optional
-        First guess. Default: passive flight.
+    guess : Plan, Trajectory or sequence of Plan, optional
+        First guess. Default: passive flight. Of a sequence of plans, that with the nearest start
+        is tried if passive flight leads to none.
     guess_damping : float, default 1e-3
         Damping of that passive flight (N m s).
     multi_start : int, default 1
         Number of guesses that are solved; the best solution is kept.
     retries : int, default 4
-        Number of further guesses if all of these fail.
+        Number of further guesses if all of these fail, after a continuation: an easier problem is
+        solved, whose bound is led back to the wanted one. At 0 there is none. A search that fails
+        says in ``report["advice"]`` which value of the bound suffices.
     seed : int, default 0
         Seed of the random guesses.
     track : bool, default True
         Whether to simulate the plan tracked by ``Pfl`` too, for the report.
+    through_torso : bool, default False
+        Whether the tail may go through the torso. Otherwise a plan in which it does is made again
+        with a constraint; if that finds none, ``plan.warnings`` tells.
     watch : callable, optional
         Function that receives the Plan of each round when it is found. An exception that it
         raises ends the search.
@@ -208,6 +215,7 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
         retries=retries,
         seed=seed,
         track=track,
+        through_torso=through_torso,
     )
     check_settings(model, settings, refused)
     of_problem = {

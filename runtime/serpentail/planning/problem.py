@@ -1,7 +1,7 @@
 """A planning problem, checked field by field before anything is derived."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -72,6 +72,9 @@ def checked_problem(
         attempt("duration", checked_duration, model, task[2]),
         attempt("bounds", checked_bounds, model, task[3]),
     )
+    usual = isinstance(task[3], Bounds) and isinstance(task[3].angle, str)
+    if usual and start is not None and bounds is not None and goal is not None:
+        bounds = _as_far_as(bounds, start[0][TAIL_Q], goal.tail, (free or {}).get("tail"))
     if start is not None and bounds is not None:
         attempt("bounds.angle", _start_inside, start[0][TAIL_Q], bounds.angle, "angle", "rad")
         attempt("bounds.rate", _start_inside, start[1][TAIL_V], bounds.rate, "rate", "rad/s")
@@ -163,6 +166,14 @@ def _partly_free(field: str, value: Any, size: int) -> np.ndarray | None:
             f"{field}: value {shown(value)}: needs {size} finite numbers, None where free"
         )
     return np.where([entry is None for entry in entries], np.nan, array)
+
+
+def _as_far_as(
+    bounds: Bounds, start: np.ndarray, goal: np.ndarray | None, free: Range | None
+) -> Bounds:
+    """Return bounds whose usual angles are as wide as start and goal ask for."""
+    asked = [start, *([] if goal is None else [np.nan_to_num(goal)]), *(free or ())]
+    return replace(bounds, angle=np.max(np.abs([bounds.angle, *asked]), axis=0))
 
 
 def _start_inside(values: np.ndarray, bound: np.ndarray | None, name: str, unit: str) -> None:

@@ -13,8 +13,10 @@ from ..optimal.interrupt import time_left
 from ..optimal.mesh import Mesh, refined
 from ..optimal.rules import collocation_rule
 from ..optimal.solution import Solution
+from ..optimal.violation import violation
 from ..simulation.simulate import spent
 from .attempts import Attempts
+from .continuation import Led, led
 from .free_variables import chosen, flown
 from .problem import PlanningProblem
 from .program.build import PlanProgram
@@ -29,6 +31,7 @@ from .round import Round
 from .settings import PlanSettings
 from .softening import softening_of
 
+LARGER_BOUND = "Solved_With_Larger_Bound"  # the status of a plan that explains a failed search
 OVERRUN = 0.1  # of a time limit: how far work after the search may exceed it
 
 
@@ -47,6 +50,8 @@ class Search:
         self.attempts = Attempts(model, settings, self.rule, before and before.attempts)
         self.softening = softening_of(problem, settings.guess)
         self.solver = settings.first_solver
+        self.led: Led | None = None
+        self.advice: str | None = None
 
     @property
     def stopped(self) -> str | None:
@@ -54,36 +59,79 @@ class Search:
         return self.attempts.stopped
 
     def _first(self, mesh: Mesh) -> Round:
-        """Return the best solution on a mesh, from all guesses, and more if these fail."""
-        settings, program = self.settings, self._program(mesh)
-        motion, near = self.attempts.given(self.problem)
+        """Return the best solution on a mesh: from the guesses, else by continuation, from the
+        nearest stored plan, from more guesses, or by IPOPT.
+        """
+        settings, program, attempts = self.settings, self._program(mesh), self.attempts
+        motion, near = attempts.given(self.problem)
         if near == "close":
-            solutions = [self.attempts.solved_near(program, motion, self.solver)]
+            solutions = [attempts.solved_near(program, motion, self.solver)]
         else:
-            solutions = [self.attempts.solved(program, motion, solver=self.solver)]
-        for k in range(1, settings.multi_start + settings.retries):
-            enough = k >= settings.multi_start and any(entry.success for entry in solutions)
-            if enough or self.attempts.is_stopped():
+            solutions = [attempts.solved(program, motion, solver=self.solver)]
+        for k in range(1, settings.multi_start):
+            if attempts.is_stopped():
                 break
-            pushed = self.attempts.pushed(self.problem, k)
-            solutions.append(self.attempts.solved(program, pushed, solver=self.solver))
-        if settings.solver == "auto" and not any(entry.success for entry in solutions):
-            self._try_ipopt(program, solutions)
-        best = min(solutions, key=lambda entry: (not entry.success, entry.value))
+            solutions.append(self._from_push(program, k))
+        if settings.retries and not self._is_done(solutions):
+            led_to = self._retried(program, mesh, solutions)
+            if led_to is not None:
+                return led_to
+        best = min(solutions, key=lambda entry: (not entry.success, self._cost(program, entry)))
         return self._round(program, best)
 
+    def _is_done(self, solutions: list[Solution]) -> bool:
+        return any(entry.success for entry in solutions) or self.attempts.is_stopped()
+
+    def _cost(self, program: PlanProgram, found: Solution) -> float:
+        """Return the objective of a solution; of a failure how much it violates."""
+        return found.value if found.success else violation(program.optimal, found.samples)
+
+    def _retried(self, program: PlanProgram, mesh: Mesh, solutions: list[Solution]) -> Round | None:
+        """Try further, and add what is found; return a round where a continuation leads to one."""
+        settings, attempts = self.settings, self.attempts
+        stored = attempts.nearest(self.problem)
+        if stored is not None:
+            solutions.append(attempts.solved_near(program, stored, self.solver))
+        if self._is_done(solutions) or settings.solver == "ipopt":
+            return None if self._is_done(solutions) else self._pushed_on(program, solutions)
+        found = led(attempts, self.problem, mesh, self.softening[0], self.motion)
+        if found is not None and found.bracket is None:
+            return self._round(found.program, found.solution)
+        self.led = found
+        self._pushed_on(program, solutions)
+        if not self._is_done(solutions) and found is None and settings.solver == "auto":
+            self._try_ipopt(program, solutions)
+        return None
+
+    def _pushed_on(self, program: PlanProgram, solutions: list[Solution]) -> None:
+        """Add what is found from further guesses, up to a first solution."""
+        first = self.settings.multi_start
+        for k in range(first, first + self.settings.retries):
+            if self._is_done(solutions):
+                return
+            solutions.append(self._from_push(program, k))
+
     def _try_ipopt(self, program: PlanProgram, solutions: list[Solution]) -> None:
-        """Add what IPOPT finds from the same guesses, up to its first solution."""
-        count = len(solutions)
-        for k in range(count):
-            if self.attempts.is_stopped():
+        """Add what IPOPT finds from the same guesses, up to a first solution."""
+        for k in range(self.settings.multi_start + self.settings.retries):
+            if self._is_done(solutions):
                 return
             motion = self.attempts.given(self.problem)[0]
             if k > 0:
                 motion = self.attempts.pushed(self.problem, k)
             solutions.append(self.attempts.solved(program, motion, solver="ipopt"))
-            if solutions[-1].success:
-                return
+
+    def _from_push(self, program: PlanProgram, k: int) -> Solution:
+        return self.attempts.solved(
+            program, self.attempts.pushed(self.problem, k), solver=self.solver
+        )
+
+    def motion(self, program: PlanProgram, found: Solution) -> GuessMotion:
+        """Return the motion of a solution, as a guess."""
+        motion = curve(program, found.samples)
+        model, problem = flown(self.model, self.problem, program, found.samples)
+        start = problem.q0, problem.v0
+        return GuessMotion(motion.duration, motion.at, start, model, program.mesh)
 
     def rounds(self) -> Iterator[Round]:
         """Make rounds on one first mesh after the other until a plan is true."""
@@ -92,7 +140,7 @@ class Search:
             self.softening = softening
             for last in self._rounds(mesh):
                 yield last
-            if self._is_true(last) or self.attempts.is_stopped():
+            if not last.solution.success or self.is_true(last) or self.attempts.is_stopped():
                 break
 
     def _rounds(self, mesh: Mesh) -> Iterator[Round]:
@@ -107,7 +155,7 @@ class Search:
                 break
             self.softening = self.softening[1:] or self.softening
             program = self._program(mesh)
-            motion = GuessMotion(last.curve.duration, last.curve.at, last.start, last.model)
+            motion = self.motion(last.program, last.solution)
             found = self.attempts.solved_near(program, motion, last.solution.solver)
             last = self._round(program, found)
             yield last
@@ -135,13 +183,13 @@ class Search:
             return 0.0
         return max(self._off(found), largest(found.excess)[0] / SLACK)
 
-    def _is_true(self, found: Round) -> bool:
+    def is_true(self, found: Round) -> bool:
         """Tell whether a round is solved and nothing in it is wrong."""
         return bool(found.solution.success and self._wrong(found) <= 1)
 
     def plan(self, best: Round, rounds: int, begun: tuple[float, float]) -> Plan:
         """Return the plan of a round; rounds: their number; begun: what ``read_clocks`` gave."""
-        success = self._is_true(best)
+        success = self.is_true(best) and self.advice is None
         trajectory = sampled(best.model, best.problem, best.curve)
         summary = {"success": success} | report(self, best, trajectory)
         summary |= {
@@ -149,7 +197,10 @@ class Search:
             "iterations": self.attempts.iterations,
             "guesses": self.attempts.count,
             "stopped": self.stopped,
+            "advice": self.advice,
         }
+        if self.advice is not None:
+            summary |= {"converged": False, "status": LARGER_BOUND}
         taken = spent(begun)
         whole = {"call_cpu_s": taken["cpu_seconds"], "wall_s": taken["seconds"]}
         return Plan(

@@ -1,7 +1,7 @@
 """How to search for a plan: settings of rule, mesh, solver and guesses, and their checks."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -22,6 +22,7 @@ WHOLE_NUMBERS = {  # least and most of each; beyond the most a search would not 
 }
 # None: the planner chooses
 CHOSEN = dict.fromkeys(("intervals", "most_intervals", "controls"), (1, 10_000))
+ROUGHLY = 10.0  # times the tolerances
 SOLVERS = ("auto", "fatrop", "ipopt")
 
 
@@ -40,12 +41,25 @@ class PlanSettings:
     solver: str
     options: dict[str, Any]
     time_limit: float | None  # s
-    guess: Any  # a Plan or a Trajectory
+    guess: Any  # a Plan, a Trajectory, or Plans of which one may help
     guess_damping: float  # N m s
     multi_start: int
     retries: int
     seed: int
     track: bool
+    through_torso: bool
+
+    def roughly(self, guess: Any) -> "PlanSettings":
+        """Return settings of a search that shows whether a problem has a plan, from a guess."""
+        rougher = {
+            name: None if most is None else ROUGHLY * most
+            for name, most in (
+                ("tolerance", self.tolerance),
+                ("tail_tolerance", self.tail_tolerance),
+                ("rate_tolerance", self.rate_tolerance),
+            )
+        }
+        return replace(self, guess=guess, retries=0, multi_start=1, track=False, **rougher)
 
     @property
     def first_solver(self) -> str:
@@ -81,8 +95,9 @@ def check_settings(model: Model, settings: PlanSettings, refused: Refusals) -> N
     refused.attempt("guess", _check_guess, model, settings.guess)
     damping = partial(number, error=PlanningError, least=0, most=HUGE)
     refused.attempt("guess_damping", damping, "guess_damping", settings.guess_damping)
-    if not isinstance(settings.track, bool | np.bool_):
-        refused.add("track", needed("track", settings.track, "True or False"))
+    for name in ("track", "through_torso"):
+        if not isinstance(getattr(settings, name), bool | np.bool_):
+            refused.add(name, needed(name, getattr(settings, name), "True or False"))
     refused.attempt("solver", one_of, "solver", settings.solver, SOLVERS, PlanningError)
     refused.attempt("degree", collocation_rule, settings.degree)
 
@@ -112,6 +127,12 @@ def _check_options(options: Any) -> None:
 def _check_guess(model: Model, guess: Any) -> None:
     """PlanningError unless the guess is None, or a motion of such a model."""
     if guess is None:
+        return
+    if isinstance(guess, tuple | list):
+        for k, each in enumerate(guess):
+            if not hasattr(each, "trajectory"):
+                raise PlanningError(f"guess[{k}]: value {shown(each)}: needs a Plan")
+            _check_guess(model, each)
         return
     motion = getattr(guess, "trajectory", guess)
     if not isinstance(motion, Trajectory):

@@ -12,7 +12,7 @@ from ..basics.checks import Refusals, needed, refusal, shown
 from ..basics.errors import PlanningError
 from ..model.model import Model
 from ..optimal.rules import MOST_DEGREE
-from ..planning.goal import GOALS, Bounds, Goal
+from ..planning.goal import GOALS, HALF_TURN, Bounds, Goal
 from ..planning.planner import plan
 from ..planning.problem import OBJECTIVES
 from ..planning.result.plan import Plan
@@ -48,7 +48,7 @@ GOAL = {
     "tail_rate": _or_free("rad/s"),
 }
 BOUNDS = {
-    "angle": _bound("rad"),
+    "angle": Key("rad", depth=1, words=(HALF_TURN, FREE), usual=False),
     "rate": _bound("rad/s"),
     "torque": _bound("N m"),
     "torque_rate": _bound("N m/s"),
@@ -90,6 +90,7 @@ PLAN = Key(
         "guess_damping": WORK,
         "time_limit": Key("s", usual=False),
         "track": Key(form={"type": "boolean"}),
+        "through_torso": Key(form={"type": "boolean"}),
     },
     needs=("start", "duration"),
 )
@@ -164,8 +165,7 @@ def arguments_but_start(
             refused.add(name, f"{where}.{name}: value {shown(table[name])}: {remedy}")
     rest = {name: value for name, value in table.items() if name not in CODE_ONLY}
     table = values_of(rest, PLAN, where, size, refused)
-    solver, options = table.get("solver", "ipopt"), table.get("options", {})
-    refused.attempt("solver", _check_solver, solver, options)
+    refused.attempt("options", _check_options, table.get("options", {}))
     if refused.lines:
         return {}
 
@@ -174,15 +174,14 @@ def arguments_but_start(
     if isinstance(goal, Mapping):
         goal = Goal(**{key: _free_parts(value) for key, value in goal.items()})
     arguments = {name: _unless_free(value) for name, value in table.items()}
-    return arguments | {"goal": goal, "bounds": Bounds(**table.get("bounds", {}))}
+    bounds = {name: _unless_free(value) for name, value in table.get("bounds", {}).items()}
+    return arguments | {"goal": goal, "bounds": Bounds(**bounds)}
 
 
-def _check_solver(solver: Any, options: Any) -> None:
-    """PlanningError for a solver that could load libraries, run code or write files."""
-    if not isinstance(solver, str) or not re.fullmatch("[a-z]+", solver):
-        raise refusal("plan.solver", solver, f"a name of a-z; {ELSEWHERE}", PlanningError)
+def _check_options(options: Any) -> None:
+    """PlanningError for an option that could load libraries, run code or write files."""
     for name, value in options.items() if isinstance(options, Mapping) else [("", options)]:
-        harmless = re.fullmatch(rf"{solver}\.(?!\w*(file|lib))\w+", name)
+        harmless = re.fullmatch(r"(ipopt|fatrop)\.(?!\w*(file|lib))\w+", name)
         if not harmless or not isinstance(value, int | float | str):
             needs = f"numbers and words of the solver, such as ipopt.max_iter; {ELSEWHERE}"
             raise refusal(f"plan.options.{name}".rstrip("."), value, needs, PlanningError)

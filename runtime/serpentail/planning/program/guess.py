@@ -11,6 +11,7 @@ from ...basics.attitude import sign_continuous
 from ...basics.errors import SimulationError
 from ...model.model import Model
 from ...motion.trajectory import Trajectory
+from ...optimal.mesh import Mesh
 from ...optimal.samples import MeshSamples
 from ...simulation.controllers.controller import TorqueTable
 from ..flight import State, flight
@@ -26,13 +27,14 @@ PUSH_WAVES = 3  # sines that it sums
 class GuessMotion:
     """A motion of a duration (s): at times (K,), s, blocks (K, size) in SI by name.
 
-    start: its state; model: what moves.
+    start: its state; model: what moves; mesh: that of a motion that a program has found.
     """
 
     duration: float
     at: Callable[[np.ndarray], dict[str, np.ndarray]]
     start: State
     model: Model
+    mesh: Mesh | None = None
 
 
 def passive(

@@ -80,7 +80,7 @@ class Plan:
     design: Mapping[str, Any] = field(default_factory=dict)
 
     def __repr__(self) -> str:
-        """At most six lines: whether it succeeded, what it costs, and how true it is."""
+        """At most seven lines: whether it succeeded, what it costs, and how true it is."""
         told, model = self.report, self.trajectory.model
         moved = model.tail_words() if model else "without its model"
         ended = "success" if self.success else f"no success ({told['status']})"
@@ -97,6 +97,7 @@ class Plan:
                 f"{told['rounds']} rounds, {told['iterations']} iterations; processor time "
                 f"{told['call_cpu_s']:.3g} s, of it {told['solve_cpu_s']:.3g} s in the solver",
                 *([f"design: {chosen}"] if chosen else []),
+                *([str(told["advice"])] if told.get("advice") else []),
             ]
         )
 
