@@ -234,7 +234,7 @@ def test_models_and_plans_that_do_not_fit_are_refused(plan):
     for words, model, planned in (
         ("plan: value", rat(), plan.trajectory),
         ("2 tail coordinates, the model 4", longer, plan),
-        ("attitude is 'euler'", rat(), plan_of(attitude="euler")),
+        ("float", zoo.model("single"), plan),
         ("compiled=False", st.load(zoo.folder("m1_n3"), compiled=False), plan),
     ):
         with row(words), pytest.raises(st.PlanningError, match=words):

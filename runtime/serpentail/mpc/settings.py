@@ -82,11 +82,6 @@ def refuse_unable(model: Model, plan: Plan) -> None:
         raise PlanningError("Mpc: the model was loaded with compiled=False: load it again with C")
     if not isinstance(plan, Plan):
         raise PlanningError(f"Mpc: plan: value {shown(plan)}: needs what st.plan returns")
-    if plan.problem.attitude != "quaternion":
-        raise PlanningError(
-            f"Mpc: the plan's attitude is {plan.problem.attitude!r}: plan it with "
-            "attitude='quaternion'"
-        )
     tail = plan.curve.starts["tail"].shape[1]
     if tail != model.layout.nt:
         raise PlanningError(
