@@ -1,25 +1,23 @@
-"""Plans by FATROP on stages: the optima of IPOPT on the transcription, which shares nothing with
-the stages but the model; and tails of many kinds, also under predictive control.
+"""Plans by FATROP on stages: the optima of a plain program, which shares only the model with them,
+and of IPOPT; and tails of many kinds, also under predictive control.
 """
 
 from dataclasses import replace
 from types import SimpleNamespace
 
+import casadi as ca
 import numpy as np
 import pytest
 
 import serpentail as st
 from examples import righting
 from serpentail.basics.attitude import tilt_deg
-from serpentail.planning.backends import STAGED
-from serpentail.planning.free_variables import start_blocks
-from serpentail.planning.nlp.bounds import limits
-from serpentail.planning.nlp.equations import equations_of_motion
-from serpentail.planning.nlp.solver import solve, solver
-from serpentail.planning.nlp.transcription import transcription_of
+from serpentail.optimal import fatrop
+from serpentail.optimal.rules import collocation_rule
+from serpentail.planning.attempts import Attempts
+from serpentail.planning.program.build import plan_program
 from serpentail.planning.result.truth import planned_torques
-from serpentail.planning.staged import fatrop
-from serpentail.planning.staged.stages import stages_of
+from tests.references.flight_program import FlightProblem, solved
 from tests.support import zoo
 from tests.support.rows import row
 from tests.support.tumbling import AGAIN, DURATION, integrated, rat, start
@@ -32,14 +30,28 @@ PROBLEMS = {
     "given attitude": {"goal": st.Goal(attitude=(1.0, 0.0, 0.0, 0.1), torso_rate=None)},
     "tail": {"goal": st.Goal(torso_rate=None, tail=(0.1, None), tail_rate=(None, 0.0))},
     "rates": {"bounds": st.Bounds(angle=np.pi / 3, rate=(12.0, 15.0))},
-    "no bounds": {"bounds": st.Bounds(torque=None)},
+    "no bounds": {"bounds": st.Bounds(angle=None, torque=None)},
     "damping": {"damping": 1e-4},
     "no smoothing": {"smoothing": 0.0},
 }
-# IPOPT does not solve one of the start 1: bounds have multipliers of 400 and more. Some that tell
-# less than others are of the slow starts alone.
-LEFT_OUT = {("given attitude", 1), ("any rate", 0), ("no bounds", 0), ("no smoothing", 0)}
 SLOW = pytest.mark.slow
+STEEP = st.Bounds(angle=np.pi / 3, torque_rate=0.1)
+WITHIN = ((lambda point: point.tail_rate[0], -4.0, 9.0), (lambda point: point.tip, -2.0, 2.0))
+RICHER = {
+    "path": {"path": WITHIN, "duration": (0.3, 0.5)},
+    "torque rates": {"bounds": STEEP},
+    "own objective": {
+        "objective": lambda point: ca.sumsqr(point.torque / 1e-3) + point.tail[0] ** 2
+    },
+    "design": {"design": {"tail_length": (0.08, 0.25)}},
+    "free start": {"free_start": {"tail": (-0.5, 0.5), "tail_rate": (-6.0, 6.0)}},
+    "all": {
+        "path": WITHIN,
+        "bounds": STEEP,
+        "design": {"tail_mass": (0.003, 0.004)},
+        "free_start": {"tail": (-0.3, 0.3)},
+    },
+}
 
 
 def planned(problem: dict, seed: int = 0, model: st.Model | None = None, **settings) -> st.Plan:
@@ -48,37 +60,55 @@ def planned(problem: dict, seed: int = 0, model: st.Model | None = None, **setti
     return st.plan(model, **given | problem | settings)
 
 
-def conserved(plan: st.Plan) -> np.ndarray:
-    h = plan.model.momentum(plan.problem.q0, plan.problem.v0)[1]
-    return np.concatenate([h, np.zeros(7)])
-
-
-def check_optimum(near: st.Plan, seed: int = 0, rel: float = 1e-8) -> None:
-    """IPOPT solves to a tolerance of 1e-11, torques guarded everywhere; FATROP goes on from there,
-    a little away, and comes back.
-    """
-    model = near.model
-    mesh = replace(near.mesh, guarded=np.ones(near.mesh.intervals, bool))
-    nlp = transcription_of(model, near.problem, mesh, near.rule, equations_of_motion(model))
-    engine = solver(nlp, "ipopt", {"ipopt.tol": 1e-11}, "close")
-    bounds = limits(nlp, start_blocks(near.problem), np.zeros(3))
-    wanted = solve(engine, bounds, near.solution.w, conserved(near))
-    assert near.report["converged"] and wanted.success
-    stages = stages_of(model, near.problem, near.mesh, near.rule)
-    w = wanted.w * (1 + 1e-6 * np.random.default_rng(seed).normal(size=wanted.w.size))
-    engine = fatrop.engine_of({}, "close")
-    found = fatrop.solve_stages(stages, start_blocks(near.problem), w, conserved(near), engine)
-    assert found.success, found.status
-    assert found.value == pytest.approx(wanted.value, rel=rel)
-    np.testing.assert_allclose(found.w, wanted.w, atol=1e-4)
+def check_optimum(plan: st.Plan) -> None:
+    """A plain program, which begins at the plan, ends there."""
+    own = plan.problem
+    terms = own.goal, own.duration, own.bounds, own.damping, own.smoothing
+    wanted = solved(plan.model, FlightProblem(plan.start, *terms), plan)
+    assert plan.report["converged"] and plan.report["solver"] == "fatrop"
+    assert plan.report["objective"] == pytest.approx(wanted.objective, rel=1e-6)
+    assert plan.duration == pytest.approx(wanted.duration, rel=1e-6)
+    np.testing.assert_allclose(plan.curve.nodes["torque"], wanted.torques, atol=5e-8)
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=SLOW) for k in (1, 2))])
-def test_optima_are_those_of_ipopt(seed):
+def test_optima_are_those_of_a_plain_program(seed):
     for name, problem in PROBLEMS.items():
-        if (name, seed) not in LEFT_OUT:
-            with row(name):
-                check_optimum(planned(problem, seed, solver="ipopt", intervals=8), seed)
+        with row(name):
+            check_optimum(planned(problem, seed, intervals=8))
+
+
+@pytest.mark.parametrize("name", RICHER)
+def test_optima_are_those_of_ipopt(name):
+    """On the same stages, from a plan that was found from afar."""
+    asked, found = RICHER[name], []
+    far = planned(asked, intervals=8)
+    for solver in ("fatrop", "ipopt"):
+        plan = planned(asked, intervals=8, solver=solver, guess=far)
+        assert plan.report["converged"] and plan.report["solver"] == solver
+        found.append(plan)
+    ours, theirs = found
+    assert ours.report["objective"] == pytest.approx(theirs.report["objective"], rel=1e-6)
+    found, wanted = (each.solution.samples for each in found)
+    np.testing.assert_allclose(found.states, wanted.states, atol=1e-4)
+    np.testing.assert_allclose(found.constants, wanted.constants, atol=1e-4)
+
+
+def test_goals_are_met_however_large_an_objective_is():
+    for solver in ("fatrop", "ipopt"):
+        asked = {"objective": lambda point: 1e6 * ca.sumsqr(point.torque / 1e-3)}
+        end = planned(asked, intervals=6, solver=solver).trajectory
+        with row(solver):
+            np.testing.assert_allclose(end.v[-1, 3:6], 0, atol=1e-6)
+            assert tilt_deg(end.q[-1, 3:7]) < 1e-5
+
+
+def test_auto_is_fatrop_and_ipopt_where_that_fails():
+    few = {"options": {"fatrop.max_iter": 1}, "intervals": 6}
+    plans = [planned(few, solver=solver, retries=1) for solver in ("auto", "fatrop")]
+    assert [plan.report["converged"] for plan in plans] == [True, False]
+    assert [plan.report["solver"] for plan in plans] == ["ipopt", "fatrop"]
+    assert planned({}, solver="auto", intervals=6).report["solver"] == "fatrop"
 
 
 def test_least_time_and_energy_are_found():
@@ -104,12 +134,11 @@ def test_plans_are_true_keep_their_bounds_between_nodes_and_are_guesses():
     assert again["objective"] == pytest.approx(fresh.report["objective"], rel=1e-6)
     assert planned({}, guess=fresh, solver="ipopt").report["converged"]  # takes it, too
     # one without collocation is returned
-    p, engine = conserved(fresh), fatrop.engine_of({}, "close")
-    p[:3] = 1e6
-    stages = stages_of(rat(), fresh.problem, fresh.mesh, fresh.rule)
-    found = fatrop.solve_stages(stages, start_blocks(fresh.problem), fresh.solution.w, p, engine)
+    program = plan_program(rat(), fresh.problem, fresh.mesh, fresh.rule, 0.0).optimal
+    node = replace(program.node, arrays=program.node.arrays | {"momentum": np.full(3, 1e6)})
+    found = fatrop.solve(replace(program, node=node), fresh.solution.samples, "close", {})
     assert (found.success, found.status) == (False, "No_Collocation_Of_Guess")
-    np.testing.assert_array_equal(found.w, fresh.solution.w)
+    assert found.samples is fresh.solution.samples
 
 
 def test_torques_have_a_coarser_mesh_than_states():
@@ -126,7 +155,7 @@ def test_torques_have_a_coarser_mesh_than_states():
 
 
 def test_first_meshes_are_finer_for_longer_tails():
-    nothing = dict.fromkeys(("intervals", "controls", "most_intervals"))
+    nothing = dict.fromkeys(("guess", "intervals", "controls", "most_intervals"))
     for segments, given, intervals, controls in (
         (1, {}, [12, 144], 12),
         (1, {"intervals": 6}, [6], 6),
@@ -137,8 +166,8 @@ def test_first_meshes_are_finer_for_longer_tails():
         (5, {}, [144], 12),
     ):
         settings = SimpleNamespace(**nothing | given)
-        search = SimpleNamespace(model=SimpleNamespace(segments=segments), settings=settings)
-        meshes = STAGED.meshes(search)
+        model = SimpleNamespace(segments=segments)
+        meshes = Attempts(model, settings, collocation_rule()).meshes()
         with row(segments, given):
             assert [mesh.intervals for mesh in meshes] == intervals
             assert {mesh.controls[-1] + 1 for mesh in meshes} == {controls}
@@ -160,10 +189,9 @@ def test_a_search_that_fails_begins_again_from_a_finer_mesh():
 def test_tails_of_all_kinds_are_planned_and_controlled(name):
     """Springs and stops; links and arcs of their own on tilted mounts; both."""
     model, goal = zoo.model(name), {"goal": st.Goal(torso_rate=None), "intervals": 10}
-    near = planned(goal, model=model, solver="ipopt")
     plan = planned(goal, model=model, track=name == "elastic")
-    assert near.report["dynamics"] == "compiled"
-    check_optimum(near, rel=2e-7)
+    assert plan.report["dynamics"] == "compiled"
+    check_optimum(plan)
     assert plan.report["converged"] and plan.report["open_loop_attitude_error_deg"] < 1.0
     assert name != "elastic" or plan.report["tracked_attitude_error_deg"] < 0.5
 
@@ -171,7 +199,7 @@ def test_tails_of_all_kinds_are_planned_and_controlled(name):
     v[3:6] += 0.1, -0.06, 0.12
     flights = [
         st.simulate(model, q, v, controller=law, t_span=DURATION)
-        for law in (st.TorqueCurve(planned_torques(near.curve)), st.Mpc(model, near))
+        for law in (st.TorqueCurve(planned_torques(plan.curve)), st.Mpc(model, plan))
     ]
     off, left = (float(tilt_deg(flight.q[-1, 3:7])) for flight in flights)
     assert off > max(1.0, 10 * left)

@@ -45,7 +45,6 @@ CLOSE_OPTIONS: dict[str, Any] = {
     "ipopt.bound_frac": 1e-6,
 }
 GUESS_OPTIONS: dict[str, dict[str, Any]] = {"far": {}, "close": CLOSE_OPTIONS}
-GIVE = 1e8  # twice what squares of the goal's rows cost
 
 
 class _Sparse:
@@ -108,10 +107,11 @@ class _Sparse:
         )
         return blocks[self.upper] * np.nan if failed else blocks[self.upper]
 
-    def limits(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return least and most of the constraints."""
+    def limits(self, goal: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return least and most of the constraints; goal: number of its rows, which give nothing."""
         least, most = np.zeros((2, self.rows))
         self.code.sparse_limits(self.program, least.ctypes.data, most.ctypes.data)
+        least[self.rows - goal :] = most[self.rows - goal :] = 0.0
         return least, most
 
 
@@ -226,7 +226,7 @@ def solve(
     states = begin.states[1:].reshape(problem.mesh.intervals, len(problem.rule.nodes), -1)
     nodes = np.ascontiguousarray(states).copy()
     crew = crew_of(problem, most_threads)
-    with in_c(OcpInC(problem, GIVE, 1.0)) as program, helped(kernel(), program, crew - 1):
+    with in_c(OcpInC(problem, 0.0, 1.0)) as program, helped(kernel(), program, crew - 1):
         kernel().program_guess(program, nodes.ctypes.data)
         sparse = _Sparse(program)
         functions = _functions(sparse)
@@ -237,7 +237,7 @@ def solve(
             raise PlanningError(
                 f"options: value {shown(dict(asked))}: ipopt refuses them: {_reason(error)}"
             ) from error
-        least, most = sparse.limits()
+        least, most = sparse.limits(0 if problem.at_end is None else problem.at_end.rows)
         with one_thread():
             found = engine(x0=w, lbg=least, ubg=most, p=np.zeros((0, 0)))
         stats, w_found = engine.stats(), np.array(found["x"]).ravel()
