@@ -14,7 +14,7 @@ from serpentail.planning.design import checked_design
 from serpentail.planning.program.body import BodyFunctions
 from tests.support import zoo
 from tests.support.rows import row
-from tests.support.tumbling import AGAIN, DURATION, integrated, rat, start
+from tests.support.tumbling import AGAIN, integrated, rat, start
 
 RANGE, RATES = (0.08, 0.25), 6.0  # m, rad/s
 LENGTH = {"design": {"tail_length": RANGE}}

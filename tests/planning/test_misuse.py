@@ -19,16 +19,16 @@ from tests.support.tumbling import AGAIN, DURATION, rat, start
 NAN, INF = float("nan"), float("inf")
 Goal, Bounds = st.Goal, st.Bounds
 RANGE = {"tail_length": (0.08, 0.25)}
-FATROP = {"solver": "fatrop"}
 VALUES = {"start": 3, "duration": 0, "bounds": 0.02, "goal": 3, "objective": "least"}
-VALUES |= {"formulation": "euler", "attitude": "matrix", "damping": -1e-3, "smoothing": "none"}
-VALUES |= {"path": None, "rule": "radaw", "intervals": 0, "most_intervals": 0}
+VALUES |= {"damping": -1e-3, "smoothing": "none"}
+VALUES |= {"path": None, "intervals": 0, "most_intervals": 0}
 VALUES |= {"controls": 2.5, "rounds": -1, "multi_start": 0, "retries": True, "seed": -1}
 VALUES |= {"tolerance": 0.0, "tail_tolerance": 0.0, "rate_tolerance": "x", "time_limit": 0}
-VALUES |= {"guess": 3, "guess_damping": -1, "track": 1, "dynamics": "c", "watch": 3}
+VALUES |= {"guess": 3, "guess_damping": -1, "track": 1, "watch": 3}
 VALUES |= {"solver": "no_such", "options": 3}
-GOALS = {"attitude": "up", "torso_rate": (0, 0), "turns": (1, 2, 3), "tail": ("1", None)}
+GOALS = {"attitude": "up", "torso_rate": (0, 0), "tail": ("1", None)}
 BOUNDS = {"torque": 0, "angle": (1, 2, 3)}
+GONE = ("formulation", "attitude", "rule", "dynamics")
 PROBLEM = {
     r"start\[0\]: ": {"start": (np.ones(8), np.zeros(8))},
     r"start\[0\]: .*needs 9 numbers": {"start": (np.ones(10), np.zeros(8))},
@@ -67,36 +67,24 @@ PROBLEM = {
     r"path\[0\]: the start has .*entry": {"path": [(lambda p: p.tail, 0.5, 1)]},
     r"path\[0\]: the start has 0.3, ": {"path": [(lambda p: p.position[2], 0, 0.2)]},
     r"path\[1\]: the start": {"path": [(lambda p: p.tail[0], -9, 9), (lambda p: p.time, 0.1, 1)]},
-    "degree: value 0": {"rule": "radau", "degree": 0},
-    "degree: value 6": {"rule": "radau", "degree": 6},  # one too many
-    "degree: value 2.0": {"rule": "radau", "degree": 2.0},
-    "degree: value 3": {"rule": "trapezoidal", "degree": 3},
+    "degree: value 0": {"degree": 0},
+    "degree: value 6": {"degree": 6},  # one too many
+    "degree: value 2.0": {"degree": 2.0},
     "setting: value 'num_nodes': .*'intervals'": {"num_nodes": 59},
     "setting: value 'interval': .*'intervals'": {"interval": 20},
     "solver: value 'ipotp': .*'ipopt'": {"solver": "ipotp"},
-    "options: .*'ipopt.no_such'": {"options": {"ipopt.no_such": 1}},
-    "options: .*did you mean .ipopt.max_iter": {"options": {"max_iter": 5}},
-    "dynamics: value 'compiled'": {"dynamics": "compiled", "design": RANGE},
+    "options: .*'ipopt.no_such'": {"options": {"ipopt.no_such": 1}, "solver": "ipopt"},
+    "options: 'max_iter': .*begins with 'fatrop.' or 'ipopt.'": {"options": {"max_iter": 5}},
+    "options: 'knitro.x': ": {"options": {"knitro.x": 5}},
+    **{f"setting: value {name!r}": {name: "x"} for name in GONE},
 }
-OPTIONS = {"max_iter": 5, "fatrop.max_itr": 5, "ipopt.max_iter": 5}
-OPTIONS |= {"fatrop.max_iter": "5", "fatrop.mu_init": NAN}
-LACKS = {  # what FATROP's stages do not have
-    "formulation is 'full'": {"formulation": "full"},
-    "attitude is 'euler'": {"attitude": "euler"},
-    "rule is 'lobatto'": {"rule": "lobatto"},
-    "objective is a function": {"objective": lambda point: point.tail[0] ** 2},
-    "path or clearance is given": {"path": ((lambda point: point.height, 0.0, INF),)},
-    "bounds.torque_rate is given": {"bounds": Bounds(torque_rate=1.0)},
-    "fatrop.*free_start is given": {"free_start": {"tail": (-0.5, 0.5)}},
-    "fatrop.*design is given": {"design": RANGE},
-}
+OPTIONS = {"fatrop.max_itr": 5, "fatrop.max_iter": "5", "fatrop.mu_init": NAN}
 FREE_VALUES = {"tail": 0.1, "tail_rate": (1, 0), "velocity": (1, 1)}
 FREE = {
     "free_start: value 3": 3,
     "free_start: part: value 'tails': .*'tail'": {"tails": (0, 1)},
     "free_start.position: value .0, 0, 0, 0.": {"position": ((0, 0, 0, 0), 1)},
     "free_start.torso_rate: value inf": {"torso_rate": (0, INF)},
-    "free_start.attitude: ": {"attitude": (0, 1)},
     "bounds.angle: the start's tail coordinate 0": {"tail": (1.2, 1.3)},
 }
 SMALL, LARGE = (1e-5, 1e-5, 1e-5), (1e-5, 1e-5, 3e-5)
@@ -137,9 +125,7 @@ def test_what_is_wrong_is_named():
     for words, changes in PROBLEM.items():
         refused(words, **changes)
     for name, value in OPTIONS.items():
-        refused(f"'{name}'|{name}: value {value!r}", options={name: value}, **FATROP)
-    for words, changes in LACKS.items():
-        refused(words, **FATROP | changes)
+        refused(f"'{name}'|{name}: value {value!r}", options={name: value})
 
 
 def test_wrong_ranges_are_named():
@@ -208,7 +194,7 @@ def test_bounds_and_durations_may_have_units_and_slips_of_units_give_a_warning()
 
 
 def test_models_that_lack_functions_are_refused():
-    """A scene without derivatives takes the symbolic dynamics, unless that is refused."""
+    """A scene without derivatives takes the symbolic dynamics."""
     names = ["mass_matrix", "inverse_dynamics", "forward_dynamics", "rollout", "energy", "momentum"]
     model = st.load(model_folder(1, 1, functions=names))  # the list of functions is the point
     given = AGAIN | {"start": start(model), "intervals": 4, "track": True}
@@ -222,8 +208,6 @@ def test_models_that_lack_functions_are_refused():
     for body, error, words, changes in (
         (zoo.model("bare"), st.ModelError, "'inverse_dynamics'", {}),
         (zoo.model("fixed"), st.ModelError, "fixed", {}),
-        (model, st.ModelError, "generated without", {"dynamics": "compiled"}),
-        (model, st.PlanningError, "lacks airborne_rates, ", FATROP),
         (model, st.PlanningError, "'tip'", {"path": path}),
     ):
         with row(words), pytest.raises(error, match=words):
@@ -235,7 +219,7 @@ def test_models_that_lack_functions_are_refused():
 def test_goal_that_cannot_be_reached_is_flagged():
     q, v = start(rat())
     v[3] = 60.0  # rad/s, far too fast for the time and torques given
-    settings = {"retries": 0, "options": {"ipopt.max_iter": 60}, "duration": 0.1}
+    settings = {"retries": 0, "options": {"fatrop.max_iter": 60}, "duration": 0.1}
     settings["bounds"] = Bounds(angle=np.pi / 3, torque=1e-4)
     plan = st.plan(rat(), start=(q, v), **settings)
     assert not plan.success and not plan.report["converged"]

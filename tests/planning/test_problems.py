@@ -9,9 +9,8 @@ import pytest
 import serpentail as st
 from serpentail.basics.attitude import angle_deg, from_angles, rotation_matrix
 from serpentail.planning.momentum import refuse_impossible
-from serpentail.planning.nlp.coordinates import Attitude
-from serpentail.planning.nlp.node import PARAMETERS, _point, variables_of
-from serpentail.planning.nlp.start import shared_of
+from serpentail.planning.program.build import plan_program
+from serpentail.planning.result.excess import path_values
 from serpentail.planning.result.full_state import com_at_start, full_state
 from tests.support import zoo
 from tests.support.posed import posed
@@ -43,7 +42,7 @@ def test_plans_of_least_time_and_energy_from_passive_flight():
     np.testing.assert_allclose(middles, sum(outer) / 2, atol=1e-8)  # straight
 
     # |power| has a kink: its rounding is lowered from round to round
-    settings |= {"start": start(rat(), 2), "duration": (0.3, 0.5)}
+    settings |= {"start": start(rat(), 2), "duration": (0.3, 0.5), "intervals": 36}
     settings["bounds"] = st.Bounds(angle=np.pi / 3)
     plan, calm = (st.plan(rat(), objective=name, **settings) for name in ("energy", "effort"))
     assert plan.success and calm.success
@@ -63,14 +62,11 @@ def test_rate_bounds_hold_at_the_nodes():
 def test_goals_of_the_tail_and_of_a_whole_attitude():
     wanted = from_angles(np.array([0.1, -0.05, 0.2]))
     goal = st.Goal(attitude=wanted, torso_rate=None, tail=(0.1, None), tail_rate=(None, 0.0))
-    for coordinates in ("quaternion", "euler"):
-        given = AGAIN | COARSE | {"start": start(rat()), "attitude": coordinates}
-        plan = st.plan(rat(), goal=goal, **given)
-        end = plan.trajectory
-        with row(coordinates):
-            assert plan.report["converged"] and angle_deg(end.attitude[-1], wanted) < 1e-5
-            assert end.tail[-1, 0] == pytest.approx(0.1, abs=1e-7)
-            assert end.v[-1, 7] == pytest.approx(0, abs=1e-6)
+    plan = st.plan(rat(), goal=goal, **AGAIN | COARSE | {"start": start(rat())})
+    end = plan.trajectory
+    assert plan.report["converged"] and angle_deg(end.attitude[-1], wanted) < 1e-5
+    assert end.tail[-1, 0] == pytest.approx(0.1, abs=1e-7)
+    assert end.v[-1, 7] == pytest.approx(0, abs=1e-6)
 
 
 def test_effort_counts_rates_as_torques_of_a_damper():
@@ -118,38 +114,47 @@ def test_path_constraints_of_several_sizes_keep_their_own_bounds():
     assert both.report["bound_excess"] == pytest.approx(alone.report["bound_excess"], abs=0.02)
 
 
-def test_points_are_the_models():
-    """What paths see; of a scaled quaternion, too: a solver's iterates have any norm."""
-    names = ("duration", "time", "center_of_mass", "position", "height", "tail_points", "tip")
-    model, coordinates, times = rat(), Attitude("quaternion"), np.linspace(0, DURATION, 7)
-    for formulation in ("airborne", "translation-free", "full"):
-        plan = planned(formulation=formulation, **COARSE)
-        variables = variables_of(formulation, coordinates, 2, np.ones(2))
-        zeta = casadi.SX.sym("zeta", 1 + sum(variables.sizes()))
-        p = casadi.SX.sym("p", PARAMETERS + 1)
-        point = _point(shared_of(model, zeta, p, variables), zeta, p, variables, coordinates)
-        function = casadi.Function("point", [zeta, p], [getattr(point, name) for name in names])
+POINT = ("duration", "time", "torso_rate", "drift", "center_of_mass")
+POINT += ("position", "height", "tail_points", "tip")  # what paths see, with their torques
 
-        blocks, state = plan.curve.at(times), plan.start
-        q, v = full_state(model, state, coordinates, times, blocks)
-        com = com_at_start(model, state)
-        units = variables.units | {"attitude": 1 / 1.7, "torque": 1.0}
-        parts = [name for name, _ in (*variables.states, *variables.algebraic)]
-        columns = [blocks[name] / units[name] for name in [*parts, "torque"]]
-        unknowns = np.column_stack([np.full(7, DURATION), *columns])
-        known = np.concatenate([np.zeros(3), *com, [0.0]])
-        given = np.column_stack([np.tile(known, (7, 1)), times / DURATION])
-        found = [function(*pair) for pair in zip(unknowns, given, strict=True)]
-        found = zip(*(function(*pair) for pair in zip(unknowns, given, strict=True)), strict=True)
-        fall = model.momentum(q, v)[0][0] / (0.10572 + 0.00351) * times[:, None]
-        fall[:, 2] -= 9.8 * times**2 / 2
-        tail = model.tail_points(q)
-        wanted = (np.full(7, DURATION), times, com[0] + fall, q[:, :3], q[:, 2], tail, tail[:, -1])
-        for name, own, of_model in zip(names, found, wanted, strict=True):
-            atol = 1e-5 if name == "center_of_mass" else 1e-9
-            with row(formulation, name):
-                of_point = np.array([np.array(each) for each in own]).squeeze()
-                np.testing.assert_allclose(of_point, of_model, atol=atol)
+
+def seen(point):
+    parts = [getattr(point, name) for name in POINT]
+    return casadi.vertcat(*(casadi.vec(casadi.SX(part).T) for part in (*parts, point.torque)))
+
+
+@pytest.mark.parametrize(
+    "free",
+    [
+        {},
+        {"design": {"tail_length": (0.08, 0.25)}},
+        {"free_start": {"tail": (-0.5, 0.5), "velocity": (-3, 3), "position": (-1, 1)}},
+    ],
+)
+def test_points_are_the_models(free):
+    """Of a scaled quaternion, too: a solver's iterates have any norm."""
+    few = COARSE | {"duration": DURATION, "path": ((seen, -500.0, 500.0),), "track": False}
+    plan = st.plan(rat(), start=start(rat()), **few | free)
+    program = plan_program(rat(), plan.problem, plan.mesh, plan.rule, 0.0)
+    model, state, times = plan.model, plan.start, np.linspace(0, DURATION, 7)
+    blocks = plan.curve.at(times)
+    q, v = full_state(model, state, times, blocks)
+    scaled = blocks | {"attitude": 1.7 * blocks["attitude"]}
+    found = path_values(program, plan.solution.samples, times, scaled, state)
+
+    masses, com = model.parameters, com_at_start(model, state)
+    fall = model.momentum(q, v)[0] / (masses["torso_mass"] + masses["tail_mass"])
+    flown = com[0] + com[1] * times[:, None] - np.outer(9.8 * times**2 / 2, [0, 0, 1])
+    own = np.einsum("kji,kj->ki", rotation_matrix(q[:, 3:7]), v[:, :3] - fall)
+    tail = model.tail_points(q)
+    wanted = (np.full(7, DURATION), times, v[:, 3:6], own, flown)
+    wanted += (q[:, :3], q[:, 2], tail, tail[:, -1], blocks["torque"])
+    columns = [np.reshape(part, (7, -1)) for part in wanted]
+    parts = np.split(found, np.cumsum([part.shape[1] for part in columns])[:-1], axis=1)
+    assert plan.report["converged"]
+    for name, ours, models in zip((*POINT, "torque"), parts, columns, strict=True):
+        with row(name):
+            np.testing.assert_allclose(ours, models, atol=1e-9)
 
 
 def test_goals_that_the_conserved_momentum_forbids_are_refused_and_no_others():

@@ -6,16 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicHermiteSpline
 
 import serpentail as st
 from serpentail.basics.attitude import angle_deg
-from serpentail.planning.nlp.coordinates import attitude
 from serpentail.planning.result import report as result_report
 from serpentail.planning.result.full_state import full_state
 from serpentail.planning.result.truth import local_errors, open_loop
 from tests.support import zoo
 from tests.support.rows import row
-from tests.support.tumbling import AGAIN, DURATION, integrated, planned, rat, rate, start
+from tests.support.tumbling import AGAIN, DURATION, TIGHT, integrated, planned, rat, rate, start
 
 
 def dense(plan, count=4001):
@@ -23,14 +23,19 @@ def dense(plan, count=4001):
     return times, plan.torque(times)
 
 
-def test_plans_of_all_formulations_reach_the_goal_in_truth():
-    """They are one optimum, and their ends those of an independent integration."""
-    forms = ("airborne", "quaternion"), ("translation-free", "quaternion"), ("full", "euler")
-    for formulation, coordinates in forms:
-        plan = planned(formulation=formulation, attitude=coordinates, guess=planned())
+def test_plans_reach_the_goal_in_truth():
+    """Compiled dynamics and that of CasADi's operations: one optimum, and its end by an independent
+    integration.
+    """
+    tail = start(rat())[0][7:]
+    free = {"free_start": {"tail": (tail - 1e-6, tail + 1e-6)}}
+    for solver, asked in (("fatrop", {}), ("ipopt", {}), ("fatrop", free)):
+        given = {"start": start(rat()), "duration": DURATION, **TIGHT, "guess": planned()}
+        plan = st.plan(rat(), **given, solver=solver, **asked)
         report, end, (q, v) = plan.report, plan.trajectory, integrated(rat(), plan)
-        with row(formulation, coordinates):
-            assert plan.success and report["converged"] and report["dynamics"] == "compiled"
+        with row(solver, *asked):
+            assert plan.success and report["converged"] and report["solver"] == solver
+            assert report["dynamics"] == ("symbolic" if asked else "compiled")
             assert report["open_loop_attitude_error_deg"] <= 0.01
             assert st.pitch_roll_yaw(end.q[-1])[:2] == pytest.approx([0, 0], abs=1e-6)
             np.testing.assert_allclose(end.v[-1, 3:6], 0, atol=1e-6)
@@ -52,8 +57,7 @@ def test_airborne_plans_conserve_momentum_and_move_as_fast_as_they_say():
     np.testing.assert_allclose(fall, flight.t[:, None] * [0, 0, -weight], atol=1e-12)
     times, origin = np.linspace(0.01, DURATION - 0.01, 7), (problem.q0, problem.v0)
     (behind, _), (_, v), (ahead, _) = (
-        full_state(rat(), origin, attitude("quaternion"), t, curve.at(t))
-        for t in (times - h, times, times + h)
+        full_state(rat(), origin, t, curve.at(t)) for t in (times - h, times, times + h)
     )
     np.testing.assert_allclose((ahead - behind)[:, :3] / (2 * h), v[:, :3], atol=2e-3)
     assert flight.t[-1] == pytest.approx(DURATION)
@@ -92,55 +96,65 @@ def test_errors_of_tracking_are_those_of_a_simulation_that_tracks(monkeypatch):
     monkeypatch.setattr(result_report, "tracked", timed)
     given = AGAIN | {"start": start(model), "intervals": 8, "track": True}
     told = st.plan(model, **given).report
-    assert spent[0] < 0.1 * told["call_cpu_s"] and told["solve_cpu_s"] < told["call_cpu_s"]
+    assert told["solve_cpu_s"] < told["call_cpu_s"]
     flight = result_report.flight
     by_scipy = {"method": "dop853"}
     monkeypatch.setattr(result_report, "flight", lambda *of, **how: flight(*of, **how | by_scipy))
     plan = st.plan(model, **given)
+    assert spent[0] < 0.2 * spent[1]
     for name in ("tracked_attitude_error_deg", "tracked_tail_error_rad", "dyn_err"):
         assert told[name] == pytest.approx(plan.report[name], rel=0.03), name
     law = st.Pfl(model, plan, torque=plan.problem.bounds.torque)
-    how = {"t_span": DURATION, "method": "dop853", "rtol": 1e-9, "output_step": 1e-4}
+    how = {"t_span": DURATION, "method": "dop853", "rtol": 1e-10, "output_step": 1e-3}
     run = st.simulate(model, *start(model), controller=law, **how)
-    tail = np.column_stack([np.interp(plan.trajectory.t, run.t, angle) for angle in run.tail.T])
+    tail = CubicHermiteSpline(run.t, run.tail, run.v[:, 6:])(plan.trajectory.t)
     error = np.abs(tail - plan.trajectory.tail).max()
-    assert told["tracked_tail_error_rad"] == pytest.approx(error, rel=0.01)
+    assert told["tracked_tail_error_rad"] == pytest.approx(error, rel=0.05)
 
 
 def test_bounds_and_paths_hold_between_nodes():
-    """The first round goes beyond them, and says so; the last does not."""
-    path = {"path": ((lambda point: point.tail_rate[0], -3.7, 9.0),), "intervals": 8}
-    given = AGAIN | {"start": start(rat()), "tolerance": 0.01}
+    """Torques in every round; of others the first goes beyond, and says so; the last does not."""
+    given = AGAIN | {"start": start(rat()), "tolerance": 0.01, "intervals": 8}
     # an eighth of the torque that the plan would like
     weak = {"bounds": st.Bounds(np.pi / 3, torque=1.5e-3), "goal": st.Goal(torso_rate=None)}
+    for rounds in (0, 6):
+        plan = st.plan(rat(), **given | weak, rounds=rounds)
+        largest = np.abs(dense(plan)[1]).max() / 1.5e-3 - 1
+        assert plan.report["converged"] and -1e-3 < largest <= 1e-6
 
-    def beyond(plan, name):
-        times, torques = dense(plan)
-        if name == "torque":
-            return np.abs(torques).max() / 1.5e-3 - 1
-        return (-3.7 - plan.curve.at(times)["tail_rate"][:, 0].min()) / 9
+    def rate(plan):
+        return plan.curve.at(dense(plan)[0])["tail_rate"][:, 0]
 
-    for name, asked in (("torque", weak), ("path", path)):
+    slow = {"bounds": st.Bounds(np.pi / 3, rate=2.5), "goal": st.Goal(torso_rate=None)}
+    path = {"path": ((lambda point: point.tail_rate[0], -3.7, 9.0),)}
+    for name, asked, beyond in (
+        (
+            "rate",
+            slow,
+            lambda plan: np.abs(plan.curve.at(dense(plan)[0])["tail_rate"]).max() / 2.5 - 1,
+        ),
+        ("path", path, lambda plan: (-3.7 - rate(plan).min()) / 9),
+    ):
         first, plan = (st.plan(rat(), **given | asked | more) for more in ({"rounds": 0}, {}))
-        off, report = beyond(first, name), first.report
+        off, report = beyond(first), first.report
         with row(name):
             assert off > 1e-3 and not first.success and report["bound_excess_of"] == name
             assert report["bound_excess"] == pytest.approx(off, rel=0.02)
             assert plan.success and plan.report["bound_excess"] <= 1e-3
-            assert beyond(plan, name) <= 1e-3
+            assert beyond(plan) <= 1e-3
             assert np.abs(plan.curve.at(dense(plan)[0])["tail"]).max() <= np.pi / 3 * 1.001
 
 
 def test_torques_are_never_steeper_than_their_bound():
     given = AGAIN | {"start": start(rat())}
     given |= {"bounds": st.Bounds(angle=np.pi / 3, torque_rate=0.04)}
-    for rule, degree, intervals in (("radau", 3, 12), ("radau", 1, 30), ("lobatto", 3, 12)):
-        plan = st.plan(rat(), **given, rule=rule, degree=degree, intervals=intervals)
+    for degree, intervals in ((3, 12), (1, 30), (2, 20)):
+        plan = st.plan(rat(), **given, degree=degree, intervals=intervals)
         times, torques = dense(plan)
         if degree == 1:  # steps, each over an interval
             times, torques = plan.curve.ends[1:], plan.curve.nodes["torque"][:, 0]
         steepest = np.abs(np.diff(torques, axis=0) / np.diff(times)[:, None]).max()
-        with row(rule, degree):
+        with row(degree):
             assert plan.report["converged"] and 0.039 < steepest <= 0.04 * (1 + 1e-5)
             assert plan.report["bound_excess"] < 1e-5
 
@@ -156,7 +170,8 @@ def test_refinement_reduces_the_true_error_and_each_round_is_watched():
     assert sizes == sorted(set(sizes)) and sizes[0] == 4
     same = plans[sizes.index(found.mesh.intervals)].trajectory
     np.testing.assert_array_equal(same.q, found.trajectory.q)
-    np.testing.assert_array_equal(planned(**given, tolerance=1e-3).solution.w, found.solution.w)
+    twin = planned(**given, tolerance=1e-3).solution.samples
+    np.testing.assert_array_equal(twin.states, found.solution.samples.states)
     with pytest.raises(ZeroDivisionError):
         planned(**given, tolerance=None, watch=lambda _: 1 / 0)
 
@@ -184,7 +199,7 @@ def test_arcs_have_no_truth_beyond_their_range_and_are_bent_no_further():
     tail = most * np.array([[0.3, 0.4], [0.9, 1.2], [0.0, 0.0]])
     blocks = {"tail": tail, "tail_rate": np.zeros((3, 2)), "torso_rate": np.zeros((3, 3))}
     blocks["attitude"] = np.tile([1.0, 0.0, 0.0, 0.0], (3, 1))
-    q, _ = full_state(model, start(model), attitude("quaternion"), np.zeros(3), blocks)
+    q, _ = full_state(model, start(model), np.zeros(3), blocks)
     kept = most * np.array([[0.3, 0.4], [0.6, 0.8], [0.0, 0.0]])
     np.testing.assert_allclose(q[:, 7:], kept, rtol=1e-11)
     model.energy(q, np.zeros((3, model.nv)))  # takes them
