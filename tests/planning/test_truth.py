@@ -94,7 +94,9 @@ def test_errors_of_tracking_are_those_of_a_simulation_that_tracks(monkeypatch):
         return motion
 
     monkeypatch.setattr(result_report, "tracked", timed)
-    given = AGAIN | {"start": start(model), "intervals": 8, "track": True}
+    # so weak that tracking needs more, on a coarse mesh
+    given = {"bounds": st.Bounds(np.pi / 3, torque=2e-3), "goal": st.Goal(torso_rate=None)}
+    given = AGAIN | {"start": start(model), "intervals": 4, "track": True} | given
     told = st.plan(model, **given).report
     assert told["solve_cpu_s"] < told["call_cpu_s"]
     flight = result_report.flight
@@ -104,12 +106,12 @@ def test_errors_of_tracking_are_those_of_a_simulation_that_tracks(monkeypatch):
     assert spent[0] < 0.2 * spent[1]
     for name in ("tracked_attitude_error_deg", "tracked_tail_error_rad", "dyn_err"):
         assert told[name] == pytest.approx(plan.report[name], rel=0.03), name
-    law = st.Pfl(model, plan, torque=plan.problem.bounds.torque)
-    how = {"t_span": DURATION, "method": "dop853", "rtol": 1e-10, "output_step": 1e-3}
+    law = st.Pfl(model, plan.trajectory, torque=plan.problem.bounds.torque)
+    how = {"t_span": DURATION, "method": "dop853", "rtol": 1e-9, "output_step": 1e-3}
     run = st.simulate(model, *start(model), controller=law, **how)
     tail = CubicHermiteSpline(run.t, run.tail, run.v[:, 6:])(plan.trajectory.t)
     error = np.abs(tail - plan.trajectory.tail).max()
-    assert told["tracked_tail_error_rad"] == pytest.approx(error, rel=0.05)
+    assert told["tracked_tail_error_rad"] == pytest.approx(error, rel=0.01)
 
 
 def test_bounds_and_paths_hold_between_nodes():
