@@ -1,5 +1,5 @@
-"""Planning again, which derives nothing anew; guesses, multipliers; being told to stop; and plans
-that scenes and the command line ask for.
+"""Planning again, which derives nothing anew; guesses; being told to stop; and plans that scenes
+and the command line ask for.
 """
 
 import json
@@ -8,7 +8,6 @@ import threading
 import time
 import tomllib
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -19,15 +18,12 @@ import pytest
 import serpentail as st
 from serpentail.basics.attitude import from_angles
 from serpentail.cli import cli
-from serpentail.planning import backends as ways
-from serpentail.planning import mesh_refinement as rounds
-from serpentail.planning.nlp import interrupt, solver, transcription
-from serpentail.planning.nlp.blas_threads import _blas, one_thread
-from serpentail.planning.nlp.equations import equations_of_motion
-from serpentail.planning.nlp.multipliers import carried
-from serpentail.planning.nlp.transcription import transcription_of
+from serpentail.optimal import fatrop, interrupt
+from serpentail.optimal.blas_threads import _blas, one_thread
+from serpentail.planning import attempts as trying
+from serpentail.planning.program import nodes
 from serpentail.planning.result import report as result_report
-from serpentail.planning.staged import fatrop
+from serpentail.planning.search import Search
 from serpentail.scenes.plan import arguments_for, plan_arguments
 from serpentail.scenes.plan import planned as planned_by
 from tests.support import zoo
@@ -45,65 +41,34 @@ def again(model=None, **settings) -> st.Plan:
     return st.plan(model or rat(), **AGAIN | {"start": start(rat())} | settings)
 
 
+def numbers(plan: st.Plan) -> np.ndarray:
+    found = plan.solution.samples
+    return np.concatenate([found.states.ravel(), found.controls.ravel(), found.constants])
+
+
 def test_planning_again_from_neighbouring_states_derives_nothing(monkeypatch):
-    """A plan of the same size lends its multipliers, and no other."""
-    (q, v), begun = start(rat()), []
-
-    def noted(nlp, name, options, guess):
-        begun.append(guess)
-        return solver.solver(nlp, name, options, guess)
-
-    monkeypatch.setattr(ways, "solver", noted)
-    fresh = again()
-    assert again(guess=fresh, rule="lobatto").report["converged"]
-    once = again(start=(q, 1.005 * v), guess=fresh)
-    assert begun[1:] == ["close", "warm"]
-    for module, name in ((transcription, "transcribe"), (solver, "_engine")):
-        monkeypatch.setattr(module, name, lambda *_: pytest.fail("derived again"))
-    found = again(start=(q, 1.01 * v), guess=once)
-    assert found.report["converged"] and found.report["iterations"] <= 8
+    (q, v), fresh = start(rat()), again()
+    monkeypatch.setattr(nodes, "terms_of", lambda *_: pytest.fail("derived again"))
+    found = again(start=(q, 1.01 * v), guess=fresh)
+    assert found.report["converged"]
+    assert found.report["iterations"] < again(start=(q, 1.01 * v)).report["iterations"]
     np.testing.assert_allclose(found.trajectory.v[0, 3:], 1.01 * v[3:], atol=1e-9)
-
-
-def test_multipliers_are_carried_to_another_mesh(monkeypatch):
-    """The solver, given none, finds the same ones there; on the mesh itself they stay."""
-    programs, solutions, plan = [], [], None
-    for intervals in (24, 36):
-        # One of several optima: the other mesh begins at the first one's.
-        plan = again(intervals=intervals, guess=plan, bounds=st.Bounds(angle=0.45))
-        own = (rat(), plan.problem, plan.mesh, plan.rule, equations_of_motion(rat()))
-        programs.append(transcription_of(*own))
-        solutions.append(plan.solution.multipliers)
-    assert np.abs(solutions[0][0]).max() > 1e-3  # a bound is active
-    for k, most in enumerate((1e-12, 1e-3)):
-        carried_on = carried(solutions[0], programs[0], programs[k])
-        for found, wanted in zip(carried_on, solutions[k], strict=True):
-            assert np.linalg.norm(found - wanted) <= most * np.linalg.norm(wanted)
-
-    iterations = []  # refinement goes on from them
-    for carry in (carried, lambda *_: None):
-        monkeypatch.setattr(ways, "SPARSE", replace(ways.SPARSE, carried=carry))
-        plan = again(intervals=8, tolerance=1e-4)
-        assert plan.success and plan.report["rounds"] > 1
-        iterations.append(plan.report["iterations"])
-    assert iterations[0] < iterations[1]
+    np.testing.assert_allclose(found.trajectory.q[0], q, atol=1e-9)
 
 
 def test_other_problems_and_models_share_no_program():
-    """A memoised program answers for its own problem only: damping, goal and model all matter.
-    Dynamics by CasADi's operations gives the plan of the compiled one.
-    """
+    """Memoised terms answer for their own problem only: damping, goal and model all matter."""
     few = {"intervals": 4}
     heavy = rat().with_parameters(tail_mass=0.005)
     goal = st.Goal(attitude=from_angles(np.array([0.1, 0, 0])))
     found = [again(**few), again(**few, damping=1e-3), again(**few, goal=goal), again(heavy, **few)]
     assert len({plan.report["objective"] for plan in found}) == 4
-    np.testing.assert_array_equal(again(**few).solution.w, found[0].solution.w)
-    other = again(**few, dynamics="symbolic")
-    assert found[0].report["dynamics"] == "compiled" and other.report["dynamics"] == "symbolic"
-    objective = found[0].report["objective"]
-    assert other.report["objective"] == pytest.approx(objective, rel=1e-7)
-    np.testing.assert_allclose(other.solution.w, found[0].solution.w, atol=1e-5)
+    np.testing.assert_array_equal(numbers(again(**few)), numbers(found[0]))
+    low, high = ({"path": ((lambda p: p.tail_rate[0], -m, m),)} for m in (2.0, 20.0))
+    rates = [
+        np.abs(again(**few, **path).curve.starts["tail_rate"][:, 0]).max() for path in (low, high)
+    ]
+    assert rates[0] <= 2.0 + 1e-6 < rates[1]
 
 
 def test_several_guesses_are_as_good_as_one_and_the_solver_uses_one_thread():
@@ -132,23 +97,24 @@ def test_interrupt_and_time_limit_end_a_solve_inside_and_return_its_iterate(name
     assert time.perf_counter() - begun >= 0.2
     assert cut.report["stopped"] == "time limit" and cut.report["iterations"] > 1
     for each in (plan, cut):
-        assert not each.success and np.isfinite(each.solution.w).all()
+        assert not each.success and np.isfinite(numbers(each)).all()
         assert each.report["guesses"] == 1 and each.report["status"] == "User_Requested_Stop"
 
 
 def test_a_stop_between_rounds_keeps_the_best_round_and_what_is_raised_is_raised(monkeypatch):
-    finer, settings = rounds.Search._finer, {"intervals": 6, "tolerance": 1e-12, "rounds": 30}
+    settings = {"intervals": 6, "tolerance": 1e-12, "rounds": 30}
+    finer = Search._finer
 
     def interrupted(search, last):
         signal.raise_signal(signal.SIGINT)
         return finer(search, last)
 
-    for name, fake, why in (
-        ("Search._finer", interrupted, "interrupt"),
-        ("stop_reason", lambda: "time limit", "time limit"),
+    for of, name, fake, why in (
+        (Search, "_finer", interrupted, "interrupt"),
+        (trying, "stop_reason", lambda: "time limit", "time limit"),
     ):
         with monkeypatch.context() as patch:
-            patch.setattr(f"serpentail.planning.mesh_refinement.{name}", fake)
+            patch.setattr(of, name, fake)
             plan = again(**settings)
         assert not plan.success and plan.report["converged"]
         assert (plan.report["stopped"], plan.report["intervals"]) == (why, 6)

@@ -200,6 +200,7 @@ def test_models_that_lack_functions_are_refused():
     given = AGAIN | {"start": start(model), "intervals": 4, "track": True}
     plan, whole = (st.plan(each, **given).report for each in (model, zoo.model("m1_n1")))
     assert plan["dynamics"] == "symbolic" and plan["converged"]
+    assert plan["objective"] == pytest.approx(whole["objective"], rel=1e-6)
     for name, most in (("tracked_tail_error_rad", 1e-4), ("tracked_attitude_error_deg", 1e-3)):
         assert plan[name] == pytest.approx(whole[name], abs=most), name  # whose PFL is compiled
     given["track"] = False
