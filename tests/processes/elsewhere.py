@@ -77,11 +77,13 @@ def casadi(model) -> str:
 
 
 def plan(model) -> str:
-    """Plan a motion: IPOPT, its linear algebra, and the truth of its end."""
+    """Plan a motion: FATROP, IPOPT from there, its linear algebra, and the truth of its end."""
     batch(model)  # from then on nodes are evaluated in lanes, whose last digits are their own
-    found = st.plan(model, start=start(model), intervals=2, **AGAIN)
-    assert found.report["converged"], found.report
-    return _digest(found.solution.w, found.trajectory.q)
+    settings = {"start": start(model), "intervals": 2, **AGAIN}
+    found = st.plan(model, **settings)
+    other = st.plan(model, **settings, guess=found, solver="ipopt")
+    assert found.report["converged"] and other.report["converged"], (found.report, other.report)
+    return _digest(found.solution.samples.states, other.solution.samples.states, found.trajectory.q)
 
 
 JOBS = {job.__name__: job for job in (batch, simulate, rollouts, casadi, plan)}

@@ -142,20 +142,20 @@ def test_what_no_plan_can_be_is_one_line_and_none_writes_files_or_runs_code():
         ({"damping": 10**400}, "damping: value 1000"),
         ({"smoothing": 1e300}, r"smoothing: value 1e\+300: .* 1e\+100"),
         ({"bounds": {"torque": 1e308}}, r"bounds.torque: value 1e\+308"),
+        ({"options": 3}, "options: value 3: needs a table"),
         ({"intervals": 10**9}, "intervals: value 1000000000: .*10000"),
+        *(({"solver": name}, f"solver: value '{name}'") for name in ("../solver", "sqpmethod")),
     ]
     rows += [
         (change, r"to serpentail\.plan")
         for change in (
-            {"solver": "../../tmp/solver"},
-            {"solver": "sqpmethod", "options": {"jit": True}},
             {"options": {"jit": True, "compiler": "shell"}},
             {"options": {"ipopt.output_file": "somewhere"}},
             {"options": {"ipopt.option_file_name": "somewhere"}},
             {"options": {"ipopt.hsllib": "library.so"}},
+            {"options": {"fatrop.output_file": 1}},
             {"options": {"ipopt.max_iter": {"jit": True}}},
             {"options": {"bonmin.max_iter": 3}},
-            {"options": 3},
         )
     ]
     for change, words in rows:

@@ -15,7 +15,6 @@ from hypothesis import strategies as some
 
 import serpentail as st
 from serpentail.cli import cli
-from serpentail.planning.nlp.rules import collocation_rule
 from serpentail.scenes.plan import plan_arguments
 from serpentail.scenes.schema import TABLES, scene_schema
 from serpentail.scenes.simulate import scenario_of
@@ -39,7 +38,7 @@ SIMULATE = {
 }
 PLAN = {
     "start": {"q": Q, "v": [0, 0, 1, 5, 0, 0, 0, 0]},
-    "goal": {"attitude": "upright", "tail": [0.0, "free"], "turns": [0, 0]},
+    "goal": {"attitude": "upright", "tail": [0.0, "free"]},
     "duration": 0.3,
     "bounds": {"angle": 3.0, "torque": 0.02},
 }
@@ -154,14 +153,15 @@ def test_what_is_wrong_is_not_valid(valid):
         *(("simulate.reference.blend", "cubic"), ("plan.path", []), ("plan.start", {"q": [0]})),
         *(("plan.goal", "upwright"), ("plan.goal.tale", 1), ("plan.free_start.tale", [0, 1])),
         *(("plan.free_start.tail", ["0 m", 1]), ("plan.bounds.angle", "3 s")),
-        *(("plan.intervals", 0), ("plan.rule", "radaw"), ("plan.track", "yes")),
-        ("plan.solver", "../x"),
+        *(("plan.intervals", 0), ("plan.solver", "radau"), ("plan.track", "yes")),
+        *((f"plan.{name}", "x") for name in ("rule", "formulation", "attitude", "dynamics")),
+        ("plan.goal.turns", [0, 0]),
     ]
     for path, value in rows:
         with row(path, value):
             table = with_value(path, value)
             assert valid(with_value("segments", 2)) and not valid(table)
-            if not path.startswith(("simulate", "plan.intervals", "plan.rule", "plan.track")):
+            if not path.startswith(("simulate", "plan.intervals", "plan.solver", "plan.track")):
                 with pytest.raises((SceneError, st.SerpentailError)):
                     parse_scene(table, "x")
                     plan_arguments(table["plan"])
@@ -225,8 +225,7 @@ def test_any_table_is_taken_or_refused(scene, motion, task):
         motion["start"].pop("settle", None)  # which takes as long as it takes
 
     def planned():
-        settings = posed(zoo.model("feet_tail"), **plan_arguments(task))[1]
-        collocation_rule(settings.rule, settings.degree)
+        posed(zoo.model("feet_tail"), **plan_arguments(task))
 
     works = [
         (SceneError, lambda: parse_scene(scene, "x")),
