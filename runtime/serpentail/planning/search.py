@@ -67,7 +67,8 @@ class Search:
         if near == "close":
             solutions = [attempts.solved_near(program, motion, self.solver)]
         else:
-            solutions = [attempts.solved(program, motion, solver=self.solver)]
+            quick = settings.retries > 0  # what follows leads further than many iterations
+            solutions = [attempts.solved(program, motion, "far", self.solver, quick)]
         for k in range(1, settings.multi_start):
             if attempts.is_stopped():
                 break
@@ -99,8 +100,9 @@ class Search:
             return self._round(found.program, found.solution)
         self.led = found
         self._pushed_on(program, solutions)
-        if not self._is_done(solutions) and found is None and settings.solver == "auto":
-            self._try_ipopt(program, solutions)
+        if settings.solver == "auto":
+            guesses = settings.multi_start + settings.retries
+            self._try_ipopt(program, solutions, guesses if found is None else 1)
         return None
 
     def _pushed_on(self, program: PlanProgram, solutions: list[Solution]) -> None:
@@ -111,9 +113,9 @@ class Search:
                 return
             solutions.append(self._from_push(program, k))
 
-    def _try_ipopt(self, program: PlanProgram, solutions: list[Solution]) -> None:
-        """Add what IPOPT finds from the same guesses, up to a first solution."""
-        for k in range(self.settings.multi_start + self.settings.retries):
+    def _try_ipopt(self, program: PlanProgram, solutions: list[Solution], guesses: int) -> None:
+        """Add what IPOPT finds from so many of the same guesses, up to a first solution."""
+        for k in range(guesses):
             if self._is_done(solutions):
                 return
             motion = self.attempts.given(self.problem)[0]
@@ -156,9 +158,17 @@ class Search:
             self.softening = self.softening[1:] or self.softening
             program = self._program(mesh)
             motion = self.motion(last.program, last.solution)
-            found = self.attempts.solved_near(program, motion, last.solution.solver)
-            last = self._round(program, found)
+            last = self._round(program, self._solved_on(program, motion, last.solution.solver))
             yield last
+
+    def _solved_on(self, program: PlanProgram, motion: GuessMotion, solver: str) -> Solution:
+        """Solve from the motion of the round before; by the other solver if its own fails."""
+        found = self.attempts.solved_near(program, motion, solver)
+        if found.success or self.settings.solver != "auto" or self.attempts.is_stopped():
+            return found
+        other = "fatrop" if solver == "ipopt" else "ipopt"
+        again = self.attempts.solved_near(program, motion, other)
+        return again if again.success else found
 
     def _program(self, mesh: Mesh) -> PlanProgram:
         return self.attempts.program(self.problem, mesh, self.softening[0])
