@@ -8,7 +8,7 @@ if the machine has both. The report is in FOLDER: report.md and report.json.
 from examples import front
 
 # in this order
-NAMES = ("forward_dynamics", "jacobians", "hessians", "batches", "nodes", "meshes", "long_tails")
+NAMES = ("forward_dynamics", "jacobians", "hessians", "batches", "long_tails")
 NAMES += ("python_overhead", "flights", "rollouts", "environments", "ground_batches")
 NAMES += ("ground_steps", "operations", "generation", "tails", "soromox", "precisions")
 NAMES += ("simulations", "contact_costs", "contact_shares", "polar_errors", "polar_times")

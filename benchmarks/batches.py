@@ -15,6 +15,7 @@ from benchmarks.models import DFD, FD, HESSIAN, built, label
 from benchmarks.timing import best, best_of
 from serpentail.model.kernel import aligned, argument_record
 from serpentail.model.library import MIN_BATCH
+from serpentail_scene.signatures.table import AIRBORNE
 
 PER_PROCESSOR = True
 STATES, ROUNDS = 512, 100  # a batch that stays in the cache
@@ -23,6 +24,7 @@ SIZES = {
     FD: ((1, 3), (2, 3), (3, 4), (6, 6), (8, 16), (3, None)),
     DFD: ((1, 3), (3, 4)),
     HESSIAN: ((1, 3), (3, 4)),
+    **dict.fromkeys(AIRBORNE, ((1, 3), (3, 2), (6, 2), (2, None))),
 }
 
 

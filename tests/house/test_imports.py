@@ -76,7 +76,7 @@ def test_names_are_the_contract_and_no_module_hides_one():
 
 BROUGHT_ALONG = {"trimesh": "viser"}  # by a library of the extra
 HOMES = {  # where alone a library of an extra may be imported, behind the room's gates
-    "casadi": ("model/casadi.py", "model/nodes/", "optimal/", "planning/"),
+    "casadi": ("model/casadi.py", "optimal/", "planning/"),
     "matplotlib": ("show/pictures/",),
     "PIL": ("show/pictures/",),
     "imageio_ffmpeg": ("show/pictures/encode.py",),

@@ -160,7 +160,7 @@ def test_models_of_one_target_evaluate_what_is_there(monkeypatch, tmp_path):
     np.testing.assert_array_equal(model.forward_dynamics(*STATE), expected)
     compiled = model.casadi.external("forward_dynamics", folded=True)
     np.testing.assert_array_equal(compiled(*STATE).full()[:, 0], expected)
-    own = ("external", "nodes", "parameter_names", "parameter_vector", "symbolic")
+    own = ("external", "parameter_names", "parameter_vector", "symbolic")
     assert dir(model.casadi) == [*own]
     for call in (
         lambda: model.casadi.forward_dynamics,

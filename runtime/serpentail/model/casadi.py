@@ -8,11 +8,9 @@ import casadi
 
 from serpentail_scene.layout import OMEGA, QUATERNION, TAIL_V, VELOCITY
 
-from ..basics.checks import one_of, whole_number
+from ..basics.checks import whole_number
 from ..basics.errors import ModelError
-from ..compiling.threads import threads
 from .lazy import lazy_property
-from .nodes.function import MOST_NODES, RESULTS, nodes_function
 from .parameters import flat, flat_names
 from .state_space import RATE
 
@@ -37,7 +35,6 @@ class CasadiFunctions:
 
     def __init__(self, model: "Model"):
         self._model = model
-        self._nodes: dict[tuple[str, int, int, int], casadi.Function] = {}  # they stay loaded
 
     @lazy_property
     def _module(self) -> ModuleType:
@@ -106,7 +103,7 @@ class CasadiFunctions:
         symbolic = [*self._module.SIGNATURES] if self._has_module else []
         if "forward_dynamics" in symbolic:
             symbolic.append("x_dot")
-        return [*symbolic, "symbolic", "external", "nodes", "parameter_names", "parameter_vector"]
+        return [*symbolic, "symbolic", "external", "parameter_names", "parameter_vector"]
 
     @property
     def parameter_vector(self) -> casadi.DM:
@@ -180,47 +177,6 @@ class CasadiFunctions:
         if not folded:
             return function
         return self._folded(name, function)
-
-    def nodes(
-        self, name: str, count: int, derivatives: int = 2, folded: bool = False
-    ) -> casadi.Function:
-        """Return the compiled dynamics at many nodes at once, such as those of a mesh.
-
-        The columns of its inputs and outputs are the nodes. It evaluates them in vector lanes and
-        in threads, as ``threads=`` of ``st.load`` allows. Derivatives have one block for each node.
-
-        Parameters
-        ----------
-        name : {"forward_dynamics", "inverse_dynamics"}
-            Which dynamics.
-        count : int
-            Number of nodes.
-        derivatives : {0, 1, 2}, default 2
-            Order of the exact derivatives that it has; of a higher order, CasADi has none.
-        folded : bool, default False
-            Use the model's parameters in place of the last input.
-
-        Returns
-        -------
-        casadi.Function
-            Its inputs are q (nq, count), v (nv, count), tau (2m, count) or v_dot (nv, count), and
-            parameters (P, 1), by which it is not differentiable; its output is v_dot or force (nv,
-            count).
-
-        Raises
-        ------
-        ModelError
-            As of ``external``; a model with a fixed base; a name or a number that cannot be used.
-        """
-        one_of("name", name, RESULTS, ModelError)
-        count = whole_number("count", count, ModelError, least=1, most=MOST_NODES)
-        order = whole_number("derivatives", derivatives, ModelError, least=0, most=2)
-        self.external(name, order)
-        key = (name, count, order, threads(self._model.batch_library.threads))
-        if key not in self._nodes:
-            self._nodes[key] = nodes_function(self._model, name, count, order)
-        function = self._nodes[key]
-        return self._folded(f"{name}_nodes", function) if folded else function
 
     def _folded(self, name: str, function: casadi.Function) -> casadi.Function:
         """Return the function with the model's parameters in place of its last input."""

@@ -8,7 +8,6 @@ import ctypes
 import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 from weakref import WeakSet
 
 from ..basics.errors import ModelError
@@ -162,16 +161,6 @@ class BatchLibrary:
         self.parts: dict[str, str] = batch["parts"]
         self.sources = {part: LazyLibrary(checked, profile, part) for part in LAZY_SOURCES}
         self.rollouts = self.sources["flights"]
-
-    def address(self, name: str) -> int:
-        """Return the address of the C function for strided states, for kernels in C.
-
-        It takes the record of a call, and for each of its arrays the stride between states.
-        KeyError if the model has no batches of that function.
-        """
-        source = self.sources[self.parts[name]]
-        function: Any = source.function(f"{self.prefix}_side_by_side_{name}_apart")
-        return ctypes.cast(function, ctypes.c_void_p).value or 0
 
     def entry(self, name: str, count: int) -> RecordFunction | None:
         """Return the C function for a batch of this size; None if it is not worthwhile."""

@@ -113,8 +113,10 @@ def test_states_may_lie_apart_or_be_shared(name):
     arrays = [nodes, nodes[:, x.shape[1] :], *shared, *results]
     apart = [nodes.shape[1]] * 2 + [0, 0] + [result.shape[1] for result in results]
     apart, work = np.array(apart, np.uintp), np.zeros(batches.work[function])
-    address = batches.address(function)
-    called = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)(address)
+    called = batches.sources[batches.parts[function]].function(
+        f"{found.name}_side_by_side_{function}_apart"
+    )
+    called.argtypes = [ctypes.c_void_p, ctypes.c_void_p]
     record = argument_record(found.parameter_vector, len(nodes), work, arrays)
     assert called(ctypes.byref(record), apart.ctypes.data) == 0
     got = np.hstack([result[:, :-1] for result in results])
