@@ -207,7 +207,7 @@ def test_command_tells_and_empties(model, cache, capsys):
     least = sum(library.stat().st_size for library in libraries)
     (cache / "mine.txt").touch()
     (cache / "libraries" / "mine").mkdir()
-    counts, told = {"libraries": 2, "models": 0, "builds": 0, "compilers": 1}, []
+    counts, told = {"libraries": 2, "models": 0, "builds": 0, "compilers": 1, "solvers": 0}, []
     for words in ([], ["--clean"]):
         assert cli.main(["cache", *words, "--json", "-"]) == 0
         told.append(json.loads(capsys.readouterr().out))

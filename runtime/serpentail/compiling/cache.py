@@ -21,10 +21,11 @@ ROOT = 0  # user id of the administrator, who may read everything
 PATIENCE_S = 600.0  # s to wait for another process, because that may be suspended
 
 # Folders of the cache. An entry is made in PARTS, and one rename puts it in its place.
-# Of the first three, it is <key>/<SHA-256 of the file>, and so proves its content.
+# Of the first four, it is <key>/<SHA-256 of the file>, and so proves its content.
 LIBRARIES = "libraries"  # compiled C
 BUILDS = "builds"  # of a scene: the hash of the manifest of its model
 COMPILERS = "compilers"  # properties of a compiler
+SOLVERS = "solvers"  # whether a solver has a setting
 MODELS = "models"  # <manifest hash>/: generated folders as they were checked
 LOCKS = "locks"
 PARTS = "parts"

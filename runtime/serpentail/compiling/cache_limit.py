@@ -11,13 +11,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..basics.errors import SerpentailError
-from .cache import BUILDS, COMPILERS, LIBRARIES, LOCKS, MODELS, PARTS, discard
+from .cache import BUILDS, COMPILERS, LIBRARIES, LOCKS, MODELS, PARTS, SOLVERS, discard
 
 DEFAULT_SIZE = "1G"
 UNITS = {"": 1, "K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
 IN_USE_S = 600.0  # s: recently used entries stay, because a process may be about to open them
 LOST_S = 3600.0  # s: older parts are from builds that were killed
-ENTRIES = (LIBRARIES, MODELS, BUILDS, COMPILERS)
+ENTRIES = (LIBRARIES, MODELS, BUILDS, COMPILERS, SOLVERS)
 LEFTOVERS = (PARTS, LOCKS)
 # Other files in the user's folder do not belong to the cache. Notes of version 0.2 were .json.
 NAME = re.compile(r"[0-9a-f]{24}|[0-9a-f]{64}(\.json|\.lock)?")

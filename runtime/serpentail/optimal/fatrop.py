@@ -12,6 +12,7 @@ import numpy as np
 
 from ..basics.checks import shown
 from ..basics.errors import PlanningError
+from .fatrop_settings import has_setting
 from .interrupt import stop_reason
 from .library import in_c, kernel
 from .problem import OcpInC, OptimalProblem
@@ -20,15 +21,15 @@ from .solution import Solution
 from .thread_pool import crew_of, helped
 
 CALLED = {  # of FATROP's C interface, by the names of Library in native/fatrop.c
-    "create": "create",
-    "solve": "solve",
-    "destroy": "destroy",
-    "set_double": "set_option_double",
-    "set_int": "set_option_int",
-    "set_bool": "set_option_bool",
-    "primal": "get_primal",
-    "dual": "get_dual",
-    "stats": "get_stats",
+    "create": "fatrop_ocp_c_create",
+    "solve": "fatrop_ocp_c_solve",
+    "destroy": "fatrop_ocp_c_destroy",
+    "set_double": "fatrop_ocp_c_set_option_double",
+    "set_int": "fatrop_ocp_c_set_option_int",
+    "set_bool": "fatrop_ocp_c_set_option_bool",
+    "primal": "fatrop_ocp_c_get_primal",
+    "dual": "fatrop_ocp_c_get_dual",
+    "stats": "fatrop_ocp_c_get_stats",
 }
 # statuses of native/fatrop.c; FATROP's own message if it gives one
 SOLVED, SAID, STOPPED = 0, 1, 2
@@ -65,7 +66,6 @@ OPTIONS = {
 # value, 1e-6, would add regularisation wherever a bound or the goal has a large weight, and steps
 # would become short. FATROP has this setting, although it does not list it.
 PIVOT, LEAST_PIVOT = "linsol_pivot_tol", 1e-14
-PIVOT_SETTER = "_ZN6fatrop15AugSystemSolverINS_7OcpTypeEE13set_pivot_tolERKd"
 # for guesses that are close to a solution
 CLOSE_OPTIONS = {"mu_init": 1e-5, "bound_push": 1e-6, "bound_frac": 1e-6}
 GUESS_OPTIONS: dict[str, dict[str, float]] = {"far": {}, "close": CLOSE_OPTIONS}
@@ -120,7 +120,7 @@ def called() -> Library:
     found = library()
     return Library(
         **{
-            name: ctypes.cast(getattr(found, f"fatrop_ocp_c_{symbol}"), ctypes.c_void_p).value
+            name: ctypes.cast(getattr(found, symbol), ctypes.c_void_p).value
             for name, symbol in CALLED.items()
         }
     )
@@ -146,18 +146,11 @@ def options_of(asked: Mapping[str, Any], guess: str, most: int | None = None) ->
     few = {} if most is None else {"max_iter": most}
     settings = OPTIONS | GUESS_OPTIONS[guess] | few | settings
     kinds = {name: library().fatrop_ocp_c_option_type(name.encode()) for name in settings}
-    if _has_pivot():
+    if has_setting(library(), PIVOT, tuple(CALLED.values())):
         kinds[PIVOT], settings[PIVOT] = 0, LEAST_PIVOT
     return (Option * len(settings))(
         *(Option(name.encode(), kinds[name], float(value)) for name, value in settings.items())
     )
-
-
-@cache
-def _has_pivot() -> bool:
-    """Tell if FATROP has the setting PIVOT; an unknown setting would end the process."""
-    found = library()
-    return hasattr(found, PIVOT_SETTER) and PIVOT.encode() in Path(found._name).read_bytes()
 
 
 @dataclass

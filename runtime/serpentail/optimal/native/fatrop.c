@@ -264,6 +264,37 @@ static int eval_hessian(double scale, const double *w, const double *lambda, con
     return DONE;
 }
 
+/* ---- settings */
+
+static int get_one_of(int k, void *data)
+{
+    (void)k;
+    (void)data;
+    return 1;
+}
+
+static int get_two(void *data)
+{
+    (void)data;
+    return 2;
+}
+
+/* 0 if FATROP has a setting that is a double.  If not, it ends the process, which must be one of
+   its own.  The problem is of two stages, and is not solved. */
+int fatrop_takes(const Library *library, const char *setting)
+{
+    struct FatropOcpCInterface face;
+    memset(&face, 0, sizeof face);
+    face.get_nx = face.get_nu = get_one_of;
+    face.get_ng = face.get_ng_ineq = face.get_n_stage_params = get_none_of;
+    face.get_n_global_params = get_none;
+    face.get_horizon_length = get_two;
+    struct FatropOcpCSolver *solver = library->create(&face, NULL, NULL);
+    const int rc = library->set_double(solver, setting, 1.0);
+    library->destroy(solver);
+    return rc;
+}
+
 /* ---- a solve */
 
 static struct FatropOcpCInterface interface_of(Run *run)
