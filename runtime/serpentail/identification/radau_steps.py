@@ -13,16 +13,10 @@ from serpentail_scene.layout import OMEGA, QUATERNION, TAIL_Q
 
 from ..model.model import Model
 from ..model.state_space import product_matrix
+from ..optimal.rules import collocation_rule
 
-ROOT = np.sqrt(6.0)
-NODES = np.array([(4 - ROOT) / 10, (4 + ROOT) / 10, 1.0])  # of an interval
-WEIGHTS = np.array(
-    [
-        [(88 - 7 * ROOT) / 360, (296 - 169 * ROOT) / 1800, (-2 + 3 * ROOT) / 225],
-        [(296 + 169 * ROOT) / 1800, (88 + 7 * ROOT) / 360, (-2 - 3 * ROOT) / 225],
-        [(16 - ROOT) / 36, (16 + ROOT) / 36, 1 / 9],
-    ]
-)  # Butcher's A
+NODES = collocation_rule(3).nodes  # of an interval
+WEIGHTS = collocation_rule(3).integrals(NODES)  # Butcher's A
 ITERATIONS = 12
 TOLERANCE = 1e-11  # of the last Newton step, over the sizes of the states
 
