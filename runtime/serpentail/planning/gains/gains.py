@@ -256,9 +256,6 @@ def _able(plan: Any, model: Model | None) -> Model:
         raise PlanningError(f"Gains: the model computes with {own.manifest['real']}: needs double")
     if own.library is None:
         raise PlanningError("Gains: the model was loaded with compiled=False: load it again with C")
-    if plan.problem.attitude != "quaternion":
-        needs = "a plan with attitude='quaternion'"
-        raise refusal("Gains: plan's attitude", plan.problem.attitude, needs, PlanningError)
     tail = plan.curve.starts["tail"].shape[1]
     if tail != own.layout.nt:
         raise PlanningError(
