@@ -228,11 +228,10 @@ def test_written_c_makes_the_same_torques(plan, tmp_path):
 
 
 def test_what_has_no_gains_is_refused(plan, tmp_path):
-    longer, euler = zoo.model("m2_n2"), plan_of(attitude="euler")
+    longer = zoo.model("m2_n2")
     for words, planned, settings in (
         ("plan: value", plan.trajectory, {}),
         ("2 tail coordinates, the model 4", plan, {"model": longer}),
-        ("attitude: value 'euler'", euler, {}),
         ("float: needs double", plan, {"model": zoo.model("single")}),
         ("compiled=False", plan, {"model": st.load(zoo.folder("m1_n3"), compiled=False)}),
         ("model: value None", pickle.loads(pickle.dumps(plan)), {}),
