@@ -1,1 +1,1 @@
-"""Optimal control of a node's equations: stages that solve their collocation inside, FATROP, IPOPT."""
+"""Optimal control of a node's equations: stages with their collocation inside, FATROP, IPOPT."""

@@ -175,7 +175,7 @@ def solve(
     begin: MeshSamples,
     guess: str,
     asked: Mapping[str, Any],
-    most_threads: int = 1,
+    most_threads: int | None = 1,
     quick: bool = False,
 ) -> Solution:
     """Solve from a motion that is "far" from a solution or "close" to one.

@@ -156,7 +156,7 @@ def _callback(name: str, inputs: list[Any], outputs: list[Any], function: Any) -
         def get_sparsity_out(self, k: int) -> "ca.Sparsity":
             return outputs[k][1]
 
-        def eval(self, arguments: list[Any]) -> Any:
+        def eval(self, arguments: Any) -> Any:
             return function(*(np.array(part).ravel() for part in arguments))
 
     made = Called()
@@ -209,7 +209,7 @@ def solve(
     begin: MeshSamples,
     guess: str,
     asked: Mapping[str, Any],
-    most_threads: int = 1,
+    most_threads: int | None = 1,
 ) -> Solution:
     """Solve from a motion that is "far" from a solution or "close" to one.
 
@@ -217,7 +217,7 @@ def solve(
     """
     import casadi as ca
 
-    settings = {"print_time": False, "error_on_fail": False, "show_eval_warnings": False}
+    settings: dict[str, Any] = {"print_time": False, "error_on_fail": False}
     settings |= OPTIONS | GUESS_OPTIONS[guess] | dict(asked)
     # the multipliers and parameters' derivatives are not asked for again at the end
     settings |= dict.fromkeys(("calc_lam_p", "calc_lam_x", "calc_f", "calc_g"), False)

@@ -121,7 +121,7 @@ class OptimalProblem:
     duration_is_free; limits, each (2, n), least and most: control_limits, state_limits of the
     states whose indices are bounded, row_limits of the node's rows, constant_limits, start_limits
     of rows at the start after the first start_equalities, which are start_values. at_end: its
-    rows are end_values at the end, where fixed (bounded,) tells which bounded states the goal gives.
+    rows are end_values at the end; fixed (bounded,): bounded states that the goal gives there.
     """
 
     node: OcpNode

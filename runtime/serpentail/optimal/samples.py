@@ -1,4 +1,4 @@
-"""``MeshSamples``: a motion at the nodes of a mesh, from which solvers begin and which they find."""
+"""``MeshSamples``: a motion at the nodes of a mesh, where solvers begin and what they find."""
 
 from dataclasses import dataclass
 

@@ -90,14 +90,15 @@ class _Buffer:
     """A function that CasADi evaluates, as one that C calls; one call at a time."""
 
     def __init__(self, function: "ca.Function"):
+        self.buffer: Any
         self.buffer, self.evaluate = function.buffer()
         self.lock = threading.Lock()
         self.inputs = [np.zeros(function.size1_in(k)) for k in range(function.n_in())]
         self.outputs = [np.zeros(function.nnz_out(k)) for k in range(function.n_out())]
         for k, array in enumerate(self.inputs):
-            self.buffer.set_arg(k, memoryview(array))
+            self.buffer.set_arg(k, array.data)
         for k, array in enumerate(self.outputs):
-            self.buffer.set_res(k, memoryview(array))
+            self.buffer.set_res(k, array.data)
         self.call = CasadiCall(self._called)
 
     def _called(self, given: Any, found: Any, *_unused: Any) -> int:

@@ -16,7 +16,7 @@ WORTH_A_THREAD = 5000
 _at_work: dict[int, ctypes.CDLL] = {}  # programs that have helpers, by their addresses
 
 
-def crew_of(problem: OptimalProblem, most: int) -> int:
+def crew_of(problem: OptimalProblem, most: int | None) -> int:
     """Return how many threads evaluate stages: at most `most`, and as many as are worth it."""
     if not problem.threads:
         return 1

@@ -10,7 +10,7 @@ from .samples import MeshSamples, packed
 
 
 def violation(problem: OptimalProblem, samples: MeshSamples) -> float:
-    """Return the largest violation of a constraint, in the program's units; inf if none is known."""
+    """Return the largest violation of a constraint, in the program's units; inf if unknown."""
     if not samples.is_motion:
         return np.inf
     code, w = kernel(), packed(problem, samples)

@@ -168,7 +168,7 @@ class Attempts:
 
 
 def _apart(problem: PlanningProblem, plan: Plan) -> float:
-    """Return how far two starts are apart: attitude and tail (rad), rates over a tenth of a second."""
+    """Return how far two starts are apart: attitude and tail (rad), rates over 0.1 s."""
     (q, v), (q0, v0) = plan.start, (problem.q0, problem.v0)
     turn = np.radians(angle_deg(q[QUATERNION], q0[QUATERNION]))
     rates = 0.1 * np.linalg.norm(v[OMEGA.start :] - v0[OMEGA.start :])

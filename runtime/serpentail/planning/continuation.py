@@ -37,8 +37,8 @@ class Bracket:
     def words(self, problem: PlanningProblem) -> str:
         """Return which value suffices, and which does not."""
         value, unit = _value(problem, self.bound), UNITS[self.bound]
-        enough, little = value * self.suffices, value * self.fails
-        return f"{self.bound}: {enough:.3g} {unit} suffices; with {little:.3g} {unit} no plan was found"
+        enough = f"{self.bound}: {value * self.suffices:.3g} {unit} suffices"
+        return f"{enough}; with {value * self.fails:.3g} {unit} no plan was found"
 
 
 @dataclass(frozen=True, eq=False)

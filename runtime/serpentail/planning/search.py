@@ -47,7 +47,8 @@ class Search:
     ):
         self.model, self.problem, self.settings = model, problem, settings
         self.rule = collocation_rule(settings.degree)
-        self.attempts = Attempts(model, settings, self.rule, before and before.attempts)
+        spent_before = None if before is None else before.attempts
+        self.attempts: Attempts = Attempts(model, settings, self.rule, spent_before)
         self.softening = softening_of(problem, settings.guess)
         self.solver = settings.first_solver
         self.led: Led | None = None
@@ -93,8 +94,11 @@ class Search:
         stored = attempts.nearest(self.problem)
         if stored is not None:
             solutions.append(attempts.solved_near(program, stored, self.solver))
-        if self._is_done(solutions) or settings.solver == "ipopt":
-            return None if self._is_done(solutions) else self._pushed_on(program, solutions)
+        if self._is_done(solutions):
+            return None
+        if settings.solver == "ipopt":
+            self._pushed_on(program, solutions)
+            return None
         found = led(attempts, self.problem, mesh, self.softening[0], self.motion)
         if found is not None and found.bracket is None:
             return self._round(found.program, found.solution)

@@ -51,15 +51,20 @@ class PlanSettings:
 
     def roughly(self, guess: Any) -> "PlanSettings":
         """Return settings of a search that shows whether a problem has a plan, from a guess."""
-        rougher = {
-            name: None if most is None else ROUGHLY * most
-            for name, most in (
-                ("tolerance", self.tolerance),
-                ("tail_tolerance", self.tail_tolerance),
-                ("rate_tolerance", self.rate_tolerance),
-            )
-        }
-        return replace(self, guess=guess, retries=0, multi_start=1, track=False, **rougher)
+        rougher = [
+            None if most is None else ROUGHLY * most
+            for most in (self.tolerance, self.tail_tolerance, self.rate_tolerance)
+        ]
+        return replace(
+            self,
+            guess=guess,
+            retries=0,
+            multi_start=1,
+            track=False,
+            tolerance=rougher[0],
+            tail_tolerance=rougher[1],
+            rate_tolerance=rougher[2],
+        )
 
     @property
     def first_solver(self) -> str:

@@ -8,8 +8,8 @@ from ..motion.trajectory import Trajectory
 from .problem import PlanningProblem
 from .result.plan import Plan
 
-# Softening of an objective, see ``program.objective.cost``, in the first rounds; the last value holds in all
-# others.
+# Softening of an objective, see ``program.objective.cost``, in the first rounds; the last value
+# holds in all others.
 # The exact ones are seldom solved from a distant guess. "energy": in mean powers of the guess.
 SOFTENING = {"energy": (3.0, 0.3, 0.03), "time": (1.0, 0.3)}
 USUAL_POWER = 0.01  # W, of a guess without torques

@@ -135,5 +135,5 @@ def angles_of(c: "ca.SX") -> "ca.SX":
     """Return pitch, roll and yaw (rad) of a quaternion, R = Rz(yaw) Rx(pitch) Ry(roll)."""
     import casadi as ca
 
-    R = ca.horzcat(*(rotated(c, ca.DM.eye(3)[:, k]) for k in range(3)))
+    R = ca.horzcat(*(rotated(c, ca.SX(ca.DM.eye(3)[:, k])) for k in range(3)))
     return ca.vertcat(ca.asin(R[2, 1]), ca.atan2(-R[2, 0], R[2, 2]), ca.atan2(-R[0, 1], R[1, 1]))

@@ -69,7 +69,8 @@ def variables_of(model: Model, problem: PlanningProblem, falls: bool) -> PlanVar
     if problem.bounds.torque_rate is not None:
         states, controls = (*states, *controls), (("torque_rate", tail),)
         units["torque_rate"] = UNIT_OF_RATE * problem.bounds.torque_rate
-    design, constants = problem.design, ()
+    design = problem.design
+    constants: Blocks = ()
     if design.size:
         constants = (("design", design.size),)
         units["design"] = design.units
