@@ -217,7 +217,9 @@ def solve(
     """
     import casadi as ca
 
-    settings: dict[str, Any] = {"print_time": False, "error_on_fail": False}
+    settings: dict[str, Any] = dict.fromkeys(
+        ("print_time", "error_on_fail", "show_eval_warnings"), False
+    )
     settings |= OPTIONS | GUESS_OPTIONS[guess] | dict(asked)
     # the multipliers and parameters' derivatives are not asked for again at the end
     settings |= dict.fromkeys(("calc_lam_p", "calc_lam_x", "calc_f", "calc_g"), False)
