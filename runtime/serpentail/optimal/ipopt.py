@@ -108,7 +108,7 @@ class _Sparse:
         return blocks[self.upper] * np.nan if failed else blocks[self.upper]
 
     def limits(self, goal: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return least and most of the constraints; goal: its rows, which do not give here."""
+        """Return least and most of the constraints; goal: its rows, which give nothing."""
         least, most = np.zeros((2, self.rows))
         self.code.sparse_limits(self.program, least.ctypes.data, most.ctypes.data)
         least[self.rows - goal :] = most[self.rows - goal :] = 0.0
