@@ -20,17 +20,18 @@ HEIGHT, VELOCITY, PITCH, SPIN, BEND, BEND_RATE = (
 )
 FUNCTIONS = (
     "mass_matrix,bias_force,inverse_dynamics,forward_dynamics,energy,momentum,tail_points,rollout,"
-    "forward_dynamics_derivatives,inverse_dynamics_derivatives,inverse_dynamics_vjp,forward_dynamics_vjp,"
-    "inverse_dynamics_hessian,pfl,center_of_mass"
+    "pfl,center_of_mass,"
+    # of the nodes of plans
+    "airborne_rates,airborne_rates_derivatives,airborne_rates_hessian,"
+    # of the paper's program
+    "forward_dynamics_derivatives,forward_dynamics_vjp,inverse_dynamics_hessian"
 )
-# those, and what the stages of FATROP need
-STAGED = f"{FUNCTIONS},airborne_rates,airborne_rates_derivatives,airborne_rates_hessian"
 
 
-def model(segments: int, links: int | None, functions: str = FUNCTIONS) -> st.Model:
-    """Return a tail with exact derivatives; a continuum where links is None."""
+def model(segments: int, links: int | None) -> st.Model:
+    """Return a tail with all that plans use; a continuum where links is None."""
     tail = {"tail": "articulated", "links": links} if links else {"tail": "continuum"}
-    return st.build(segments=segments, functions=functions.split(","), **tail)
+    return st.build(segments=segments, functions=FUNCTIONS.split(","), **tail)
 
 
 def share(rat: st.Model) -> np.ndarray:

@@ -25,7 +25,7 @@ TAPERED = {
     "radii": [0.003, 0.001],
     "density": DENSITY,
 }  # gives links of their own
-VERSION = 1  # of what makes a row
+VERSION = 2  # of what makes a row
 OVER = {
     "length": st.sobol(0.5, 1.5, "log"),  # of the rat's
     "mass": st.sobol(0.25, 4.0, "log"),  # of the rat's
@@ -93,7 +93,7 @@ def right(point: dict) -> dict:
         tolerance=None,
         retries=0,
         track=False,
-        options={"ipopt.max_iter": ITERATIONS},
+        options={"fatrop.max_iter": ITERATIONS},
     )
     told = plan.report
     off = told["open_loop_attitude_error_deg"]

@@ -12,14 +12,14 @@ from pathlib import Path
 import numpy as np
 
 import serpentail as st
+from examples import righting
 from examples.front import ROOT
-from examples.righting import FUNCTIONS, TORQUE, tumbling
+from examples.righting import TORQUE, tumbling
 from examples.studies.parts import Part, digest, made
 from serpentail.basics.attitude import product, tilt_deg
 
 RATE = 100.0  # Hz, of the ticks
 SOURCES = ("codegen", "runtime")
-NODE = ("airborne_rates", "airborne_rates_derivatives", "airborne_rates_hessian")
 LAWS = ("open loop", "PFL", "MPC")
 NOISE = np.radians(0.5), 0.05, np.radians(0.2), 0.5  # rad, rad/s of the torso; rad, rad/s: tail
 PUSHED = 1.0  # rad/s, the torso's, at once, about a random axis, in the middle of the flight
@@ -62,8 +62,7 @@ TRIALS = {
 
 def rat() -> st.Model:
     """Return the model of (1, 3) for which the flights are planned."""
-    functions = [*FUNCTIONS.split(","), *NODE]
-    return st.build(tail="articulated", segments=1, links=3, functions=functions)
+    return righting.model(1, 3)
 
 
 def body_of(model: st.Model, trial: Trial) -> st.Model:

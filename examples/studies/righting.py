@@ -41,7 +41,7 @@ def name(segments: int, links: int | None) -> str:
 def built(folder: Path) -> dict[tuple, str]:
     """Build the tails, and return hashes that distinguish their code."""
     sizes = {name(*size): size for size in (RAT, *TAILS, *MORE)}
-    of = {"program": digest(ROOT / "codegen"), "functions": righting.STAGED}
+    of = {"program": digest(ROOT / "codegen"), "functions": righting.FUNCTIONS}
     parts = {title: Part(partial(plans.content, size), of) for title, size in sizes.items()}
     found = made("tails", folder / "tails", parts)
     return {size: found[title]["content_hash"] for title, size in sizes.items()}

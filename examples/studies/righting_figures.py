@@ -20,7 +20,7 @@ LOOKS = {  # a band, and the curve that may lie on it
     "passive": {"color": "#d55e00", "linestyle": "--"},
 }
 WAYS = {"ours": ("#0072b2", "s-"), "paper": ("#d55e00", "o--")}
-RATES = {"IPOPT": (BLUE, "s"), "FATROP": ("#009e73", "D"), "paper": ("#d55e00", "o")}
+RATES = {"auto": (BLUE, "s"), "IPOPT": ("#009e73", "D"), "paper": ("#d55e00", "o")}
 PANELS = (  # of Fig. 10
     *("$p_{b,y}$ [m]", "$p_{b,z}$ [m]"),
     *(r"pitch $\phi_x$ [deg]", r"roll $\phi_y$ [deg]"),

@@ -1,5 +1,5 @@
 """The random starts of the righting study: which animal starts, how, and to what end; each is
-planned as we do, by IPOPT and by FATROP, and as the paper does.
+planned as we do, by default and by IPOPT alone, and as the paper does.
 """
 
 import time
@@ -18,8 +18,8 @@ from examples.studies.righting_plans import RAT, rat
 BLOCK = 10  # random starts that are kept together
 PAPER = "paper"
 WAYS: dict[str, dict] = {
-    "IPOPT": {"track": False},
-    "FATROP": {"solver": "fatrop", "track": False},
+    "auto": {"track": False},
+    "IPOPT": {"solver": "ipopt", "track": False},
     PAPER: {},
 }
 LIMIT = 120.0  # s a plan

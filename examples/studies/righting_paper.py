@@ -6,7 +6,7 @@ import serpentail as st
 from examples.paper.collocation import PaperPlan, paper_plan, states_of
 from serpentail.basics.attitude import angle_deg, from_angles
 
-ITERATIONS = 300  # of IPOPT, as many as in `st.plan`
+ITERATIONS = 300  # of IPOPT, as many as `st.plan` has
 TRUE = ("open_loop_attitude_error_deg", "energy_J", "peak_power_W")
 TRACKED = ("tracked_attitude_error_deg", "tracked_tail_error_rad", "dyn_err")
 SAMPLES = 1000  # of a flight

@@ -16,8 +16,8 @@ LIMIT = 300.0  # s a plan
 
 @cache
 def rat(segments: int, links: int | None) -> st.Model:
-    """Return a tail that both solvers can plan for."""
-    return righting.model(segments, links, righting.STAGED)
+    """Return a tail with the functions of plans."""
+    return righting.model(segments, links)
 
 
 def content(size: tuple) -> dict:

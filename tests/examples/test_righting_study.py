@@ -22,7 +22,7 @@ def test_the_paper_has_no_cells_where_the_objective_is_not_its_own(tmp_path):
         "least energy",
         "least time",
     }
-    errors = {"IPOPT": 0.001, "FATROP": 0.02, "paper": np.nan}
+    errors = {"auto": 0.001, "IPOPT": 0.02, "paper": np.nan}
     found = {title: plans(2, 1.0, errors[way]) for (_, way), of in wanted.items() for title in of}
     rates = kinds.rows_of(20, found)
     lines = {line.split(" | ")[0][2:]: line.split("|")[2:-1] for line in kinds.table(rates)[2:]}
@@ -55,7 +55,7 @@ def test_both_ways_get_one_task(monkeypatch):
         asked.clear()
         with row(name):
             assert [found["start"] for found in kinds.block(kind, "paper", [3, 4])] == [3, 4]
-            kinds.block(kind, "FATROP", [4])
+            kinds.block(kind, "IPOPT", [4])
             q, v = righting.tumbling(rat(), 4)
             for (q0, v0), duration, bounds in (
                 asked["task"],
@@ -65,6 +65,6 @@ def test_both_ways_get_one_task(monkeypatch):
                 np.testing.assert_array_equal(v0, v * (name != "falling cat, 1 s"))
                 assert duration == (least, most) and bounds.torque == righting.TORQUE
                 assert bounds.angle == pytest.approx(np.pi / 3)
-            assert asked["time_limit"] == kinds.LIMIT and asked["solver"] == "fatrop"
+            assert asked["time_limit"] == kinds.LIMIT and asked["solver"] == "ipopt"
             free = name == "(1, 3), any rate"
             assert asked["at_rest"] is not free and ("goal" in asked) is free

@@ -49,7 +49,10 @@ class CollocationRule:
 
 
 def collocation_rule(degree: int | None = None) -> CollocationRule:
-    """Return the rule of a degree, 3 if it is None; PlanningError if there is none."""
+    """Return the rule (Eqs. 41, 42) of a degree, 3 if it is None.
+
+    PlanningError if there is none.
+    """
     degree = USUAL_DEGREE if degree is None else degree
     if isinstance(degree, bool) or not isinstance(degree, int) or not 1 <= degree <= MOST_DEGREE:
         raise PlanningError(

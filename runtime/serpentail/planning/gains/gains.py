@@ -42,7 +42,7 @@ class Gains:
     Parameters
     ----------
     plan : Plan
-        The plan, with ``attitude="quaternion"``.
+        The plan.
     model : Model, optional
         The model of the body; it needs "airborne_rates", "airborne_rates_derivatives" and
         "momentum". Default: the plan's.

@@ -77,7 +77,10 @@ def plan_program(
     rule: CollocationRule,
     softening: float,
 ) -> PlanProgram:
-    """Return the program of a problem on a mesh; softening: of its objective, see ``cost``."""
+    """Return the program of a problem on a mesh, with the constraints of Eq. 43.
+
+    softening: of its objective, see ``cost``.
+    """
     conserved = conserved_at(model, (problem.q0, problem.v0))
     compiled = is_compiled(model, problem)
     falls = problem.is_free and _falls(model, problem, compiled)

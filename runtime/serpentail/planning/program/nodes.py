@@ -99,7 +99,7 @@ def carried_turn(body: BodyFunctions, blocks: dict[str, Any]) -> "ca.SX":
 
 
 def rates_of(symbols: NodeSymbols, problem: PlanningProblem, variables: PlanVariables) -> "ca.SX":
-    """Return the rates of the states where the dynamics is not compiled.
+    """Return the rates of the states (Eqs. 41, 42) where the dynamics is not compiled.
 
     It is evaluated at the identity attitude: in body axes only gravity depends on the attitude.
     """

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def cost(
     problem: PlanningProblem, point: PathPoint, softening: "ca.SX", torque_unit: np.ndarray
 ) -> "ca.SX":
-    """Return the integrand (CasADi), in ``objective_unit``.
+    """Return the integrand of Eq. 40 (CasADi), in ``objective_unit``.
 
     softening: of "energy", W, below which |power| is rounded off; of "time", s that a second with
     all torques at their bounds adds.

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 class PathPoint(SimpleNamespace):
     """CasADi blocks of a node by name, in SI units.
 
-    They are those of the formulation, torque (2m,), quaternion, time and duration (s), and
-    parameters (numbers by name).
+    They are attitude and quaternion (4,), which are the same, torso_rate (3,), tail, tail_rate and
+    torque (2m,), time and duration (s), and parameters (numbers by name).
 
     Further blocks are made when they are used, in world axes (m): center_of_mass (3,); position
     (3,) of B and its height; tail_points (K, 3) and the last of them, tip (3,); with contacts,

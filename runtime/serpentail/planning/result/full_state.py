@@ -1,4 +1,4 @@
-"""q and v of a planned motion, with the parts that the formulation eliminated.
+"""q and v of a planned motion, with the parts that the program eliminated.
 
 The angular velocity follows from the conserved angular momentum, the position from the free fall of
 the COM.
