@@ -12,7 +12,6 @@ import jsonschema
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as some
-from serpentail.planning.nlp.rules import collocation_rule
 
 import serpentail as st
 from serpentail.cli import cli
