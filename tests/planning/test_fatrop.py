@@ -106,14 +106,6 @@ def test_goals_are_met_however_large_an_objective_is():
             assert tilt_deg(end.q[-1, 3:7]) < 1e-5
 
 
-def test_auto_is_fatrop_and_ipopt_where_that_fails():
-    few = {"options": {"fatrop.max_iter": 1}, "intervals": 6}
-    plans = [planned(few, solver=solver, retries=1) for solver in ("auto", "fatrop")]
-    assert [plan.report["converged"] for plan in plans] == [True, False]
-    assert [plan.report["solver"] for plan in plans] == ["ipopt", "fatrop"]
-    assert planned({}, solver="auto", intervals=6).report["solver"] == "fatrop"
-
-
 def test_least_time_and_energy_are_found():
     settings = {"objective": "time", "duration": (0.2, 0.5)}
     plan, other = planned(settings), planned(settings, solver="ipopt")
