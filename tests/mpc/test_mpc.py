@@ -234,7 +234,6 @@ def test_models_and_plans_that_do_not_fit_are_refused(plan):
     for words, model, planned in (
         ("plan: value", rat(), plan.trajectory),
         ("2 tail coordinates, the model 4", longer, plan),
-        ("float", zoo.model("single"), plan),
         ("compiled=False", st.load(zoo.folder("m1_n3"), compiled=False), plan),
     ):
         with row(words), pytest.raises(st.PlanningError, match=words):

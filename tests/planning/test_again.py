@@ -14,19 +14,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from serpentail.planning.nlp import interrupt, solver, transcription
-from serpentail.planning.nlp.blas_threads import _blas, one_thread
-from serpentail.planning.nlp.equations import equations_of_motion
-from serpentail.planning.nlp.multipliers import carried
-from serpentail.planning.nlp.transcription import transcription_of
-from serpentail.planning.staged import fatrop
 
 import serpentail as st
 from serpentail.basics.attitude import from_angles
 from serpentail.cli import cli
-from serpentail.planning import backends as ways
-from serpentail.planning import mesh_refinement as rounds
+from serpentail.optimal import fatrop, interrupt
+from serpentail.optimal.blas_threads import _blas, one_thread
+from serpentail.planning import attempts as trying
+from serpentail.planning.program import nodes
 from serpentail.planning.result import report as result_report
+from serpentail.planning.search import Search
 from serpentail.scenes.plan import arguments_for, plan_arguments
 from serpentail.scenes.plan import planned as planned_by
 from tests.support import zoo

@@ -7,15 +7,11 @@ from functools import cache
 import casadi as ca
 import numpy as np
 import pytest
-from serpentail.planning.nlp.body import BodyFunctions
-from serpentail.planning.nlp.equations import equations_of_motion
-from serpentail.planning.nlp.mesh import uniform
-from serpentail.planning.nlp.rules import collocation_rule
-from serpentail.planning.nlp.transcription import transcription_of
 
 import serpentail as st
 from serpentail.basics.attitude import angle_deg, pitch_roll_yaw
 from serpentail.planning.design import checked_design
+from serpentail.planning.program.body import BodyFunctions
 from tests.support import zoo
 from tests.support.rows import row
 from tests.support.tumbling import AGAIN, integrated, rat, start

@@ -8,19 +8,15 @@ from types import SimpleNamespace
 import casadi as ca
 import numpy as np
 import pytest
-from serpentail.planning.backends import STAGED
-from serpentail.planning.nlp.bounds import limits
-from serpentail.planning.nlp.equations import equations_of_motion
-from serpentail.planning.nlp.solver import solve, solver
-from serpentail.planning.nlp.transcription import transcription_of
-from serpentail.planning.staged import fatrop
-from serpentail.planning.staged.stages import stages_of
 
 import serpentail as st
-from examples import righting
 from serpentail.basics.attitude import tilt_deg
-from serpentail.planning.free_variables import start_blocks
+from serpentail.optimal import fatrop
+from serpentail.optimal.rules import collocation_rule
+from serpentail.planning.attempts import Attempts
+from serpentail.planning.program.build import plan_program
 from serpentail.planning.result.truth import planned_torques
+from tests.references.flight_program import FlightProblem, solved
 from tests.support import zoo
 from tests.support.rows import row
 from tests.support.tumbling import AGAIN, DURATION, integrated, rat, start

@@ -5,13 +5,12 @@ goals the conserved angular momentum forbids.
 import casadi
 import numpy as np
 import pytest
-from serpentail.planning.nlp.coordinates import Attitude
-from serpentail.planning.nlp.node import PARAMETERS, _point, variables_of
-from serpentail.planning.nlp.start import shared_of
 
 import serpentail as st
 from serpentail.basics.attitude import angle_deg, from_angles, rotation_matrix
 from serpentail.planning.momentum import refuse_impossible
+from serpentail.planning.program.build import plan_program
+from serpentail.planning.result.excess import path_values
 from serpentail.planning.result.full_state import com_at_start, full_state
 from tests.support import zoo
 from tests.support.posed import posed

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from serpentail.planning.nlp.coordinates import attitude
+from scipy.interpolate import CubicHermiteSpline
 
 import serpentail as st
 from serpentail.basics.attitude import angle_deg

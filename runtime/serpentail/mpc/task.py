@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..model.model import Model
+from ..planning.goal import Bounds
 from ..planning.problem import PlanningProblem
 from ..planning.program.end import goal_matrix
 from ..planning.result.curve import Curve

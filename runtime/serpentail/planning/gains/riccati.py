@@ -5,8 +5,7 @@ from typing import Any
 import numpy as np
 
 from ...model.model import Model
-from ..nlp.coordinates import attitude
-from ..nlp.direct import goal_matrix
+from ..program.end import goal_matrix
 from ..result.plan import Plan
 from .linear import TURNED, linear_flight
 
@@ -104,7 +103,7 @@ def _end_cost(model: Model, plan: Plan) -> np.ndarray:
     """Return the weights (n, n) of z at the plan's end; what the goal leaves free has none."""
     goal, nt = plan.problem.goal, model.layout.nt
     end = linear_flight(model, plan, np.array([plan.mesh.intervals - 1]), np.ones(1))
-    x, matrix = end.planned[0, nt : nt + 4], goal_matrix(goal.attitude, attitude("quaternion"))
+    x, matrix = end.planned[0, nt : nt + 4], goal_matrix(goal.attitude)
     w, v = x[0], x[1:]
     turned = np.vstack([-v, w * np.eye(3) + np.cross(v, np.eye(3)).T])  # 2 dq / dphi
     tilt = np.zeros((len(matrix), len(end.E[0])))
