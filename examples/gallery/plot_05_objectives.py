@@ -33,7 +33,7 @@ for name, plan in plans.items():
 
 # %%
 # The plan of least time begins at the torque limit of 20 mN m. Its tail turns fast,
-# and it needs sixty times the energy of the cheapest plan.
+# and it needs eighty times the energy of the cheapest plan.
 
 plt.style.use("seaborn-v0_8-colorblind")
 figure, (top, bottom) = plt.subplots(2, 1, figsize=(7, 4.6), sharex=True, layout="constrained")
