@@ -30,10 +30,11 @@ def disturbed(size: float = 1.0, seed: int = 1):
 
 
 REST, TAIL = {"goal": st.Goal()}, {"goal": st.Goal("upright", None, (0.1, None), (None, 0.0))}
+NO_ANGLE = st.Bounds(angle=None)
 TICKS = [
     ({}, 0.003, 1.0, True, {}),
     ({}, 0.003, 8.0, True, {}),
-    (REST, 0.103, 0.1, False, {"intervals": 2}),
+    (REST | {"bounds": NO_ANGLE}, 0.103, 0.1, False, {"intervals": 2}),
     (TAIL | {"damping": 1e-4}, 0.311, 0.1, True, {"intervals": 4}),
     ({}, 0.053, 0.1, True, {"horizon": 0.15}),
     ({}, 0.307, 0.1, True, {"horizon": 0.15}),  # of which 0.1 s are left
@@ -59,7 +60,7 @@ def test_a_tick_is_the_gauss_newton_step_of_casadi_and_scipy():
 
 def test_bounds_of_angles_and_rates_are_kept_and_flags_tell_where_not():
     """A push that the goal answers with large angles; the predicted motion by CasADi."""
-    plan, free = plan_of(0, bounds=st.Bounds(angle=1.1, rate=40.0)), st.Bounds()
+    plan, free = plan_of(0, bounds=st.Bounds(angle=1.1, rate=40.0)), NO_ANGLE
     settings = {"intervals": 4, "step": 0.011, "iterations": 4}
     q, v = disturbed(1.0, 0)
     for bounds, held in ((None, True), (st.Bounds(angle=0.9, rate=25.0), True), (free, False)):
@@ -250,7 +251,7 @@ def test_models_and_plans_that_do_not_fit_are_refused(plan):
 
 def test_a_phase_of_a_sequence_is_controlled_predictively():
     right = {"intervals": 11, "duration": 0.3, "goal": st.Goal(torso_rate=None)}
-    right |= {"tolerance": None, "track": False}
+    right |= {"tolerance": None, "track": False, "bounds": NO_ANGLE}
     tracking = st.Tracking(mpc={"rate": 50, "intervals": 4})
     phases = [st.Phase("fall", 0.05), st.Phase("right", 0.3, plan=right, tracking=tracking)]
     run = st.Sequence(rat(), [*phases, st.Phase("after", 0.01)]).simulate(*start(rat(), 1))

@@ -79,7 +79,7 @@ def casadi(model) -> str:
 def plan(model) -> str:
     """Plan a motion: FATROP, IPOPT from there, its linear algebra, and the truth of its end."""
     batch(model)  # from then on nodes are evaluated in lanes, whose last digits are their own
-    settings = {"start": start(model), "intervals": 2, **AGAIN}
+    settings = {"start": start(model), **AGAIN}
     found = st.plan(model, **settings)
     other = st.plan(model, **settings, guess=found, solver="ipopt")
     assert found.report["converged"] and other.report["converged"], (found.report, other.report)
