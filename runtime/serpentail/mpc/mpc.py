@@ -70,7 +70,7 @@ class Mpc:
         "airborne_rates_derivatives" and "momentum", and has a free base. The controller computes
         with the model's type of numbers, double or float.
     plan : Plan
-        The plan, with ``attitude="quaternion"``.
+        The plan.
     rate : float, default 100
         Rate of the ticks (Hz).
     horizon : float, optional
