@@ -55,7 +55,7 @@ def best_plan(
             best, tried = search.best(rounds), search
             if not search.is_true(best):
                 best, tried = explained(search, best, stage)
-            if not settings.through_torso and search.is_true(best):
+            elif not settings.through_torso:
                 best, tried = kept_off(search, best, stage, watch, begun)
         return tried.plan(best, len(rounds), begun)
 
