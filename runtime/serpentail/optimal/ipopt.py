@@ -45,6 +45,7 @@ CLOSE_OPTIONS: dict[str, Any] = {
     "ipopt.bound_frac": 1e-6,
 }
 GUESS_OPTIONS: dict[str, dict[str, Any]] = {"far": {}, "close": CLOSE_OPTIONS}
+QUICK = {"far": 150, "close": 60}  # iterations that show whether a guess leads anywhere
 
 
 class _Sparse:
@@ -210,17 +211,19 @@ def solve(
     guess: str,
     asked: Mapping[str, Any],
     most_threads: int | None = 1,
+    quick: bool = False,
 ) -> Solution:
     """Solve from a motion that is "far" from a solution or "close" to one.
 
-    asked: options by CasADi's names; PlanningError if one is unknown.
+    asked: options by CasADi's names; PlanningError if one is unknown. quick: with few iterations.
     """
     import casadi as ca
 
     settings: dict[str, Any] = dict.fromkeys(
         ("print_time", "error_on_fail", "show_eval_warnings"), False
     )
-    settings |= OPTIONS | GUESS_OPTIONS[guess] | dict(asked)
+    few = {"ipopt.max_iter": QUICK[guess]} if quick else {}
+    settings |= OPTIONS | GUESS_OPTIONS[guess] | few | dict(asked)
     # the multipliers and parameters' derivatives are not asked for again at the end
     settings |= dict.fromkeys(("calc_lam_p", "calc_lam_x", "calc_f", "calc_g"), False)
     settings |= {"no_nlp_grad": True}

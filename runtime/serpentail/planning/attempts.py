@@ -147,7 +147,7 @@ class Attempts:
         options = self.settings.options_of(solver)
         threads = self.model.batch_library.threads
         if solver == "ipopt":
-            found = ipopt.solve(program.optimal, begin, guess, options, threads)
+            found = ipopt.solve(program.optimal, begin, guess, options, threads, quick)
         else:
             found = fatrop.solve(program.optimal, begin, guess, options, threads, quick)
         self.spent["solve_cpu_s"] += found.cpu_s

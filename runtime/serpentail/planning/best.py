@@ -23,6 +23,8 @@ NEEDED = (  # functions of the model
     *("mass_matrix", "inverse_dynamics", "forward_dynamics"),
     *("rollout", "energy", "momentum"),
 )
+# of a search that keeps the tail off the torso: it begins near its end, or does not lead there
+AROUND_ROUNDS, AROUND_OPTIONS = 2, {"fatrop.max_iter": 100}
 
 
 def best_plan(
@@ -93,7 +95,18 @@ def kept_off(
     if problem is None:
         return best, search
     motion = search.motion(best.program, best.solution)
-    again = Search(search.model, problem, replace(search.settings, guess=motion), search)
+    settings = search.settings
+    nearby = replace(
+        settings,
+        guess=motion,
+        retries=0,
+        multi_start=1,
+        solver=settings.first_solver,
+        rounds=AROUND_ROUNDS,
+        most_intervals=2 * best.program.mesh.intervals,
+        options=AROUND_OPTIONS | settings.options,
+    )
+    again = Search(search.model, problem, nearby, search)
     last = again.best(rounds_of(again, stage, watch, begun))
     if again.is_true(last):
         return last, again

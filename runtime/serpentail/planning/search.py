@@ -171,7 +171,7 @@ class Search:
         if found.success or self.settings.solver != "auto" or self.attempts.is_stopped():
             return found
         other = "fatrop" if solver == "ipopt" else "ipopt"
-        again = self.attempts.solved_near(program, motion, other)
+        again = self.attempts.solved(program, motion, "close", other, quick=True)
         return again if again.success else found
 
     def _program(self, mesh: Mesh) -> PlanProgram:
