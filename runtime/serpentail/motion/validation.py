@@ -70,7 +70,8 @@ def check_time(t: Array) -> None:
 
 def check_unit(attitude: Array) -> None:
     """ValueError unless the quaternions have unit norm."""
-    norm = np.linalg.norm(attitude, axis=1)
+    with np.errstate(over="ignore"):
+        norm = np.linalg.norm(attitude, axis=1)
     k = int(np.argmax(np.abs(norm - 1)))
     if abs(norm[k] - 1) > UNIT_TOLERANCE:
         raise ValueError(f"q[{k}, 3:7] has norm {norm[k]:.6g}: give unit quaternions (w, x, y, z)")
