@@ -140,13 +140,15 @@ class Search:
         return GuessMotion(motion.duration, motion.at, start, model, program.mesh)
 
     def rounds(self) -> Iterator[Round]:
-        """Make rounds on one first mesh after the other until a plan is true."""
+        """Make rounds on one first mesh after the other until a plan is true, or one has none."""
         softening = self.softening
         for mesh in self.attempts.meshes():
             self.softening = softening
+            found = False
             for last in self._rounds(mesh):
+                found = found or last.solution.success
                 yield last
-            if not last.solution.success or self.is_true(last) or self.attempts.is_stopped():
+            if not found or self.is_true(last) or self.attempts.is_stopped():
                 break
 
     def _rounds(self, mesh: Mesh) -> Iterator[Round]:
