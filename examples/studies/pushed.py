@@ -9,10 +9,8 @@ from pathlib import Path
 import numpy as np
 
 import serpentail as st
-from examples.front import ROOT
 from examples.righting import TORQUE, tumbling
-from examples.studies.parts import Part, digest, made
-from examples.studies.replanning import NOISE, RATE, SOURCES, STEP, measured, rat
+from examples.studies.replanning import NOISE, RATE, STEP, flown_from, measured, rat
 from serpentail.basics.attitude import tilt_deg
 
 PUSH = 10.0  # rad/s, the torso's, at once, about a random axis, in the first half of the flight
@@ -93,13 +91,7 @@ def trials_of(seed: int) -> dict:
 
 def study(folder: Path, starts: int = 100) -> None:
     """Make all flights, write summary.json, and print a table."""
-    of = {"program": digest(Path(__file__), *(ROOT / source for source in SOURCES))}
-    rat()
-    parts = {
-        f"start_{seed}": Part(partial(trials_of, seed), of | {"seed": seed})
-        for seed in range(900, 900 + starts)
-    }
-    found = [rows for rows in made("pushed", folder / "parts", parts).values() if rows]
+    found = flown_from("pushed", folder, starts, trials_of, Path(__file__))
     (folder / "summary.json").write_text(json.dumps(found, indent=1) + "\n")
     print(f"{len(found)} true plans from {starts} starts, pushed by {PUSH:g} rad/s")
     print(f"| | within {TOLERANCE:g} deg | beyond, without a flag | median | new plans |")

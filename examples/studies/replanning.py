@@ -159,15 +159,22 @@ def trials_of(seed: int) -> dict:
     }
 
 
-def study(folder: Path, starts: int) -> None:
-    """Make all flights, write summary.json and tilts.png, and print a table."""
-    of = {"program": digest(Path(__file__), *(ROOT / source for source in SOURCES))}
+def flown_from(
+    name: str, folder: Path, starts: int, trials: Callable[[int], dict], file: Path
+) -> list[dict]:
+    """Return the trials of all starts that have any, made in parallel; file: the study's own."""
+    of = {"program": digest(file, *(ROOT / source for source in SOURCES))}
     rat()
     parts = {
-        f"start_{seed}": Part(partial(trials_of, seed), of | {"seed": seed})
+        f"start_{seed}": Part(partial(trials, seed), of | {"seed": seed})
         for seed in range(900, 900 + starts)
     }
-    found = [rows for rows in made("replanning", folder / "parts", parts).values() if rows]
+    return [rows for rows in made(name, folder / "parts", parts).values() if rows]
+
+
+def study(folder: Path, starts: int) -> None:
+    """Make all flights, write summary.json and tilts.png, and print a table."""
+    found = flown_from("replanning", folder, starts, trials_of, Path(__file__))
     told = {
         title: {name: [rows[title][name] for rows in found] for name in LAWS} for title in TRIALS
     }

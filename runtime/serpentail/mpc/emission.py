@@ -4,12 +4,8 @@ import os
 import re
 from pathlib import Path
 
-import numpy as np
-
-from ..basics.checks import shown
-from ..basics.errors import PlanningError
-from ..basics.files import refuse_unwritable, replacing
 from ..model.model import Model
+from ..planning.c_text import array_text, literal, write_texts
 from .kernel import FUNCTIONS, SIZES, SOURCES, task_fields, text_of
 from .settings import NEEDED
 from .task import MpcTask
@@ -18,7 +14,6 @@ ARRAYS = [
     *("parameters", "times", "plan", "most_torque", "most_tail", "torque_weight", "rate_weight"),
     *("goal", "end_state", "end_weight", "track_weight"),
 ]
-A_LINE = 4  # numbers
 INCLUDE = re.compile(r'^#include "[^"]*"\n', re.MULTILINE)
 NAME = re.compile(r"\b(mpc_|MPC_)")
 USE = """/* The predictive controller of {prefix}, for one plan.
@@ -62,22 +57,13 @@ static int call_momentum(const void *parameters, const double *q, const double *
 def write_c(model: Model, task: MpcTask, memory: int, folder: str | os.PathLike[str]) -> list[Path]:
     """Write <model>_mpc.h and .c to a folder; return their paths; memory: in numbers.
 
-    A missing folder is made.  PlanningError if it is not a path, NotWritten if the system refuses.
+    Raises as ``write_texts``.
     """
-    try:
-        target = Path(folder)
-    except TypeError:
-        needs = "the path of a folder"
-        raise PlanningError(f"write_c: folder: value {shown(folder)}: needs {needs}") from None
     texts = {
         f"{model.name}_mpc.h": header(model.name, task.real, memory),
         f"{model.name}_mpc.c": source(model.name, task),
     }
-    for name, text in texts.items():
-        refuse_unwritable(target / name)
-        with replacing(target / name) as part:
-            part.write_text(text, encoding="utf-8")
-    return [target / name for name in texts]
+    return write_texts(folder, texts)
 
 
 def header(prefix: str, real: str, memory: int) -> str:
@@ -99,7 +85,7 @@ def source(prefix: str, task: MpcTask) -> str:
     includes = f'#include "{prefix}.h"\n#include "{prefix}_mpc.h"\n\n'
     code = _renamed("\n".join(parts), prefix)
     calls = DATA.format(prefix=prefix, **NEEDED).replace("double", task.real)
-    arrays = "\n".join(_array(name, task) for name in ARRAYS)
+    arrays = "\n".join(array_text(name, task.arrays[name], task.real, task.real) for name in ARRAYS)
     return includes + code + calls + "\n" + arrays + _plan(prefix, task)
 
 
@@ -109,23 +95,10 @@ def _renamed(text: str, prefix: str) -> str:
     return NAME.sub(lambda found: marks[found[0]], text)
 
 
-def _array(name: str, task: MpcTask) -> str:
-    """Return an array as C; an empty one as a single 0 that is never read."""
-    flat = [_literal(value, task.real) for value in task.arrays[name].ravel().tolist()] or ["0"]
-    rows = (", ".join(flat[k : k + A_LINE]) for k in range(0, len(flat), A_LINE))
-    head = f"static const {task.real} {name}[{len(flat)}] = {{\n    "
-    return head + ",\n    ".join(rows) + "};\n"
-
-
-def _literal(value: float, real: str) -> str:
-    """Return a number as C of its type."""
-    return repr(float(value)) if real == "double" else f"{float(np.float32(value))!r}f"
-
-
 def _plan(prefix: str, task: MpcTask) -> str:
     """Return the task, member by member."""
     values = {name: f"call_{name}" for name in FUNCTIONS} | {name: name for name in ARRAYS}
     for name, number in task.numbers.items():
-        values[name] = str(int(number)) if name in SIZES else _literal(number, task.real)
+        values[name] = str(int(number)) if name in SIZES else literal(number, task.real)
     rows = ",\n".join(f"    {values[name]} /* {name} */" for name, _ in task_fields(None))
     return f"\nconst {prefix}_mpc_task {prefix}_mpc_plan = {{\n{rows}\n}};\n"

@@ -10,7 +10,7 @@ from ..basics.errors import PlanningError
 from ..model.model import Model
 from ..planning.goal import Bounds
 from ..planning.magnitudes import checked_bounds
-from ..planning.result.plan import Plan
+from ..planning.result.plan import Plan, refuse_unfit
 from .kernel import FUNCTIONS
 
 NEEDED = dict(
@@ -72,21 +72,9 @@ def checked_settings(model: Model, plan: Plan, given: dict[str, Any]) -> MpcSett
 
 def refuse_unable(model: Model, plan: Plan) -> None:
     """PlanningError if the model or the plan cannot be controlled."""
-    model.refuse_fixed("Mpc")
-    missing = [name for name in NEEDED.values() if name not in model.generated]
-    if missing:
-        raise PlanningError(
-            f"Mpc: the model lacks {', '.join(missing)}: add them to the scene's functions"
-        )
-    if model.library is None:
-        raise PlanningError("Mpc: the model was loaded with compiled=False: load it again with C")
     if not isinstance(plan, Plan):
         raise PlanningError(f"Mpc: plan: value {shown(plan)}: needs what st.plan returns")
-    tail = plan.curve.starts["tail"].shape[1]
-    if tail != model.layout.nt:
-        raise PlanningError(
-            f"Mpc: the plan has {tail} tail coordinates, the model {model.layout.nt}"
-        )
+    refuse_unfit("Mpc", model, plan, NEEDED.values())
 
 
 def _refuse_path(plan: Plan, ignored: Any) -> None:

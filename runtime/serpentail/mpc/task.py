@@ -10,7 +10,7 @@ from ..model.model import Model
 from ..planning.goal import Bounds
 from ..planning.problem import PlanningProblem
 from ..planning.program.end import goal_matrix
-from ..planning.result.curve import Curve
+from ..planning.result.curve import Curve, fitted
 from ..planning.result.plan import Plan
 from .kernel import FUNCTIONS, kernel
 from .settings import NEEDED, MpcSettings
@@ -87,15 +87,12 @@ def polynomials_of(curve: Curve) -> tuple[np.ndarray, np.ndarray]:
     """Return times (pieces + 1,) s and coefficients (pieces, channels, powers) of a plan's torques,
     quaternion, tail coordinates and their rates, by powers of the time since the piece's begin.
     """
-    pieces, powers = len(curve.ends) - 1, len(curve.rule.nodes) + 1
-    s = (1 - np.cos(np.pi * np.arange(powers) / (powers - 1))) / 2
-    k = np.repeat(np.arange(pieces), powers)
-    blocks = curve.inside(k, np.tile(s, pieces))
-    values = np.concatenate([blocks[name] for name in BLOCKS], axis=1)
-    values = values.reshape(pieces, powers, -1)
-    found = np.linalg.solve(np.vander(s, increasing=True), values)
-    widths = np.diff(curve.ends)[:, None, None]
-    return curve.ends, np.swapaxes(found, 1, 2) / widths ** np.arange(powers)
+
+    def sampled(k: np.ndarray, s: np.ndarray) -> np.ndarray:
+        blocks = curve.inside(k, s)
+        return np.concatenate([blocks[name] for name in BLOCKS], axis=1)
+
+    return curve.ends, fitted(curve, sampled)
 
 
 def _steps(time: float, step: float) -> int:

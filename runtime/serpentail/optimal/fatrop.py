@@ -16,7 +16,7 @@ from .fatrop_settings import has_setting
 from .interrupt import stop_reason
 from .library import in_c, kernel
 from .problem import OcpInC, OptimalProblem
-from .samples import MeshSamples, packed, unpacked
+from .samples import MeshSamples, nodes_of, packed, unpacked
 from .solution import Solution
 from .thread_pool import crew_of, helped
 
@@ -32,7 +32,7 @@ CALLED = {  # of FATROP's C interface, by the names of Library in native/fatrop.
     "stats": "fatrop_ocp_c_get_stats",
 }
 # statuses of native/fatrop.c; FATROP's own message if it gives one
-SOLVED, SAID, STOPPED = 0, 1, 2
+SOLVED, STOPPED = 0, 2
 STATUSES = {
     2: "User_Requested_Stop",
     3: "No_Collocation_Of_Guess",
@@ -184,7 +184,7 @@ def solve(
     """
     options = options_of(asked, guess, QUICK[guess] if quick else None)
     variables = packed(problem, begin)
-    states = begin.states[1:].reshape(problem.mesh.intervals, len(problem.rule.nodes), -1)
+    states = nodes_of(problem, begin)
     begun, iterations = time.process_time(), 0
     crew = crew_of(problem, most_threads)
     for scale in SCALES[:1] if quick else SCALES:
@@ -217,7 +217,7 @@ def _run(
     crew: number of threads that evaluate stages.
     """
     code, stopping, outcome = kernel(), _Stopping(), SolveResult()
-    found, nodes = variables.copy(), np.ascontiguousarray(states).copy()
+    found, nodes = variables.copy(), states.copy()
     slopes = np.zeros(ocp.problem.free)
     with in_c(ocp) as program:
         code.program_guess(program, nodes.ctypes.data)

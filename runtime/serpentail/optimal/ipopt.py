@@ -14,7 +14,7 @@ from .blas_threads import one_thread
 from .interrupt import stop_reason
 from .library import in_c, kernel
 from .problem import OcpInC, OptimalProblem
-from .samples import MeshSamples, packed, unpacked
+from .samples import MeshSamples, nodes_of, packed, unpacked
 from .solution import Solution
 from .thread_pool import crew_of, helped
 
@@ -228,8 +228,7 @@ def solve(
     settings |= dict.fromkeys(("calc_lam_p", "calc_lam_x", "calc_f", "calc_g"), False)
     settings |= {"no_nlp_grad": True}
     begun, w = time.process_time(), packed(problem, begin)
-    states = begin.states[1:].reshape(problem.mesh.intervals, len(problem.rule.nodes), -1)
-    nodes = np.ascontiguousarray(states).copy()
+    nodes = nodes_of(problem, begin)
     crew = crew_of(problem, most_threads)
     with in_c(OcpInC(problem, 0.0, 1.0)) as program, helped(kernel(), program, crew - 1):
         kernel().program_guess(program, nodes.ctypes.data)

@@ -31,6 +31,11 @@ class MeshSamples:
         return all(np.isfinite(part).all() for part in parts) and self.duration > 0
 
 
+def nodes_of(problem: OptimalProblem, samples: MeshSamples) -> np.ndarray:
+    """Return a copy of the states (I, K, nx) at the nodes, where collocation begins in C."""
+    return samples.states[1:].reshape(problem.mesh.intervals, len(problem.rule.nodes), -1).copy()
+
+
 def packed(problem: OptimalProblem, samples: MeshSamples) -> np.ndarray:
     """Return the variables of all stages, in a row.
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from .library import in_c, kernel
 from .problem import OcpInC, OptimalProblem
-from .samples import MeshSamples, packed
+from .samples import MeshSamples, nodes_of, packed
 
 
 def violation(problem: OptimalProblem, samples: MeshSamples) -> float:
@@ -14,8 +14,7 @@ def violation(problem: OptimalProblem, samples: MeshSamples) -> float:
     if not samples.is_motion:
         return np.inf
     code, w = kernel(), packed(problem, samples)
-    states = samples.states[1:].reshape(problem.mesh.intervals, len(problem.rule.nodes), -1)
-    nodes = np.ascontiguousarray(states)
+    nodes = nodes_of(problem, samples)
     with in_c(OcpInC(problem, 1.0, 1.0)) as program:
         rows, f = code.program_rows(program), ctypes.c_double()
         g, least, most = np.zeros((3, rows))

@@ -72,13 +72,11 @@ def explained(search: Search, best: Round, stage: Stage) -> tuple[Round, Search]
     factor = found.bracket.suffices
     easier = with_bound(search.problem, found.bracket.bound, factor)
     motion = search.motion(found.program, found.solution)
-    rough = Search(search.model, easier, search.settings.roughly(motion), search)
-    last = rough.best(rounds_of(rough, stage))
-    if rough.is_true(last):
-        rough.advice = found.bracket.words(search.problem)
-        return last, rough
-    search.attempts.share(rough.attempts)
-    return best, search
+    led_to = searched_on(search, easier, search.settings.roughly(motion), stage)
+    if led_to is None:
+        return best, search
+    led_to[1].advice = found.bracket.words(search.problem)
+    return led_to
 
 
 def kept_off(
@@ -106,12 +104,24 @@ def kept_off(
         most_intervals=2 * best.program.mesh.intervals,
         options=AROUND_OPTIONS | settings.options,
     )
-    again = Search(search.model, problem, nearby, search)
-    last = again.best(rounds_of(again, stage, watch, begun))
-    if again.is_true(last):
-        return last, again
-    search.attempts.share(again.attempts)
-    return best, search
+    return searched_on(search, problem, nearby, stage, watch, begun) or (best, search)
+
+
+def searched_on(
+    search: Search,
+    problem: PlanningProblem,
+    settings: PlanSettings,
+    stage: Stage,
+    watch: Callable[[Plan], object] | None = None,
+    begun: tuple[float, float] = (0.0, 0.0),
+) -> tuple[Round, Search] | None:
+    """Return the best round of another search after one; None, its cost counted, if untrue."""
+    later = Search(search.model, problem, settings, search)
+    last = later.best(rounds_of(later, stage, watch, begun))
+    if later.is_true(last):
+        return last, later
+    search.attempts.share(later.attempts)
+    return None
 
 
 def rounds_of(

@@ -4,9 +4,9 @@ import re
 
 import numpy as np
 
+from ..c_text import array_text, literal
 from .kernel import ARRAYS, NATIVE, sizes
 
-A_LINE = 4  # numbers
 NAME = re.compile(r"\b(gains_|GAINS_)")
 USE = """
 /* The gains of one plan:
@@ -34,14 +34,10 @@ def texts_of(
     begin, end = header.replace("typedef double", f"typedef {real}").rsplit("\n#ifdef __cpl", 1)
     header = f"{begin}{USE.format(memory=8 + 2 * sizes(tables)[0])}\n#ifdef __cpl{end}"
 
-    suffix = "f" if real == "float" else ""
     for name in ARRAYS:
-        flat = [f"{float(value)!r}{suffix}" for value in tables[name].ravel()]
-        rows = (", ".join(flat[k : k + A_LINE]) for k in range(0, len(flat), A_LINE))
-        source += f"\nstatic const gains_real {name}[{len(flat)}] = {{\n    "
-        source += ",\n    ".join(rows) + "};\n"
+        source += "\n" + array_text(name, tables[name], real, "gains_real")
     numbers = ", ".join(map(str, sizes(tables)))
-    members = f"{numbers}, {float(period)!r}{suffix}, {', '.join(ARRAYS)}"
+    members = f"{numbers}, {literal(period, real)}, {', '.join(ARRAYS)}"
     source += f"\nconst gains_task gains_plan = {{{members}}};\n"
     source = source.replace('"gains.h"', f'"{prefix}_gains.h"')
 

@@ -16,11 +16,11 @@ from serpentail_scene.layout import TAIL_V
 
 from ...basics.checks import number, one_of, refusal, whole_number
 from ...basics.errors import PlanningError, SimulationError
-from ...basics.files import refuse_unwritable, replacing
 from ...model.model import Model
 from ...simulation.controllers.parts import ControllerState, NativeTorque, Parts
 from ...simulation.controllers.piecewise import Piecewise
-from ..result.plan import Plan
+from ..c_text import write_texts
+from ..result.plan import Plan, refuse_unfit
 from .emission import texts_of
 from .kernel import GainsMemory, kernel
 from .riccati import NONE, tables_of
@@ -213,17 +213,7 @@ class Gains:
             The system refuses the folder or a file.
         """
         one_of("write_c: real", real, ("float", "double"), PlanningError)
-        try:
-            target = Path(folder)
-        except TypeError:
-            needs = "the path of a folder"
-            raise refusal("write_c: folder", folder, needs, PlanningError) from None
-        texts = texts_of(self.model.name, self._tables(), 1 / self.rate, real)
-        for file, text in texts.items():
-            refuse_unwritable(target / file)
-            with replacing(target / file) as part:
-                part.write_text(text, encoding="utf-8")
-        return [target / file for file in texts]
+        return write_texts(folder, texts_of(self.model.name, self._tables(), 1 / self.rate, real))
 
     def _tables(self) -> dict[str, np.ndarray]:
         return self.tables | {"region": self.validity.region}
@@ -246,19 +236,7 @@ def _able(plan: Any, model: Model | None) -> Model:
     if not isinstance(own, Model):
         needs = "the plan's model, which a stored plan lost: st.Gains(plan, model=...)"
         raise refusal("Gains: model", own, needs, PlanningError)
-    own.refuse_fixed("Gains")
-    missing = [name for name in NEEDED if name not in own.generated]
-    if missing:
-        raise PlanningError(
-            f"Gains: the model lacks {', '.join(missing)}: add them to the scene's functions"
-        )
     if own.manifest["real"] != "double":
         raise PlanningError(f"Gains: the model computes with {own.manifest['real']}: needs double")
-    if own.library is None:
-        raise PlanningError("Gains: the model was loaded with compiled=False: load it again with C")
-    tail = plan.curve.starts["tail"].shape[1]
-    if tail != own.layout.nt:
-        raise PlanningError(
-            f"Gains: the plan has {tail} tail coordinates, the model {own.layout.nt}"
-        )
+    refuse_unfit("Gains", own, plan, NEEDED)
     return own

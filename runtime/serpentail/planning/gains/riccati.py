@@ -6,6 +6,7 @@ import numpy as np
 
 from ...model.model import Model
 from ..program.end import goal_matrix
+from ..result.curve import fitted
 from ..result.plan import Plan
 from .linear import TURNED, linear_flight
 
@@ -123,10 +124,4 @@ def _end_cost(model: Model, plan: Plan) -> np.ndarray:
 
 def _polynomials(model: Model, plan: Plan) -> np.ndarray:
     """Return the plan (pieces, channels, powers), by powers of the time since the piece's begin."""
-    pieces, powers = plan.mesh.intervals, len(plan.rule.nodes) + 1
-    s = (1 - np.cos(np.pi * np.arange(powers) / (powers - 1))) / 2
-    k = np.repeat(np.arange(pieces), powers)
-    values = linear_flight(model, plan, k, np.tile(s, pieces)).planned.reshape(pieces, powers, -1)
-    found = np.linalg.solve(np.vander(s, increasing=True), values)
-    widths = np.diff(plan.curve.ends)[:, None, None]
-    return np.swapaxes(found, 1, 2) / widths ** np.arange(powers)
+    return fitted(plan.curve, lambda k, s: linear_flight(model, plan, k, s).planned)

@@ -1,5 +1,6 @@
 """The motion of a solved program, at any time."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,6 +60,20 @@ class Curve:
         return states | {
             name: np.einsum("nj,njx->nx", basis, values[k]) for name, values in self.nodes.items()
         }
+
+
+def fitted(motion: Curve, sampled: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> np.ndarray:
+    """Return polynomials (pieces, channels, powers) of the time since each interval's beginning.
+
+    sampled: values (n, channels) in intervals k (n,) at fractions s (n,) of them.
+    """
+    pieces, powers = len(motion.ends) - 1, len(motion.rule.nodes) + 1
+    s = (1 - np.cos(np.pi * np.arange(powers) / (powers - 1))) / 2
+    k = np.repeat(np.arange(pieces), powers)
+    values = sampled(k, np.tile(s, pieces)).reshape(pieces, powers, -1)
+    found = np.linalg.solve(np.vander(s, increasing=True), values)
+    widths = np.diff(motion.ends)[:, None, None]
+    return np.swapaxes(found, 1, 2) / widths ** np.arange(powers)
 
 
 def curve(program: PlanProgram, samples: MeshSamples) -> Curve:

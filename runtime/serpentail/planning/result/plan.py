@@ -1,6 +1,6 @@
 """``Plan``: a planned motion with its torques, and a report on the true motion."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from serpentail_scene.layout import TAIL_V
 
-from ...basics.errors import SimulationError
+from ...basics.errors import PlanningError, SimulationError
 from ...model.model import Model
 from ...motion.archive import origin
 from ...motion.text import SI, framed
@@ -224,6 +224,25 @@ class Plan:
             Torques (N m).
         """
         return self.torque(min(max(t, 0.0), self.duration))[0] - self.problem.damping * v[TAIL_V]
+
+
+def refuse_unfit(name: str, model: Model, plan: Plan, functions: Iterable[str]) -> None:
+    """ModelError or PlanningError if a model cannot fly a plan by a controller of this name."""
+    model.refuse_fixed(name)
+    missing = [function for function in functions if function not in model.generated]
+    if missing:
+        raise PlanningError(
+            f"{name}: the model lacks {', '.join(missing)}: add them to the scene's functions"
+        )
+    if model.library is None:
+        raise PlanningError(
+            f"{name}: the model was loaded with compiled=False: load it again with C"
+        )
+    tail = plan.curve.starts["tail"].shape[1]
+    if tail != model.layout.nt:
+        raise PlanningError(
+            f"{name}: the plan has {tail} tail coordinates, the model {model.layout.nt}"
+        )
 
 
 def _digits(value: Any) -> str:
