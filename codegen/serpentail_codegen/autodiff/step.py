@@ -200,24 +200,29 @@ def adjoint(
     tape = rules.tape
     incoming, adjoints = _output_adjoints(rules, given)
 
-    # each operation passes its adjoint on to its operands
+    # each operation passes its adjoint on to its operands, sines and cosines to their angles
+    angles = AngleAdjoints(tape, step, kinds)
     for node in reversed(live_nodes(step.nodes, step.results)):
         if step.nodes[node][0] not in LEAVES:
             for operand, partial in rules.partials(node).items():
-                passed_on = tape.mul(partial, adjoints[node])
-                adjoints[operand] = tape.add(adjoints[operand], passed_on)
+                if operand in angles.slopes:
+                    angles.add(operand, partial, adjoints[node])
+                else:
+                    passed_on = tape.mul(partial, adjoints[node])
+                    adjoints[operand] = tape.add(adjoints[operand], passed_on)
 
     # those of the inputs, zero where no node reads a scalar
     position = {args[0]: node for node, (op, *args) in enumerate(step.nodes) if op == "input"}
     outputs: list[tuple[str, int]] = []
     results: list[int] = []
     for name, span in spans(step.inputs).items():
-        if name in wanted:
+        if name in kinds:
+            vector = [angles.total(name, angle) for angle in range(kinds[name].angles)]
+            outputs.append((f"b_{name}_angles", len(vector)))
+            results += vector
+        elif name in wanted:
             vector = [adjoints[position[k]] if k in position else tape.const(0) for k in span]
-            suffix = ""
-            if name in kinds:
-                vector, suffix = angle_adjoints(tape, span, kinds[name], vector), "_angles"
-            outputs.append((f"b_{name}{suffix}", len(vector)))
+            outputs.append((f"b_{name}", len(vector)))
             results += vector
 
     chosen = some_of(step.inputs, wanted) + some_of(step.outputs, given, "_of")
@@ -247,12 +252,38 @@ def _output_adjoints(
     return incoming, adjoints
 
 
-def angle_adjoints(
-    tape: Tape, span: range, kind: SinesAndCosines, adjoints: Iterable[int]
-) -> list[int]:
-    """Return the adjoints of angles from those of their sines and cosines."""
-    out = [tape.const(0)] * kind.angles
-    for (angle, sign, other), adjoint_node in zip(kind.scalars, adjoints, strict=True):
-        term = tape.mul(tape.input(span[other]), adjoint_node)
-        out[angle] = tape.add(out[angle], term if sign > 0 else tape.neg(term))
-    return out
+class AngleAdjoints:
+    """Adjoints of angles, gathered by the adjoints of the nodes that read their sines and cosines:
+    of y = c v + s w, (c w - s v) times that of y.
+
+    slopes: of each node that is a sine or cosine, its input, its angle and its derivative.
+    """
+
+    def __init__(self, tape: Tape, step: Step, kinds: dict[str, SinesAndCosines]):
+        self.tape, self.slopes = tape, {}
+        self.terms: dict[tuple[str, int], Combination] = {}
+        positions = {args[0]: node for node, (op, *args) in enumerate(step.nodes) if op == "input"}
+        for name, span in spans(step.inputs).items():
+            if name in kinds:
+                for k, (angle, sign, other) in zip(span, kinds[name].scalars, strict=True):
+                    if k in positions:
+                        partner = tape.input(span[other])
+                        slope = partner if sign > 0 else tape.neg(partner)
+                        self.slopes[positions[k]] = (name, angle), slope
+
+    def add(self, node: int, partial: int, adjoint_node: int) -> None:
+        """Add what a sine or cosine passes on to its angle."""
+        tape, (angle, slope) = self.tape, self.slopes[node]
+        op, *args = tape.nodes[adjoint_node]
+        if op == "neg":
+            adjoint_node, partial = args[0], tape.neg(partial)
+        terms = self.terms.setdefault(angle, {})
+        before = terms.get(adjoint_node, tape.const(0))
+        terms[adjoint_node] = tape.add(before, tape.mul(slope, partial))
+
+    def total(self, name: str, angle: int) -> int:
+        """Return the adjoint of one angle of an input."""
+        total = self.tape.const(0)
+        for adjoint_node, coefficient in self.terms.get((name, angle), {}).items():
+            total = self.tape.add(total, self.tape.mul(coefficient, adjoint_node))
+        return total
