@@ -4,10 +4,11 @@ Each array ``x`` that depends on the inputs of interest gets a companion ``d_x``
 scalar of ``d_x`` has one number for each direction; without, it is the derivative in one direction.
 """
 
-from collections.abc import Callable, Collection, Iterator
-from dataclasses import replace
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 from ..ir import program as ir
+from ..ir.builder import narrowed
 from ..ir.dataflow import forward_slice, inner_arrays, pruned, rule_of, writes
 from .angles import SinesAndCosinesArray, angle_inputs, kinds, sines_and_cosines_arrays
 from .step import tangent
@@ -17,6 +18,32 @@ Bound = Callable[[tuple[ir.Loop, ...]], ir.Index | None]
 
 def all_lanes(loops: tuple[ir.Loop, ...]) -> None:
     """Set no bound: every lane is needed in all loops."""
+
+
+@dataclass(frozen=True)
+class Lanes:
+    """Directions of differentiation side by side.
+
+    active: the inputs that they move.
+    count: how many they are, 0 for one direction in narrow scalars.
+    bound: how many are needed inside given loops.
+    prefix: how the names of their tangents begin, as in ``d_x``.
+    wanted: the outputs whose tangents are given; None for all.
+    """
+
+    active: Collection[str]
+    count: int = 0
+    bound: Bound = all_lanes
+    prefix: str = "d"
+    wanted: Collection[str] | None = None
+
+    def companion(self, array: ir.Array) -> ir.Array:
+        """Return the tangents of an array; those of parameters are inputs."""
+        role = "input" if array.role == "parameters" else array.role
+        if role == "output" and self.wanted is not None and array.name not in self.wanted:
+            role = "local"
+        name = f"{self.prefix}_{array.name}"
+        return ir.Array(name, role, array.size, array.count, lanes=self.count)
 
 
 def tangent_program(
@@ -31,33 +58,37 @@ def tangent_program(
     ``lanes`` is the number of directions, 0 for one direction in narrow scalars; ``bound`` tells
     how many of the lanes are needed inside given loops.  ``kept`` outputs are given, too.
     """
-    # every array that depends on the active ones has tangents, or its angles do
-    moving = forward_slice(program.body, active)
-    by_angles = {
-        name: array for name, array in sines_and_cosines_arrays(program).items() if name in moving
-    }
-    companions = {
-        a.name: ir.Array(f"d_{a.name}", _role(a), a.size, a.count, lanes=lanes)
-        for a in program.arrays
-        if a.name in moving - by_angles.keys()
-    }
+    return tangents_together(program, [Lanes(active, lanes, bound)], kept)
+
+
+def tangents_together(
+    program: ir.Program, kinds_of_lanes: Sequence[Lanes], kept: Collection[str] = ()
+) -> ir.Program:
+    """Return the program of the tangents of several kinds at once, which share all values."""
+    sweeps, companions, names = [], [], []
+    arrays = sines_and_cosines_arrays(program)
+    for lanes in kinds_of_lanes:
+        # every array that depends on the active ones has tangents, or its angles do
+        moving = forward_slice(program.body, lanes.active)
+        by_angles = {name: array for name, array in arrays.items() if name in moving}
+        moving -= by_angles.keys()
+        own = {a.name: lanes.companion(a) for a in program.arrays if a.name in moving}
+        sweeps.append(_Tangents(own, by_angles, lanes.bound))
+        companions += own.values()
+        names += [lanes.prefix, *lanes.active]
 
     # lanes that a statement leaves out are zero from the start
-    body = _Tangents(companions, by_angles, bound).body(program.body, ())
+    body = _Together(sweeps).body(program.body, ())
     fills = tuple(ir.Fill(ref, (0,) * ref.size) for ref in _partly_written(body))
 
-    own = inner_arrays(program)
-    own = tuple(replace(a, role="output") if a.name in kept else a for a in own)
-    arrays = (*own, *companions.values())
-    name = "_".join(["d", *active, program.name])
-    if lanes:
-        name = f"{name}_rows_of_{lanes}"
-    return pruned(replace(program, name=name, arrays=arrays, body=fills + body))
-
-
-def _role(array: ir.Array) -> str:
-    """Return the role of an array's tangents; the tangents of parameters are inputs."""
-    return "input" if array.role == "parameters" else array.role
+    own_arrays = inner_arrays(program)
+    given = (replace(a, role="output") if a.name in kept else a for a in own_arrays)
+    name = "_".join([*names, program.name])
+    counts = [str(lanes.count) for lanes in kinds_of_lanes if lanes.count]
+    if counts:
+        name = "_".join([name, "rows_of", *counts])
+    arrays_of_all = (*given, *companions)
+    return pruned(replace(program, name=name, arrays=arrays_of_all, body=fills + body))
 
 
 def _partly_written(body: ir.Body) -> list[ir.Ref]:
@@ -72,7 +103,7 @@ def _partly_written(body: ir.Body) -> list[ir.Ref]:
 
 
 class _Tangents:
-    """Rewrites statements so that they compute tangents as well.
+    """The tangents of one kind: statements that compute them beside those of the values.
 
     companions: the tangents of arrays, by the names of the arrays.
     by_angles: arrays of sines and cosines; they have no tangents, those of their angles serve.
@@ -94,6 +125,47 @@ class _Tangents:
         """Return the tangents of a reference."""
         return replace(ref, array=self.companions[ref.array.name])
 
+    def cleared(self, *targets: ir.Ref) -> Iterator[ir.Statement]:
+        """Yield what sets the tangents of overwritten scalars to zero."""
+        for target in targets:
+            if self.moves(target):
+                yield ir.Fill(self.of(target), (0,) * target.size)
+
+    def copy(self, copy: ir.Copy) -> Iterator[ir.Statement]:
+        """Yield the copy of the tangents."""
+        if self.moves(copy.target) and self.moves(copy.source):
+            yield replace(copy, target=self.of(copy.target), source=self.of(copy.source))
+        elif not copy.adds:
+            yield from self.cleared(copy.target)
+
+    def step(self, call: ir.Apply, loops: tuple[ir.Loop, ...]) -> ir.Apply | None:
+        """Return a step with its tangents, None if it has none."""
+        values = call.inputs()
+        active = {name for name, ref in values.items() if self.moves(ref)}
+        angles = angle_inputs(self.by_angles, values)
+
+        # sines and cosines need no tangents, and of constants they are zero
+        makes_sines = any(ref.array.name in self.by_angles for ref in call.writes)
+        if makes_sines or not (active or angles):
+            return None
+
+        # the step of values and tangents, and what it reads by the names of its inputs
+        step = tangent(call.step, frozenset(active | angles.keys()), kinds(angles))
+        for name, array in angles.items():
+            values[f"d_{name}_angles"] = self.of(array.angles(values[name]))
+        for name in active:
+            values[f"d_{name}"] = self.of(values[name])
+        targets = (*call.writes, *map(self.of, call.writes))
+        both = ir.Apply.named(step, values, targets, call.adds * 2)
+        return replace(both, columns=self.bound(loops))
+
+
+class _Together:
+    """Rewrites statements so that they compute tangents of several kinds as well."""
+
+    def __init__(self, sweeps: Sequence[_Tangents]):
+        self.sweeps = sweeps
+
     def body(self, body: ir.Body, loops: tuple[ir.Loop, ...]) -> ir.Body:
         """Return the transformed loop nest."""
         out: list[ir.Statement] = []
@@ -113,41 +185,30 @@ class _Tangents:
     def fill(self, fill: ir.Fill, loops: tuple[ir.Loop, ...]) -> Iterator[ir.Statement]:
         """Yield a fill, and forget the tangents of what it overwrites."""
         yield fill
-        yield from self.cleared(fill.target)
-
-    def cleared(self, *targets: ir.Ref) -> Iterator[ir.Statement]:
-        """Yield what sets the tangents of overwritten scalars to zero."""
-        for target in targets:
-            if self.moves(target):
-                yield ir.Fill(self.of(target), (0,) * target.size)
+        for sweep in self.sweeps:
+            yield from sweep.cleared(fill.target)
 
     def copy(self, copy: ir.Copy, loops: tuple[ir.Loop, ...]) -> Iterator[ir.Statement]:
         """Yield a copy, and that of the tangents."""
         yield copy
-        if self.moves(copy.target) and self.moves(copy.source):
-            yield replace(copy, target=self.of(copy.target), source=self.of(copy.source))
-        elif not copy.adds:
-            yield from self.cleared(copy.target)
+        for sweep in self.sweeps:
+            yield from sweep.copy(copy)
 
     def apply(self, call: ir.Apply, loops: tuple[ir.Loop, ...]) -> Iterator[ir.Statement]:
-        """Yield a step with its tangents."""
-        values = call.inputs()
-        active = {name for name, ref in values.items() if self.moves(ref)}
-        angles = angle_inputs(self.by_angles, values)
+        """Yield a step with its tangents: with the last kind; the others read the same values, so
+        they come before it.
+        """
+        still = [sweep for sweep in self.sweeps if sweep.step(call, loops) is None]
+        steps = [both for sweep in self.sweeps if (both := sweep.step(call, loops)) is not None]
+        yield from (tangents_alone(both, call) for both in steps[:-1])
+        yield steps[-1] if steps else call
+        for sweep in still:
+            yield from sweep.cleared(*call.stored())
 
-        # sines and cosines need no tangents, and of constants they are zero
-        makes_sines = any(ref.array.name in self.by_angles for ref in call.writes)
-        if makes_sines or not (active or angles):
-            yield call
-            yield from self.cleared(*call.stored())
-            return
 
-        # the step of values and tangents, and what it reads by the names of its inputs
-        step = tangent(call.step, frozenset(active | angles.keys()), kinds(angles))
-        for name, array in angles.items():
-            values[f"d_{name}_angles"] = self.of(array.angles(values[name]))
-        for name in active:
-            values[f"d_{name}"] = self.of(values[name])
-        targets = (*call.writes, *map(self.of, call.writes))
-        both = ir.Apply.named(step, values, targets, call.adds * 2)
-        yield replace(both, columns=self.bound(loops))
+def tangents_alone(both: ir.Apply, call: ir.Apply) -> ir.Apply:
+    """Return a step of values and tangents without the values."""
+    first = len(call.writes)
+    step = narrowed(both.step, {name for name, _ in both.step.outputs[first:]})
+    alone = ir.Apply.named(step, both.inputs(), both.writes[first:], call.adds)
+    return replace(alone, columns=both.columns)

@@ -10,7 +10,7 @@ from serpentail_scene.layout import OMEGA, PER_SEGMENT, TORSO_NQ, TORSO_NV, VELO
 
 from ...ir.program import Array, Index, Ref
 from ...mechanics import airborne, rotations
-from ..derivatives.differentiated import POWER_AND_MOMENTUM, VIRTUAL_POWER
+from ..derivatives.differentiated import POWER_AND_MOMENTUM
 from ..derivatives.directions import Directions
 from ..derivatives.hessian import tangents_of_gradient
 from ..draft import Draft
@@ -107,10 +107,10 @@ def curvatures(
     rigid = {"drift": drift, "slide": slide, "rigid": weights.turning}
 
     given["b_power"] = draft.constant("minus_one", [-1])
-    arguments = given | rigid | of_q.tangents(draft)
-    by_q = tangents_of_gradient(draft, POWER_AND_MOMENTUM, of_q, arguments, BY_Q)
-    arguments = given | of_v.tangents(draft)
-    by_v = tangents_of_gradient(draft, VIRTUAL_POWER, of_v, arguments, ("v",))
+    given |= rigid | of_q.tangents(draft) | {"dv_v": of_v.tangents(draft)["d_v"]}
+    by_q, by_v = tangents_of_gradient(
+        draft, POWER_AND_MOMENTUM, (of_q, BY_Q), (of_v, ("v",)), given
+    )
     return Curvatures(by_q, by_v["v"], of_q, of_v)
 
 

@@ -5,7 +5,7 @@ from types import MappingProxyType
 
 from serpentail_scene.layout import OMEGA, TORSO_NV, VELOCITY
 
-from ...autodiff.forward import tangent_program
+from ...autodiff.forward import Lanes, tangent_program, tangents_together
 from ...autodiff.reverse import adjoint_program
 from ...ir.program import Array, Ref
 from ...mechanics import rotation_derivatives as turns
@@ -22,6 +22,8 @@ from .torso_axes import TorsoAxes, torso_axes
 BY_Q = ("q", "v", "v_dot", "a", "u")
 BY_V = ("v", "u")  # the other blocks are transposes of those by q, or zero
 
+Wanted = tuple[Directions, tuple[str, ...]]  # directions, and which gradients along them
+
 
 def assemble_inverse_dynamics_hessian(draft: Draft, arrays: dict[str, Array]) -> None:
     """Tangents of the gradient of lambda^T (H v_dot + C) in torso axes, by tail coordinates and by
@@ -36,8 +38,10 @@ def assemble_inverse_dynamics_hessian(draft: Draft, arrays: dict[str, Array]) ->
     given = {name: arrays[name] for name in ("q", "v", "v_dot", "multiplier")} | axes.arrays()
     given["b_power"] = draft.fixed("one", [1]).array
     d_q, d_v = of_q.tangents(draft), of_v.tangents(draft)
-    by_q = tangents_of_gradient(draft, VIRTUAL_POWER, of_q, given | d_q, BY_Q, gradient)
-    by_v = tangents_of_gradient(draft, VIRTUAL_POWER, of_v, given | d_v, BY_V)
+    given |= d_q | {"dv_v": d_v["d_v"]}
+    by_q, by_v = tangents_of_gradient(
+        draft, VIRTUAL_POWER, (of_q, BY_Q), (of_v, BY_V), given, gradient
+    )
     blocks = HessianBlocks(draft, of_q, of_v, arrays)
     blocks.clear()
     blocks.of_motion(by_q["q"], by_q["v"], by_v["v"])
@@ -60,25 +64,32 @@ def assemble_inverse_dynamics_hessian(draft: Draft, arrays: dict[str, Array]) ->
 def tangents_of_gradient(
     draft: Draft,
     function: Function,
-    directions: Directions,
+    by_q: Wanted,
+    by_v: Wanted,
     arguments: dict[str, Array],
-    wanted: tuple[str, ...],
     gradients: Mapping[str, Array] = MappingProxyType({}),
-) -> dict[str, Array]:
-    """Return the tangents of the wanted gradients of ``power`` as wide rows, and store some of the
-    gradients; the weight of the power is the argument ``b_power``.
-    """
-    tail, lanes = draft.tail, directions.count
-    inner = adjoint_program(assemble(function, tail), wanted, ("power",))
-    active = [name for name in ("q", "v") if f"d_{name}" in arguments]
-    kept = {f"b_{name}": array for name, array in gradients.items()}
-    inner = tangent_program(inner, active, lanes, directions.outward, kept)
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Return the tangents of the wanted gradients of ``power``, along coordinates and along
+    velocities, as wide rows, and store some of the gradients.
 
-    sizes, label = {a.name: a.length(tail) for a in function.inputs}, directions.label
-    tangents = {n: draft.wide(f"d_b_{n}_{label}", sizes[n], lanes) for n in wanted}
-    outputs = {f"d_b_{name}": array for name, array in tangents.items()}
-    draft.call(inner, **arguments, **outputs, **kept)
-    return tangents
+    Arguments: those of the function, the directions ``d_q`` and ``dv_v``, and ``b_power``, the
+    weight of the power.
+    """
+    sizes = {a.name: a.length(draft.tail) for a in function.inputs}
+    kept = {f"b_{name}": array for name, array in gradients.items()}
+    lanes, found, outputs = [], [], {}
+    # what moves along coordinates reads most of the values, so it shares a step with them
+    for active, prefix, (directions, names) in (("v", "dv", by_v), ("q", "d", by_q)):
+        count, label = directions.count, directions.label
+        wanted = [f"b_{name}" for name in names]
+        lanes.append(Lanes((active,), count, directions.outward, prefix, wanted))
+        rows = {name: draft.wide(f"d_b_{name}_{label}", sizes[name], count) for name in names}
+        outputs |= {f"{prefix}_b_{name}": array for name, array in rows.items()}
+        found.append(rows)
+
+    inner = adjoint_program(assemble(function, draft.tail), by_q[1], ("power",))
+    draft.call(tangents_together(inner, lanes, kept), **arguments, **outputs, **kept)
+    return found[1], found[0]
 
 
 def turned_twice(
