@@ -28,11 +28,12 @@ class Directions:
     torso: tuple[str, ...]
     coordinates: bool = True
     rates: bool = True
+    axes: range = range(3)  # of the torso, about or along which the directions move it
 
     @property
     def base(self) -> int:
         """Lanes of the torso."""
-        return 3 * len(self.torso)
+        return len(self.axes) * len(self.torso)
 
     @property
     def each(self) -> int:
@@ -76,11 +77,14 @@ class Directions:
         q, with a unit quaternion, is given if the attitude is differentiated.
         """
         sizes = {"d_q": self.tail.nq} if self.coordinates else {}
-        sizes |= {"d_v": self.tail.nv} if self.rates else {}
+        sizes |= {"d_v": self.tail.nv} if self.rates or self.torso else {}
         tangents = {n: draft.wide(f"{n}_{self.label}", s, self.count) for n, s in sizes.items()}
+        if "d_v" in tangents and (not self.rates or len(self.axes) < 3):
+            draft.fill(tangents["d_v"].whole(), 0)
         for lane, name in enumerate(self.torso):
             if name != "turn":
-                draft.unit(block(tangents["d_v"], TORSO[name][0]), 3 * lane)
+                rows = tangents["d_v"].part(TORSO[name][0].start + self.axes.start, len(self.axes))
+                draft.unit(rows, len(self.axes) * lane)
             elif q:
                 turn = {"quaternion": block(q, QUATERNION), "turn": self.turn(draft)}
                 draft.step(

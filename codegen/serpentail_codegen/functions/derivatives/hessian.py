@@ -7,13 +7,14 @@ from serpentail_scene.layout import OMEGA, TORSO_NV, VELOCITY
 
 from ...autodiff.forward import Lanes, tangent_program, tangents_together
 from ...autodiff.reverse import adjoint_program
-from ...ir.program import Array, Ref
+from ...ir.program import Array, Ref, padded
 from ...mechanics import rotation_derivatives as turns
 from ...mechanics import rotations
 from ..draft import Draft
 from ..function import Function, assemble
 from ..layout import block
 from ..scope import Vectors
+from ..tail import Tail
 from .differentiated import MOMENT, VIRTUAL_POWER
 from .directions import Directions
 from .hessian_blocks import HessianBlocks
@@ -31,8 +32,7 @@ def assemble_inverse_dynamics_hessian(draft: Draft, arrays: dict[str, Array]) ->
 
     All terms with rotations of the torso follow from these.
     """
-    of_q = Directions(draft.tail, (), rates=False)
-    of_v = Directions(draft.tail, ("omega",), coordinates=False)
+    of_q, of_v = split_directions(draft.tail)
     axes = torso_axes(draft, arrays["q"], arrays["v_dot"], arrays["multiplier"])
     gradient = {name: draft.array(f"b_{name}", 3) for name in ("a", "u")}
     given = {name: arrays[name] for name in ("q", "v", "v_dot", "multiplier")} | axes.arrays()
@@ -61,6 +61,16 @@ def assemble_inverse_dynamics_hessian(draft: Draft, arrays: dict[str, Array]) ->
     turned_twice(draft, d_q, axes, gradient, blocks)
 
 
+def split_directions(tail: Tail) -> tuple[Directions, Directions]:
+    """Return the directions of the coordinates, and of omega and the rates; some of omega go with
+    the coordinates where that fills whole vectors.
+    """
+    nt, axes = tail.nt, OMEGA.stop - OMEGA.start
+    moved = min(range(axes), key=lambda k: padded(nt + k) + padded(nt + axes - k))
+    of_q = Directions(tail, ("omega",) if moved else (), rates=False, axes=range(moved))
+    return of_q, Directions(tail, ("omega",), coordinates=False, axes=range(moved, axes))
+
+
 def tangents_of_gradient(
     draft: Draft,
     function: Function,
@@ -79,10 +89,11 @@ def tangents_of_gradient(
     kept = {f"b_{name}": array for name, array in gradients.items()}
     lanes, found, outputs = [], [], {}
     # what moves along coordinates reads most of the values, so it shares a step with them
-    for active, prefix, (directions, names) in (("v", "dv", by_v), ("q", "d", by_q)):
+    for prefix, (directions, names) in (("dv", by_v), ("d", by_q)):
+        active = [name for name in ("q", "v") if f"{prefix}_{name}" in arguments]
         count, label = directions.count, directions.label
         wanted = [f"b_{name}" for name in names]
-        lanes.append(Lanes((active,), count, directions.outward, prefix, wanted))
+        lanes.append(Lanes(active, count, directions.outward, prefix, wanted))
         rows = {name: draft.wide(f"d_b_{name}_{label}", sizes[name], count) for name in names}
         outputs |= {f"{prefix}_b_{name}": array for name, array in rows.items()}
         found.append(rows)
@@ -107,7 +118,7 @@ def turned_twice(
         assemble(MOMENT, draft.tail), ("q",), of_q.count, of_q.outward, ("moment",)
     )
     h, d_h = draft.array("h", 3), draft.wide("d_h", 3, of_q.count)
-    draft.call(inner, q=blocks.arrays["q"], moment=h, d_moment=d_h, **d_q)
+    draft.call(inner, q=blocks.arrays["q"], moment=h, d_moment=d_h, d_q=d_q["d_q"])
 
     gradients = {f"b_{name}": array[0] for name, array in gradient.items()}
     turned = Vectors({**axes.vectors(), **gradients, "h": h[0], "R": axes.R})

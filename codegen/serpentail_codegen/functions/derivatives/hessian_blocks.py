@@ -31,15 +31,18 @@ class HessianBlocks:
     def of_motion(self, by_q: Array, v_by_q: Array, by_v: Array) -> None:
         """Copy tangents of the gradients by q and v along q, and of the gradient by v along v."""
         draft, tail, nv = self.draft, self.draft.tail, self.draft.tail.nv
-        with draft.loop("k", self.of_v.count) as k:
+        with draft.loop("k", nv - OMEGA.start) as k:
             to = self.arrays["qv"].part(nv * TORSO_NV + k + OMEGA.start, tail.nt, nv)
-            draft.copy(to, v_by_q.lane(k + OMEGA.start, 0, tail.nt))
-        with draft.loop("k", 3) as k:
-            self._mirrored("vv", k + OMEGA.start, OMEGA.start, by_v.lane(k + OMEGA.start, 0, 3))
+            draft.copy(to, v_by_q.lane(k + OMEGA.start, self.of_q.base, tail.nt))
+        with draft.loop("k", nv - OMEGA.start) as k:
+            row = k + OMEGA.start
+            for directions, source in ((self.of_q, v_by_q), (self.of_v, by_v)):
+                if directions.torso:
+                    lanes, first = source.lane(row, 0, directions.base), directions.axes.start
+                    self._mirrored("vv", row, OMEGA.start + first, lanes)
         with draft.loop("i", tail.segments) as i, draft.loop("k", PER_SEGMENT) as k:
             number = coordinate(i) + k
             row = number + TORSO_NV
-            self._mirrored("vv", row, OMEGA.start, by_v.lane(row, 0, 3))
             with draft.loop("l", i + 1) as other:
                 column = coordinate(other) + TORSO_NV
                 for block, source, first in (
@@ -61,7 +64,7 @@ class HessianBlocks:
         tail = self.draft.tail
         with self.draft.loop("row", tail.nv) as r:
             to = self.arrays["aq"].part(tail.nv * r + TORSO_NV, tail.nt)
-            self.draft.copy(to, rows.lane(r, 0, tail.nt))
+            self.draft.copy(to, rows.lane(r, self.of_q.base, tail.nt))
 
     def of_turn(self, by_q: Array, by_v: Array) -> None:
         """Copy tangents of the gradient by a rotation of the torso, except those along a
@@ -70,8 +73,12 @@ class HessianBlocks:
         nv = self.draft.tail.nv
         with self.draft.loop("k", 3) as k:
             row = k + OMEGA.start
-            self._mirrored("qq", row, TORSO_NV, by_q.lane(k, 0, by_q.lanes))
-            to = self.arrays["qv"].part(nv * row + OMEGA.start, by_v.lanes)
+            base, first = self.of_q.base, self.of_v.axes.start
+            self._mirrored("qq", row, TORSO_NV, by_q.lane(k, base, by_q.lanes - base))
+            if base:
+                to = self.arrays["qv"].part(nv * row + OMEGA.start, base)
+                self.draft.copy(to, by_q.lane(k, 0, base))
+            to = self.arrays["qv"].part(nv * row + OMEGA.start + first, by_v.lanes)
             self.draft.copy(to, by_v.lane(k, 0, by_v.lanes))
 
     def of_turned_inertia(self, by_turn: Array) -> None:
@@ -79,7 +86,7 @@ class HessianBlocks:
         tail = self.draft.tail
         with self.draft.loop("k", 3) as k:
             to = self.arrays["aq"].part(k + (tail.nv * TORSO_NV + OMEGA.start), tail.nt, tail.nv)
-            self.draft.copy(to, by_turn.lane(k, 0, tail.nt))
+            self.draft.copy(to, by_turn.lane(k, self.of_q.base, tail.nt))
 
     def columns_of_turns(self, block: str, first: int, count: int) -> dict[str, Ref]:
         """Return the columns of rotations in some rows of a block, by the names of a step's
