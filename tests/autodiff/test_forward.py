@@ -1,10 +1,10 @@
 """Tangents of programs: exact in rational arithmetic, where dual numbers run the same loops."""
 
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 
-from serpentail_codegen.autodiff.forward import tangent_program
+from serpentail_codegen.autodiff.forward import Lanes, tangent_program, tangents_together
 from serpentail_codegen.ir.interpret import Run
 from serpentail_codegen.ir.program import Index, statements
 from tests.support.programs import EXACT, NEXT, PROGRAMS, SQUARE, Narrow, built, jacobian, numbers
@@ -140,3 +140,23 @@ def test_what_does_not_move_has_no_tangents():
     assert {"d_mass", "d_t", "d_u"} <= names
     assert not {"d_x", "d_y", "d_w", "dead", "d_dead", "w"} & names
     assert [a.role for a in arrays if a.name == "d_mass"] == ["input"]
+
+
+def test_kinds_of_lanes_share_a_sweep():
+    """Beside all values, each kind has the tangents that it has alone, or those that are wanted."""
+    for name, program in PROGRAMS.items():
+        arguments, names = numbers(program), arguments_of(program)
+        for first, second in product(subsets(names), names):
+            counts = [sum(len(arguments[n]) for n in active) for active in (first, (second,))]
+            alone = Lanes((second,), counts[1], wanted=["w"])
+            both = tangents_together(program, [Lanes(first, counts[0], prefix="e"), alone])
+            rows = {f"e{n[1:]}": values for n, values in unit_rows(arguments, first).items()}
+            found = ran(both, arguments | rows | unit_rows(arguments, (second,)))
+            given, own = set(outputs_of(both)), outputs_of(tangent_program(program, first, 1))
+            with row(name, *first, second):
+                assert {n for n in given if n[:2] == "e_"} == {f"e{n[1:]}" for n in own}
+                for prefix, active, count in (("e", first, counts[0]), ("d", (second,), counts[1])):
+                    expected = jacobian(program, arguments, active)
+                    for n in [n for n in given if n[:2] == f"{prefix}_"]:
+                        assert by_lanes(found[n], count) == expected[n[2:]]
+                assert not {n for n in given if n[:2] == "d_"} - {"d_w"}

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import sympy
 
+from serpentail_codegen.autodiff.angles import SinesAndCosines
 from serpentail_codegen.autodiff.step import adjoint, tangent
 from serpentail_codegen.ir.interpret import Numbers
 from serpentail_codegen.ir.step import Step
@@ -202,3 +203,19 @@ def test_a_linear_step_has_no_products_and_no_values_in_its_derivatives():
     assert operation_count(forward.nodes, forward.results[1:]) == alone
     assert back.inputs == (("b_u", 1),)
     assert operation_count(back.nodes, back.results) == 1
+
+
+def test_the_adjoint_of_an_angle_takes_two_products():
+    """Of y = R v it is y_1 b_0 - y_0 b_1, where b are the adjoints of y."""
+
+    def turned(t, c, s, v, w):
+        return [t.add(t.mul(c, v), t.mul(s, w)), t.sub(t.mul(c, w), t.mul(s, v))]
+
+    step = step_of("turn", (("joint", 2), ("v", 2)), (("y", 2),), turned)
+    kind = frozenset({("joint", SinesAndCosines(1, ((0, -1, 1), (0, 1, 0))))})
+    back = adjoint(step, frozenset({"joint"}), frozenset({"y"}), kind)
+    c, s, v, w, *b = sympy.symbols("c s v w b0 b1")
+    nodes = replay(back.nodes, [c, s, v, w, *b], Numbers(sympy, sympy.sympify))
+    (found,) = (nodes[r] for r in back.results)
+    assert sympy.expand(found - (c * w - s * v) * b[0] + (c * v + s * w) * b[1]) == 0
+    assert operation_count(back.nodes, back.results) == 2 * 3 + 3  # y, then two products

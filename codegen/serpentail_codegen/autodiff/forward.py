@@ -65,30 +65,26 @@ def tangents_together(
     program: ir.Program, kinds_of_lanes: Sequence[Lanes], kept: Collection[str] = ()
 ) -> ir.Program:
     """Return the program of the tangents of several kinds at once, which share all values."""
-    sweeps, companions, names = [], [], []
-    arrays = sines_and_cosines_arrays(program)
+    # every array that depends on the active ones has tangents, or its angles do
+    sweeps, angles = [], sines_and_cosines_arrays(program)
     for lanes in kinds_of_lanes:
-        # every array that depends on the active ones has tangents, or its angles do
         moving = forward_slice(program.body, lanes.active)
-        by_angles = {name: array for name, array in arrays.items() if name in moving}
+        by_angles = {name: array for name, array in angles.items() if name in moving}
         moving -= by_angles.keys()
-        own = {a.name: lanes.companion(a) for a in program.arrays if a.name in moving}
-        sweeps.append(_Tangents(own, by_angles, lanes.bound))
-        companions += own.values()
-        names += [lanes.prefix, *lanes.active]
+        companions = {a.name: lanes.companion(a) for a in program.arrays if a.name in moving}
+        sweeps.append(_Tangents(companions, by_angles, lanes.bound))
 
     # lanes that a statement leaves out are zero from the start
     body = _Together(sweeps).body(program.body, ())
     fills = tuple(ir.Fill(ref, (0,) * ref.size) for ref in _partly_written(body))
 
-    own_arrays = inner_arrays(program)
-    given = (replace(a, role="output") if a.name in kept else a for a in own_arrays)
-    name = "_".join([*names, program.name])
+    own = inner_arrays(program)
+    own = tuple(replace(a, role="output") if a.name in kept else a for a in own)
+    arrays = (*own, *(a for sweep in sweeps for a in sweep.companions.values()))
     counts = [str(lanes.count) for lanes in kinds_of_lanes if lanes.count]
-    if counts:
-        name = "_".join([name, "rows_of", *counts])
-    arrays_of_all = (*given, *companions)
-    return pruned(replace(program, name=name, arrays=arrays_of_all, body=fills + body))
+    words = [word for lanes in kinds_of_lanes for word in (lanes.prefix, *lanes.active)]
+    name = "_".join([*words, program.name, *(["rows_of", *counts] if counts else [])])
+    return pruned(replace(program, name=name, arrays=arrays, body=fills + body))
 
 
 def _partly_written(body: ir.Body) -> list[ir.Ref]:
@@ -195,15 +191,16 @@ class _Together:
             yield from sweep.copy(copy)
 
     def apply(self, call: ir.Apply, loops: tuple[ir.Loop, ...]) -> Iterator[ir.Statement]:
-        """Yield a step with its tangents: with the last kind; the others read the same values, so
-        they come before it.
+        """Yield a step with its tangents of the last kind; before it come those of the other kinds,
+        which read the same values.
         """
-        still = [sweep for sweep in self.sweeps if sweep.step(call, loops) is None]
-        steps = [both for sweep in self.sweeps if (both := sweep.step(call, loops)) is not None]
+        found = [sweep.step(call, loops) for sweep in self.sweeps]
+        steps = [both for both in found if both]
         yield from (tangents_alone(both, call) for both in steps[:-1])
         yield steps[-1] if steps else call
-        for sweep in still:
-            yield from sweep.cleared(*call.stored())
+        for sweep, both in zip(self.sweeps, found, strict=True):
+            if not both:
+                yield from sweep.cleared(*call.stored())
 
 
 def tangents_alone(both: ir.Apply, call: ir.Apply) -> ir.Apply:

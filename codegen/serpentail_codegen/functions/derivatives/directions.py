@@ -28,7 +28,7 @@ class Directions:
     torso: tuple[str, ...]
     coordinates: bool = True
     rates: bool = True
-    axes: range = range(3)  # of the torso, about or along which the directions move it
+    axes: range = range(3)  # along or about which it moves; fewer for omega alone
 
     @property
     def base(self) -> int:
@@ -79,8 +79,8 @@ class Directions:
         sizes = {"d_q": self.tail.nq} if self.coordinates else {}
         sizes |= {"d_v": self.tail.nv} if self.rates or self.torso else {}
         tangents = {n: draft.wide(f"{n}_{self.label}", s, self.count) for n, s in sizes.items()}
-        if "d_v" in tangents and (not self.rates or len(self.axes) < 3):
-            draft.fill(tangents["d_v"].whole(), 0)
+        if self.torso and (len(self.axes) < 3 or not self.rates):
+            draft.fill(tangents["d_v"].whole(), 0)  # rows that no direction moves
         for lane, name in enumerate(self.torso):
             if name != "turn":
                 rows = tangents["d_v"].part(TORSO[name][0].start + self.axes.start, len(self.axes))

@@ -87,7 +87,8 @@ def tangents_of_gradient(
     """
     sizes = {a.name: a.length(draft.tail) for a in function.inputs}
     kept = {f"b_{name}": array for name, array in gradients.items()}
-    lanes, found, outputs = [], [], {}
+    outputs: dict[str, Array] = {}
+    lanes, found = [], []
     # what moves along coordinates reads most of the values, so it shares a step with them
     for prefix, (directions, names) in (("dv", by_v), ("d", by_q)):
         active = [name for name in ("q", "v") if f"{prefix}_{name}" in arguments]

@@ -32,26 +32,25 @@ class HessianBlocks:
         """Copy tangents of the gradients by q and v along q, and of the gradient by v along v."""
         draft, tail, nv = self.draft, self.draft.tail, self.draft.tail.nv
         with draft.loop("k", nv - OMEGA.start) as k:
-            to = self.arrays["qv"].part(nv * TORSO_NV + k + OMEGA.start, tail.nt, nv)
-            draft.copy(to, v_by_q.lane(k + OMEGA.start, self.of_q.base, tail.nt))
-        with draft.loop("k", nv - OMEGA.start) as k:
             row = k + OMEGA.start
+            to = self.arrays["qv"].part(nv * TORSO_NV + row, tail.nt, nv)
+            draft.copy(to, v_by_q.lane(row, self.of_q.base, tail.nt))
             for directions, source in ((self.of_q, v_by_q), (self.of_v, by_v)):
-                if directions.torso:
-                    lanes, first = source.lane(row, 0, directions.base), directions.axes.start
-                    self._mirrored("vv", row, OMEGA.start + first, lanes)
+                if directions.base:
+                    column = OMEGA.start + directions.axes.start
+                    self._mirrored("vv", row, column, source.lane(row, 0, directions.base))
         with draft.loop("i", tail.segments) as i, draft.loop("k", PER_SEGMENT) as k:
             number = coordinate(i) + k
             row = number + TORSO_NV
             with draft.loop("l", i + 1) as other:
-                column = coordinate(other) + TORSO_NV
+                beside = coordinate(other) + TORSO_NV
                 for block, source, first in (
                     ("qq", by_q, self.of_q.of_q(other)),
                     ("vv", by_v, self.of_v.of_v(other)),
                 ):
                     scalar = number + (TORSO_NQ if block == "qq" else TORSO_NV)
                     lanes = source.lane(scalar, first, PER_SEGMENT)
-                    self._mirrored(block, row, column, lanes)
+                    self._mirrored(block, row, beside, lanes)
 
     def _mirrored(self, block: str, row: Index, column: Index | int, lanes: Ref) -> None:
         """Copy lanes to a row of a symmetric block from a column on, and to its column."""
