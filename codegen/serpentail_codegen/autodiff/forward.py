@@ -55,8 +55,7 @@ def tangent_program(
 ) -> ir.Program:
     """Return the program that takes ``d_<input>`` of the active inputs to ``d_<output>``.
 
-    ``lanes`` is the number of directions, 0 for one direction in narrow scalars; ``bound`` tells
-    how many of the lanes are needed inside given loops.  ``kept`` outputs are given, too.
+    lanes, bound: count and bound of ``Lanes``; kept: outputs that are given, too.
     """
     return tangents_together(program, [Lanes(active, lanes, bound)], kept)
 

@@ -39,9 +39,8 @@ def assemble_inverse_dynamics_hessian(draft: Draft, arrays: dict[str, Array]) ->
     given["b_power"] = draft.fixed("one", [1]).array
     d_q, d_v = of_q.tangents(draft), of_v.tangents(draft)
     given |= d_q | {"dv_v": d_v["d_v"]}
-    by_q, by_v = tangents_of_gradient(
-        draft, VIRTUAL_POWER, (of_q, BY_Q), (of_v, BY_V), given, gradient
-    )
+    wanted = (of_q, BY_Q), (of_v, BY_V)
+    by_q, by_v = tangents_of_gradient(draft, VIRTUAL_POWER, *wanted, given, gradient)
     blocks = HessianBlocks(draft, of_q, of_v, arrays)
     blocks.clear()
     blocks.of_motion(by_q["q"], by_q["v"], by_v["v"])
@@ -93,8 +92,8 @@ def tangents_of_gradient(
     for prefix, (directions, names) in (("dv", by_v), ("d", by_q)):
         active = [name for name in ("q", "v") if f"{prefix}_{name}" in arguments]
         count, label = directions.count, directions.label
-        wanted = [f"b_{name}" for name in names]
-        lanes.append(Lanes(active, count, directions.outward, prefix, wanted))
+        given = [f"b_{name}" for name in names]
+        lanes.append(Lanes(active, count, directions.outward, prefix, given))
         rows = {name: draft.wide(f"d_b_{name}_{label}", sizes[name], count) for name in names}
         outputs |= {f"{prefix}_b_{name}": array for name, array in rows.items()}
         found.append(rows)
