@@ -21,6 +21,9 @@ TURNED_AT = {  # where along a tail its turn grows, and by what
 }
 # ros34pw2's error in flight at one tolerance, over that of tsit5: measured, docs/simulation.md
 AIR = 5.0
+# s: how long ros34pw2 takes an error of a rate to last in contact; measured: with it, short steps
+# after a touch and long ones add equally to the error at the end
+LASTING = 1e-3
 SLOTS = 11  # states in the workspace: see simulation/workspace.c.jinja
 # of simulation/workspace.c.jinja, undefined again where the file ends
 MACROS = (
@@ -72,6 +75,7 @@ def simulation_context(
         "methods": METHODS,
         "method": f"{scene.name}_method(run)" if "switching" in has.methods else "run->method",
         "air": AIR,
+        "lasting": LASTING,
         "runs": f"{scene.name}_run",  # what explicit methods advance, and the length of its steps
         "lengths": "real ",
         "turns": 1 if tail.kind == "continuum" else tail.links,  # of a tip, for a coordinate
