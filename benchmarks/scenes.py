@@ -70,10 +70,10 @@ def standing(model: st.Model) -> dict:
 
 def sliding() -> tuple[Callable, float]:
     """0.5 s of sliding on feet and tail, from 1 m/s askew."""
-    model = touching()
-    start = standing(model.with_parameters(mu=0.3))
+    model = touching().with_parameters(mu=0.3)
+    start = standing(model)
     start["v0"][:2] = 0.8, 0.6
-    return lambda **how: st.simulate(model.with_parameters(mu=0.3), t_span=0.5, **start | how), 0.5
+    return lambda **how: st.simulate(model, t_span=0.5, **start | how), 0.5
 
 
 def impact() -> tuple[Callable, float]:

@@ -71,7 +71,7 @@ def simulation_context(
         "felt": felt,
         "group_starts": [0, *accumulate(count for _, count in has.groups)],
         "bristles": 2 * has.contacts,
-        "bisections": 40,
+        "bisections": 41,
         "methods": METHODS,
         "method": f"{scene.name}_method(run)" if "switching" in has.methods else "run->method",
         "air": AIR,
