@@ -2,7 +2,8 @@
 step.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
@@ -39,6 +40,7 @@ class Draft(Builder):
     stretch: Stretch | None = field(
         default=None, init=False
     )  # the stretch whose segments the open loop is over
+    _lanes: tuple[int, str] = field(default=(0, ""), init=False)  # and suffix, of local vectors
 
     def declare_parameters(self, parameters: Iterable[Parameter]) -> None:
         """Declare the parameter struct: steps find its numbers by their names."""
@@ -113,6 +115,15 @@ class Draft(Builder):
         parameters = {name: ref for name, ref in self.parameters.items() if name in declared}
         return parameters | refs
 
+    @contextmanager
+    def side_by_side(self, lanes: int, suffix: str) -> Iterator[None]:
+        """Give so many lanes to local vectors that are declared here, and a suffix to their
+        names.
+        """
+        self._lanes, before = (lanes, suffix), self._lanes
+        yield
+        self._lanes = before
+
     def store(self, function: Callable[..., dict] | Step, *reads: Reads, **sizes: int) -> Vectors:
         """Apply a step and return its outputs, new local vectors of the same names."""
         outputs = {name: self.vector(name, size) for name, size in sizes.items()}
@@ -121,7 +132,8 @@ class Draft(Builder):
 
     def vector(self, name: str, size: int) -> Ref:
         """Declare a local vector."""
-        return self.array(name, size)[0]
+        lanes, suffix = self._lanes
+        return self.declare(Array(name + suffix, "local", size, lanes=lanes))[0]
 
     def vectors(self, **sizes: int) -> Vectors:
         """Declare local vectors."""
@@ -129,8 +141,8 @@ class Draft(Builder):
 
     def scratch(self, **sizes: int) -> Vectors:
         """Return local vectors that each stretch of segments uses again; they are declared once."""
-        found = {a.name: a[0] for a in self.arrays if a.name in sizes and a.role == "local"}
-        return Vectors({n: found.get(n) or self.vector(n, size) for n, size in sizes.items()})
+        found, suffix = {a.name: a[0] for a in self.arrays if a.role == "local"}, self._lanes[1]
+        return Vectors({n: found.get(n + suffix) or self.vector(n, s) for n, s in sizes.items()})
 
     def fixed(self, name: str, values: Iterable[Number]) -> Ref:
         """Return a constant, which is declared once."""

@@ -70,11 +70,8 @@ def assemble(function: Function, tail: Tail, dynamics: str = "composite") -> Pro
     ``dynamics`` chooses another algorithm for long tails where vectors hold several numbers;
     functions that it does not apply to stay the same.
     """
-    dynamics = dynamics if tail.kind == "articulated" else "composite"
-    if tail.fixed:
+    if tail.fixed or tail.polar or (dynamics == "lanes" and tail.kind != "articulated"):
         dynamics = "composite"
-    if dynamics == "segments" and not tail.uniform:
-        dynamics = "lanes"  # dynamics by segments needs equal segments of equal links
     draft = Draft(function.name, function.doc, tail=tail, dynamics=dynamics)
     # parameters first, then arguments: the program keeps the order of its arrays
     draft.declare_parameters(struct_parameters(tail))

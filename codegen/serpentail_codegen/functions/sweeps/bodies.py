@@ -7,8 +7,8 @@ from ..scope import Vectors
 
 
 def lane(vector: Ref, i: Index) -> Ref:
-    """Return the part of segment i: a lane of a wide vector."""
-    return vector.array.down(vector.offset, i, vector.size)
+    """Return the part of segment i: a lane of a wide vector, or what all segments share."""
+    return vector if not vector.lanes else vector.array.down(vector.offset, i, vector.size)
 
 
 @dataclass(frozen=True)
@@ -48,8 +48,8 @@ class Freed:
 
     def own(self, i: Index) -> dict[str, Ref]:
         """A segment's own inertia, and how its tip moves."""
-        lanes = {name: lane(self.inertia[name], i) for name in ("h", "I", "pitch", "yaw")}
-        return lanes | {"mass": self.inertia["mass"]} | self.passes.tip_of(i)
+        names = ("mass", "h", "I", "pitch", "yaw")
+        return {name: lane(self.inertia[name], i) for name in names} | self.passes.tip_of(i)
 
 
 @dataclass(frozen=True)

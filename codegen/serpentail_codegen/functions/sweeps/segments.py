@@ -1,6 +1,6 @@
-"""Forward dynamics of a long articulated tail by segments: it gives v_dot without H.
+"""Forward dynamics of a long tail by segments: it gives v_dot without H.
 
-The links of all segments are swept at once, segment i in lane i. Then one sweep goes over the
+The pieces of all segments are swept at once, segment i in lane i. Then one sweep goes over the
 segments from the tip to the mount and treats each as an articulated body with free coordinates. A
 last sweep carries accelerations from the torso to the tip.
 """
@@ -8,16 +8,14 @@ last sweep carries accelerations from the torso to the tip.
 from serpentail_scene.layout import OMEGA, PER_SEGMENT, VELOCITY
 
 from ...ir.program import Array, Index, Ref, as_index
-from ...ir.tape import Number
-from ...mechanics import free_segment, link, rotations, torso
+from ...mechanics import free_segment, mount, rotations, torso
 from ...mechanics.link_columns import torso_bias
 from ..draft import Draft
 from ..layout import block, coordinates
-from ..scope import State, Vectors
-from ..tails.articulated import link_properties
-from ..tails.mechanism import simplified
+from ..scope import Motion, State, Vectors
 from .bodies import ArticulatedBody, Freed, Passes, lane
-from .pieces import IDENTITY
+from .pieces import IDENTITY, across, mechanism
+from .side_by_side import Group, groups_of, joined
 
 UNKNOWNS = 8  # motion of a segment's base, and two coordinates
 OWN_INERTIA = {"h": 3, "I": 6, "pitch": 6, "yaw": 6, "H_pp": 1, "H_py": 1, "H_yy": 1}
@@ -31,14 +29,16 @@ def forward_dynamics(
     again: keep the quantities that further loads need.
     """
     m = draft.tail.segments
-    tip = _wide(draft, "tip_map", 30).array
-    over = draft.array("over_pivots", 2, m) if again else None
-    passes = Passes(tip, draft.array("coasting", 6, m), draft.array("shares", 15, m), over)
+    groups = groups_of(draft, state)
 
-    # loads of the segments' own links
-    links = _prepare(draft, state)
-    inertia = _own_inertia(draft, links, passes)
-    bias = _bias(draft, state, links, _base_velocities(draft, state, passes))
+    # loads of the segments' own pieces
+    inertia = joined(groups, [_own_inertia(group) for group in groups])
+    over = draft.array("over_pivots", 2, m) if again else None
+    coasting, shares = draft.array("coasting", 6, m), draft.array("shares", 15, m)
+    passes = Passes(inertia["tip_map"].array, coasting, shares, over)
+    w = _base_velocities(draft, state, passes)
+    bias = joined(groups, [_bias(group, group.part("w", w)) for group in groups])
+    across(draft, mount.wrench_at_mount, F_next=lane(bias["F_next"], as_index(0)))
 
     # inward: everything beyond the mount, then the torso; outward: accelerations
     body = _inward_pass(draft, passes, inertia, bias, torques)
@@ -53,79 +53,73 @@ def forward_dynamics(
     return Freed(passes, inertia, *freed)
 
 
-def _wide(draft: Draft, name: str, size: int, *values: Number) -> Ref:
-    """Declare a vector with one lane for each segment, which begins with ``values``."""
-    vector = draft.wide(f"{name}_lanes", size, draft.tail.segments)[0]
-    if values:
-        draft.fill(vector, *values)
-    return vector
-
-
 def _base_velocities(draft: Draft, state: State, passes: Passes) -> Ref:
-    """Angular velocities of the bases of all segments."""
-    w, w_base = _wide(draft, "w", 3, 0), draft.vector("w_base", 3)
+    """Angular velocities of the bases of all segments, the first in the tail's root axes."""
+    w, w_base = draft.wide("w_lanes", 3, draft.tail.segments)[0], draft.vector("w_base", 3)
+    draft.fill(w, 0)
     draft.copy(w_base, state.omega)
     with draft.loop("i", draft.tail.segments) as i:
-        draft.copy(w.array.down(0, i, 3), w_base)
+        draft.copy(lane(w, i), w_base)
         reads = {"rates": state.rates(i), "w": w_base}
         draft.step(free_segment.tip_angular_velocity, passes.tip_of(i), reads, w=w_base)
+    across(draft, mount.velocity_at_root, w=lane(w, as_index(0)))
     return w
 
 
-def _prepare(draft: Draft, state: State) -> Vectors:
-    """Link properties, coordinates, rates and trigonometry of all joints."""
-    properties = link_properties(draft)
-    angles, rates = _wide(draft, "angles", 2, 0), _wide(draft, "rates", 2, 0)
-    with draft.loop("i", draft.tail.segments) as i:
-        draft.copy(angles.array.down(0, i, PER_SEGMENT), state.angles(i))
-        draft.copy(rates.array.down(0, i, PER_SEGMENT), state.rates(i))
-    joint = _wide(draft, "joint", 4)
-    draft.step(link.joint_trigonometry, {"angles": angles}, joint=joint)
-    twice = _wide(draft, "twice", 10)
-    draft.step(link.double_angles, {"joint": joint}, twice=twice)
-    return Vectors({**properties, "rates": rates, "joint": joint, "twice": twice})
+def _own_inertia(group: Group) -> Vectors:
+    """Compute how each tip moves, and the composite inertia of each segment's own pieces.
+
+    The base of the first segment has the axes of the torso.
+    """
+    draft, first = group.draft, as_index(0)
+    with group.at_once():
+        # from the base to the tip
+        tail, begin = mechanism(draft), group.vectors(R=IDENTITY, P=(0,) * 3, S=(0,) * 12)
+        pose = begin.only("R", "P")
+        if not group.number:
+            across(draft, mount.mounted_frame, R=lane(pose["R"], first))
+        with draft.loop("j", group.pieces) as j:
+            piece = group.segments.at(first, j)
+            draft.step(tail.twist, piece, pose, S_=begin["S"])
+            draft.step(tail.pose, piece, pose, **pose)
+        tip = draft.vectors(tip_map=30)
+        draft.step(free_segment.tip_motion, begin, **tip)
+
+        # from the tip to the base
+        inertia = group.vectors(**{name: (0,) * size for name, size in OWN_INERTIA.items()})
+        carried = inertia.only("h", "I", "pitch", "yaw")
+        own = {f"{name}_": inertia[name] for name in ("H_pp", "H_py", "H_yy")}
+        mass = group.mass()
+        with draft.loop("j", group.pieces, downward=True) as j:
+            reads = group.segments.at(first, j), mass, carried
+            draft.step(tail.gather, *reads, **mass, **carried, **own)
+    if not group.number:
+        h, I, *momenta = (lane(ref, first) for ref in carried.named.values())
+        across(draft, mount.composite_at_mount, h=h, I=I)
+        for momentum in momenta:
+            across(draft, mount.wrench_at_mount, F_next=momentum)
+    return Vectors({**inertia, **mass, **tip})
 
 
-def _own_inertia(draft: Draft, links: Vectors, passes: Passes) -> Vectors:
-    """Compute how each tip moves, and the composite inertia of each segment's own links."""
-    # from the base to the tip
-    pose = {"R": _wide(draft, "R", 9, *IDENTITY), "P": _wide(draft, "P", 3, 0)}
-    S = _wide(draft, "S", 12, 0)
-    with draft.loop("j", draft.tail.links):
-        draft.step(link.joint_twist, links, pose, S_=S)
-        draft.step(link.link_pose, links, pose, **pose)
-    draft.step(free_segment.tip_motion, pose, {"S": S}, tip_map=passes.tip[0])
-
-    # from the tip to the base
-    inertia = Vectors({name: _wide(draft, name, size, 0) for name, size in OWN_INERTIA.items()})
-    mass = draft.vectors(mass=1)
-    draft.fill(mass["mass"], 0)
-    carried = inertia.only("h", "I", "pitch", "yaw")
-    own = {f"{name}_": inertia[name] for name in ("H_pp", "H_py", "H_yy")}
-    with draft.loop("j", draft.tail.links, downward=True):
-        draft.step(link.gather_links, links, mass, carried, **mass, **carried, **own)
-    return Vectors({**inertia, **mass})
-
-
-def _bias(draft: Draft, state: State, links: Vectors, w: Ref) -> Vectors:
+def _bias(group: Group, w: Ref) -> Vectors:
     """Compute loads and tip accelerations of each segment that velocities alone cause."""
-    # from the base to the tip
-    motion = {"w": w, "w_dot": _wide(draft, "w_dot", 3, 0), "a": _wide(draft, "a", 3, 0)}
-    joint = {name: _wide(draft, name, 3) for name in ("a_joint", "swing")}
-    wrench = draft.wide("wrench", 6 * draft.tail.links, draft.tail.segments)
-    link_motion = simplified(link.link_motion, state, forced=False)
-    with draft.loop("j", draft.tail.links) as j:
-        draft.step(link_motion, links, Vectors(motion), **motion, **joint)
-        reads = Vectors(motion), joint
-        draft.step(link.link_wrench, links, *reads, F=wrench.part(6 * j, 6))
+    draft, first = group.draft, as_index(0)
+    with group.at_once():
+        # from the base to the tip
+        tail, begin = mechanism(draft), group.vectors(w_dot=(0,) * 3, a=(0,) * 3)
+        motion, bending = Motion(w, **begin), draft.vectors(torque_own=2)
+        wrench = draft.wide(f"wrench{group.suffix}", 6 * group.pieces, group.lanes)
+        with draft.loop("j", group.pieces) as j:
+            own = Vectors({"F": wrench.part(6 * j, 6), **bending})
+            tail.move(draft, group.segments, (first, j), motion, None, own)
 
-    # from the tip to the base
-    total, torque = _wide(draft, "F_next", 6, 0), _wide(draft, "torque", 2, 0)
-    with draft.loop("j", draft.tail.links, downward=True) as j:
-        loads = {"F": wrench.part(6 * j, 6), "F_next": total}
-        draft.step(link.gather_wrench, links, loads, F_next=total, torque_=torque)
-    coasting = {"w_dot": motion["w_dot"], "a": motion["a"]}
-    return Vectors({**coasting, "F_next": total, "torque": torque})
+        # from the tip to the base
+        total = group.vectors(F_next=(0,) * 6, torque=(0,) * 2)
+        with draft.loop("j", group.pieces, downward=True) as j:
+            loads = Vectors({"F": wrench.part(6 * j, 6), **bending}), total.only("F_next")
+            writes = {"F_next": total["F_next"], "torque_": total["torque"]}
+            draft.step(tail.gather_wrench, group.segments.at(first, j), *loads, **writes)
+    return Vectors({**begin, **total})
 
 
 def _inward_pass(
@@ -141,7 +135,7 @@ def _inward_pass(
         """Start with the segment alone: its inertia, loads, and the acceleration of its tip by
         velocities.
         """
-        own = {name: lane(inertia[name], i) for name in OWN_INERTIA} | {"mass": inertia["mass"]}
+        own = {name: lane(inertia[name], i) for name in (*OWN_INERTIA, "mass")}
         rows = {f"K_{r}": K.lane(r, 0, UNKNOWNS) for r in range(UNKNOWNS)}
         draft.step(free_segment.own_inertia, own, **rows)
         draft.copy(b.lane(0, 0, 6), lane(bias["F_next"], i))

@@ -8,8 +8,9 @@ from ...mechanics import airborne_power, link
 from ...scene.variant import SegmentRun
 from ..draft import Draft
 from ..scope import Instead, Motion, State, Vectors
-from .mechanism import Mechanism, Place, Segments, simplified
+from .mechanism import Mechanism, Place, Segments, in_turn, simplified
 
+JOINT = {"joint": 4, "twice": 10}
 SIZES = {"link_inertias": 3}  # parameters with more than one number for each link
 
 
@@ -32,27 +33,27 @@ def fill_links(draft: Draft, array: Array, others: Callable[[SegmentRun], int]) 
             draft.step(link.own_link_properties, Instead(own), link=array[k + others(run)])
 
 
-def link_properties(draft: Draft) -> Vectors:
-    """Store the properties of one link; all links are equal."""
+def link_properties(draft: Draft, state: State) -> Segments:
+    """Store the properties of every link, or those of one link if all are equal."""
+    if draft.tail.shape.own:
+        return Segments(state, {}, {}, {"link": own_links(draft)})
     share = draft.fixed("share", [Fraction(1, draft.tail.total)])
-    return draft.store(link.link_properties, {"share": share}, link=6)
+    return Segments(state, {}, draft.store(link.link_properties, {"share": share}, link=6).named)
+
+
+def describe_joint(draft: Draft, piece: Vectors) -> None:
+    """Store the trigonometry of a segment's joint, and that of twice its angles if wanted."""
+    joint = piece.only("joint")
+    draft.step(link.joint_trigonometry, piece, **joint)
+    if "twice" in piece.named:
+        draft.step(link.double_angles, joint, **piece.only("twice"))
 
 
 def prepare_links(draft: Draft, state: State, doubled: bool = False) -> Segments:
     """Link properties, and the trigonometry of every segment's joint."""
-    own = draft.tail.shape.own
-    each = {"link": own_links(draft)} if own else {}
-    shared = {} if own else link_properties(draft).named
-    arrays = {"joint": draft.array("joint", 4, draft.tail.segments)}
-    if doubled:
-        arrays["twice"] = draft.array("twice", 10, draft.tail.segments)
-    for run in draft.tail.runs("articulated"):
-        with draft.loop("i", run.stop, start=run.first) as i:
-            joint = arrays["joint"][i]
-            draft.step(link.joint_trigonometry, {"angles": state.angles(i)}, joint=joint)
-            if doubled:
-                draft.step(link.double_angles, {"joint": joint}, twice=arrays["twice"][i])
-    return Segments(state, arrays, shared, each)
+    sizes = JOINT if doubled else {"joint": JOINT["joint"]}
+    own = link_properties(draft, state)
+    return in_turn(draft, "articulated", own, sizes, describe_joint)
 
 
 def prepare_link_samples(draft: Draft, state: State, segments: Segments | None) -> Segments:
@@ -101,6 +102,9 @@ def link_momentum(
 
 ARTICULATED = Mechanism(
     prepare=prepare_links,
+    properties=link_properties,
+    data=JOINT,
+    describe=describe_joint,
     prepare_samples=prepare_link_samples,
     declare_torques=no_torques,
     move=move_link,

@@ -10,7 +10,7 @@ from ...mechanics import airborne_power, arc, arc_inertia, arc_shape, arc_wrench
 from ...mechanics.lower import derive
 from ..draft import Draft
 from ..scope import Instead, Motion, State, Vectors
-from .mechanism import Mechanism, Place, Segments, simplified
+from .mechanism import Mechanism, Place, Segments, in_turn, simplified
 
 ARC = {"tip": 8, "shape": 16, "E": 9, "r": 3, "bend": 12}
 OWN = {"h_own": 3, "I_own": 6, "pitch_own": 6, "yaw_own": 6, "H_own": 3}
@@ -39,33 +39,29 @@ def own_sections(draft: Draft, name: str, part: Fraction) -> Array:
     return array
 
 
-def section_properties(draft: Draft) -> tuple[dict[str, Array], Mapping[str, Ref]]:
-    """Store the properties of every segment as arrays, or those of one segment as shared vectors if
-    all are equal.
-    """
+def section_properties(draft: Draft, state: State) -> Segments:
+    """Store the properties of every segment, or those of one segment if all are equal."""
     if draft.tail.shape.own:
-        return {"section": own_sections(draft, "section", Fraction(1))}, {}
+        return Segments(state, {"section": own_sections(draft, "section", Fraction(1))})
     share = draft.fixed("share", [Fraction(1, draft.tail.segments)])
-    return {}, draft.store(arc.section_properties, {"share": share}, section=2).named
+    return Segments(state, {}, draft.store(arc.section_properties, {"share": share}, section=2))
+
+
+def describe_arc(draft: Draft, piece: Vectors) -> None:
+    """Store shape, tip and own inertia of a segment."""
+    limit, margin = bend_range(draft), draft.scratch(margin=1)
+    draft.step(shape_step(draft.tail.bend_range), piece, **piece.only("tip", "shape"))
+    draft.step(arc_shape.bend_margin, piece, limit, **margin)
+    draft.guard(margin["margin"], "OUT_OF_RANGE", piece["tip"], piece["shape"])
+    draft.step(arc.segment_tip, piece, **piece.only("E", "r", "bend"))
+    draft.step(arc_inertia.segment_inertia, piece, **piece.only(*OWN))
 
 
 def prepare_arcs(draft: Draft, state: State, doubled: bool = False) -> Segments:
     """Shape, tip and own inertia of every segment."""
     del doubled
-    (own, shared), count = section_properties(draft), draft.tail.segments
-    arrays = {name: draft.array(name, size, count) for name, size in (ARC | OWN).items()}
-    segments = Segments(state, arrays | own, shared)
-    limit, margin = bend_range(draft), draft.vector("margin", 1)
-    for run in draft.tail.runs("continuum"):
-        with draft.loop("i", run.stop, start=run.first) as i:
-            piece = segments.at(i)
-            shape = shape_step(draft.tail.bend_range)
-            draft.step(shape, piece, **piece.only("tip", "shape"))
-            draft.step(arc_shape.bend_margin, piece, limit, margin=margin)
-            draft.guard(margin, "OUT_OF_RANGE", piece["tip"], piece["shape"])
-            draft.step(arc.segment_tip, piece, **piece.only("E", "r", "bend"))
-            draft.step(arc_inertia.segment_inertia, piece, **piece.only(*OWN))
-    return segments
+    own = section_properties(draft, state)
+    return in_turn(draft, "continuum", own, ARC | OWN, describe_arc)
 
 
 def sample_section(draft: Draft) -> tuple[dict[str, Ref], Callable[[Index], dict[str, Ref]]]:
@@ -147,6 +143,9 @@ def arc_momentum(
 
 CONTINUUM = Mechanism(
     prepare=prepare_arcs,
+    properties=section_properties,
+    data=ARC | OWN,
+    describe=describe_arc,
     prepare_samples=prepare_arc_samples,
     declare_torques=bending_torques,
     move=move_arc,

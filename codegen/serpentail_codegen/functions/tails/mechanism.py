@@ -5,7 +5,7 @@ piece.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from ...ir.program import Array, Index, Ref
 from ...ir.step import Step, specialised
@@ -43,6 +43,23 @@ class Segments:
         return Vectors(named)
 
 
+def in_turn(
+    draft: Draft,
+    kind: str,
+    own: Segments,
+    sizes: Mapping[str, int],
+    describe: Callable[[Draft, Vectors], None],
+) -> Segments:
+    """Return the properties of segments, and their data, computed segment by segment."""
+    count = draft.tail.segments
+    arrays = {name: draft.array(name, size, count) for name, size in sizes.items()}
+    segments = replace(own, arrays=arrays | own.arrays)
+    for run in draft.tail.runs(kind):
+        with draft.loop("i", run.stop, start=run.first) as i:
+            describe(draft, segments.at(i))
+    return segments
+
+
 @dataclass(frozen=True)
 class Wrenches:
     """Wrenches (or momenta) of all pieces, and the generalised forces of the bends."""
@@ -62,7 +79,9 @@ class Wrenches:
 class Mechanism:
     """How one piece moves, its mass properties, and how it passes quantities on.
 
-    ``prepare(draft, state, doubled)`` stores the data of the pieces.
+    ``prepare(draft, state, doubled)`` stores the data of the pieces: their ``properties(draft,
+    state)``, which are constant, and ``data`` (sizes) of each segment, which
+    ``describe(draft, piece)`` computes from its coordinates.
     ``prepare_samples`` stores the data of what lies between two tail points; it is given the data
     of the pieces if they exist.
     ``declare_torques`` declares the array in which ``move`` stores the generalised forces of bends.
@@ -74,6 +93,9 @@ class Mechanism:
     """
 
     prepare: Callable[[Draft, State, bool], Segments]
+    properties: Callable[[Draft, State], Segments]
+    data: Mapping[str, int]
+    describe: Callable[[Draft, Vectors], None]
     prepare_samples: Callable[[Draft, State, Segments | None], Segments]
     declare_torques: Callable[[Draft], Array | None]
     move: Callable[[Draft, Segments, Place, Motion, Array | None, Vectors], None]

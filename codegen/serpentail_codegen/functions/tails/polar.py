@@ -15,9 +15,10 @@ from .continuum import (
     sample_section,
     section_properties,
 )
-from .mechanism import Place, Segments, simplified
+from .mechanism import Place, Segments, in_turn, simplified
 
-POLAR_OWN = {"trig": 4, "E_v": 15, "Q_v": 10, "loading": 27}
+POLAR_DATA = {name: ARC[name] for name in ("E", "r", "bend")} | OWN
+POLAR_DATA |= {"trig": 4, "E_v": 15, "Q_v": 10, "loading": 27}
 
 
 def guard_polar(draft: Draft, angles: Ref, limit: dict[str, Ref], *protects: Ref) -> None:
@@ -30,18 +31,18 @@ def guard_polar(draft: Draft, angles: Ref, limit: dict[str, Ref], *protects: Ref
 def prepare_polar_arcs(draft: Draft, state: State, doubled: bool = False) -> Segments:
     """Integrals over the slices, tip and own inertia of every segment."""
     del doubled
-    (own, shared), count = section_properties(draft), draft.tail.segments
-    sizes = {name: ARC[name] for name in ("E", "r", "bend")} | OWN | POLAR_OWN
-    arrays = {name: draft.array(name, size, count) for name, size in sizes.items()}
-    segments, limit = Segments(state, arrays | own, shared), bend_range(draft)
-    with draft.loop("i", count) as i:
-        piece = segments.at(i)
-        draft.step(polar_arc.segment_trigonometry, piece, trig=piece["trig"])
-        draft.step(polar_arc.slice_integrals, piece, **piece.only("E_v", "Q_v"))
-        guard_polar(draft, state.angles(i), limit, *piece.only("trig", "E_v", "Q_v").named.values())
-        draft.step(polar_arc.segment_tip, piece, **piece.only("E", "r", "bend"))
-        draft.step(polar_arc.segment_inertia, piece, **piece.only(*OWN))
-    return segments
+    own = section_properties(draft, state)
+    return in_turn(draft, "continuum", own, POLAR_DATA, describe_polar_arc)
+
+
+def describe_polar_arc(draft: Draft, piece: Vectors) -> None:
+    """Store integrals over the slices, tip and own inertia of a segment."""
+    draft.step(polar_arc.segment_trigonometry, piece, trig=piece["trig"])
+    draft.step(polar_arc.slice_integrals, piece, **piece.only("E_v", "Q_v"))
+    guarded = piece.only("trig", "E_v", "Q_v").named.values()
+    guard_polar(draft, piece["angles"], bend_range(draft), *guarded)
+    draft.step(polar_arc.segment_tip, piece, **piece.only("E", "r", "bend"))
+    draft.step(polar_arc.segment_inertia, piece, **piece.only(*OWN))
 
 
 def prepare_polar_samples(draft: Draft, state: State, segments: Segments | None) -> Segments:
@@ -83,6 +84,8 @@ def move_polar_arc(
 POLAR = replace(
     CONTINUUM,
     prepare=prepare_polar_arcs,
+    data=POLAR_DATA,
+    describe=describe_polar_arc,
     prepare_samples=prepare_polar_samples,
     move=move_polar_arc,
 )
