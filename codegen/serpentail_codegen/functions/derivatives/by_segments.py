@@ -13,23 +13,21 @@ from dataclasses import dataclass
 from serpentail_scene.layout import OMEGA, PER_SEGMENT, VELOCITY
 from serpentail_scene.signatures.arguments import V_DOT, Argument, Q, V
 
-from ...autodiff.angles import SinesAndCosines, sines_and_cosines_of
+from ...autodiff.forward import tangent_program
 from ...autodiff.step import tangent
 from ...ir.program import Array, Index, Ref
-from ...ir.step import Step
-from ...mechanics import link, rotations, segment_slopes, torso, translation
+from ...mechanics import mount, rotations, segment_slopes, torso, translation
 from ...mechanics.lower import derive
 from ..draft import Draft
 from ..function import Function, assemble
 from ..layout import block, coordinate
-from ..passive import add_passive_slopes, net_torques
+from ..passive import add_passive_forces, net_torques
 from ..scope import Motion, Vectors
-from ..sweeps.pieces import mechanism
+from ..sweeps.pieces import across, each_segment, mechanism, pieces_of
 from ..sweeps.segments import Freed, forward_dynamics
-from ..tails.mechanism import Segments
+from ..tails.mechanism import Wrenches
 from .directions import Directions
 
-CARRIED = ("w", "w_dot", "a")
 # lanes of a segment's own directions: omega of its base, angles, rates
 ANGLES, RATES, OWN = 3, 5, 7
 FORCES = 6 + PER_SEGMENT  # wrench at the base, torques
@@ -45,14 +43,10 @@ class SegmentSlopes:
     force: Array
 
     @classmethod
-    def declared(cls, draft: Draft, role: str) -> "SegmentSlopes":
+    def declared(cls, draft: Draft) -> "SegmentSlopes":
         """Declare the arrays."""
-        sizes = {"tip": 9 * draft.tail.segments, "force": FORCES * draft.tail.segments}
-        return cls(*(draft.declare(Array(n, role, s, lanes=OWN)) for n, s in sizes.items()))
-
-    def torque(self, i: Index) -> Ref:
-        """Slopes of the torques of segment i."""
-        return self.force.part(FORCES * i + 6, PER_SEGMENT)
+        m = draft.tail.segments
+        return cls(draft.wide("tip", 9 * m, OWN), draft.wide("force", FORCES * m, OWN))
 
     def by_omega(self, i: Index) -> dict[str, Ref]:
         """Slopes by omega of the base: of w_dot and a of the tip, and of the wrench and the
@@ -75,9 +69,7 @@ def derivatives_by_segments(draft: Draft, arrays: dict[str, Array]) -> None:
     a = draft.vector("a_torso", 3)
     draft.step(torso.torso_acceleration, reads, a=a)
     motion = Motion(state.omega, block(v_dot, OMEGA), a)
-    slopes = SegmentSlopes.declared(draft, "local")
-    arguments = {"q": arrays["q"], "v": arrays["v"], "v_dot": v_dot, "a_torso": a.array}
-    draft.call(assemble(SLOPES, tail), tip=slopes.tip, force=slopes.force, **arguments)
+    slopes = segment_slopes_of(draft, arrays, v_dot, a)
 
     directions = Directions(tail, ("omega",))
     lanes = directions.count + tail.nt
@@ -96,100 +88,96 @@ def derivatives_by_segments(draft: Draft, arrays: dict[str, Array]) -> None:
 # ---- one segment ---------------------------------------------------------------------------------
 
 
-def moved(function, *active: str) -> Step:
-    """Return a step with its tangents by some inputs, and by the joint's angles."""
-    step = derive(function)
-    kind = sines_and_cosines_of(derive(link.joint_trigonometry))
-    assert isinstance(kind, SinesAndCosines), "a joint is sines and cosines"
-    angles = frozenset({("joint", kind)} if "joint" in dict(step.inputs) else ())
-    return tangent(step, frozenset({*active, *(name for name, _ in angles)}), angles)
+def assemble_alone(draft: Draft, arrays: dict[str, Array]) -> None:
+    """Wrench and torques at the base of every segment, and the motion of its tip, from that of its
+    base and the wrench beyond; these are those of the whole tail where they are not given.
+    """
+    state, v_dot, tail = draft.state(arrays["q"], arrays["v"]), arrays["v_dot"], draft.tail
+    segments, alone = mechanism(draft).prepare(draft, state, False), "loads" in arrays
+    bases, beyond = arrays["bases"], arrays["beyond"]
+    wrench, total = draft.array("wrench", 6, tail.pieces), draft.vectors(F_next=6)
+    wrenches = Wrenches(wrench, mechanism(draft).declare_torques(draft))
+    here = draft.vector("here", 9)
+    motion = Motion(*(here.array.part(3 * k, 3) for k in range(3)))
 
+    # from the torso to the tip
+    if not alone:
+        start = Motion(state.omega, draft.of_torso(v_dot, OMEGA), arrays["a_torso"][0])
+        draft.copy(motion.w, start.w)
+        draft.copy(motion.w_dot, start.w_dot)
+        draft.step(torso.mount_acceleration, start, a_mount=motion.a)
+        across(draft, mount.motion_at_root, motion.vectors())
+    for stretch, i in each_segment(draft):
+        base = bases.part(9 * i, 9)
+        draft.copy(*((here, base) if alone else (base, here)))
+        with pieces_of(draft, stretch, i) as g:
+            mechanism(draft).move(draft, segments, (i, g), motion, v_dot, wrenches.at(i, g))
+        if alone:
+            draft.copy(arrays["tips"].part(9 * i, 9), here)
 
-@dataclass(frozen=True)
-class LinkTangents:
-    """Differentiates the links of every segment: their wrenches along all of its own directions."""
-
-    draft: Draft
-    segments: Segments
-    slopes: SegmentSlopes
-    wrench: Array
-    d_wrench: Array
-    own: dict[str, Ref]
-
-    def outward(self, start: Motion, v_dot: Array) -> None:
-        """Carry the motion to the tip, link by link; its tangents begin anew in every segment."""
-        draft, n = self.draft, self.draft.tail.links
-        here, joint = draft.vectors(**dict.fromkeys(CARRIED, 3)), draft.vectors(a_joint=3, swing=3)
-        d_here, d_joint = (
-            Vectors({f"d_{k}": draft.wide(f"d_{k}", 3, OWN)[0] for k in scope.named})
-            for scope in (here, joint)
+    # and back
+    torque = draft.vector("torque", PER_SEGMENT)
+    draft.fill(total["F_next"], 0)
+    for stretch, i in each_segment(draft, downward=True):
+        tip = beyond.part(6 * i, 6)
+        draft.copy(*((total["F_next"], tip) if alone else (tip, total["F_next"])))
+        draft.fill(torque, 0)
+        with pieces_of(draft, stretch, i, downward=True) as g:
+            reads = segments.at(i, g), wrenches.at(i, g), total
+            draft.step(mechanism(draft).gather_wrench, *reads, **total, torque_=torque)
+        if alone:
+            draft.copy(arrays["loads"].part(FORCES * i, 6), total["F_next"])
+            draft.copy(arrays["loads"].part(FORCES * i + 6, PER_SEGMENT), torque)
+    if alone:
+        add_passive_forces(
+            draft, state, lambda i: arrays["loads"].part(FORCES * i + 6, PER_SEGMENT)
         )
-        draft.copy(here["w"], start.w)
-        draft.copy(here["w_dot"], start.w_dot)
-        draft.step(torso.mount_acceleration, start, a_mount=here["a"])
-        move = moved(link.link_motion, *CARRIED, "rates")
-        weigh = moved(link.link_wrench, "w", "w_dot", *joint.named)
-        turning = {"d_joint_angles": self.own["angles"], "d_rates": self.own["rates"]}
-        with draft.loop("i", draft.tail.segments) as i:
-            draft.copy(d_here["d_w"], self.own["w"])
-            for name in ("d_w_dot", "d_a"):
-                draft.fill(d_here[name], 0)
-            with draft.loop("j", n) as j:
-                piece, rates = self.segments.at(i), self.segments.motion(i, v_dot)
-                writes = {**here, **d_here, **joint, **d_joint}
-                draft.step(move, piece, rates, here, d_here, turning, **writes)
-                writes = {
-                    "F": self.wrench[n * i + j],
-                    "d_F": self.d_wrench.part(6 * (n * i + j), 6),
-                }
-                draft.step(weigh, piece, here, d_here, joint, d_joint, **writes)
-            for k, ref in enumerate(d_here.named.values()):
-                draft.copy(self.slopes.tip.part(9 * i + 3 * k, 3), ref)
-
-    def inward(self) -> None:
-        """Sum the wrenches to the base, with those of all links beyond."""
-        draft, n, force = self.draft, self.draft.tail.links, self.slopes.force
-        total = {"F_next": draft.vector("F_next", 6)}
-        total["d_F_next"] = d_total = draft.wide("d_F_next", 6, OWN)[0]
-        draft.fill(total["F_next"], 0)
-        gather = moved(link.gather_wrench, "F", "F_next")
-        with draft.loop("i", draft.tail.segments, downward=True) as i:
-            d_torque = self.slopes.torque(i)
-            draft.fill(d_total, 0)
-            draft.fill(d_torque, 0)
-            with draft.loop("j", n, downward=True) as j:
-                loads = {"F": self.wrench[n * i + j], "d_F": self.d_wrench.part(6 * (n * i + j), 6)}
-                loads["d_joint_angles"] = self.own["angles"]
-                piece = self.segments.at(i)
-                draft.step(gather, piece, Vectors(total), loads, **total, d_torque_=d_torque)
-            draft.copy(force.part(FORCES * i, 6), d_total)
 
 
-def assemble_segment_slopes(draft: Draft, arrays: dict[str, Array]) -> None:
-    """Slopes of every segment by its own directions, link by link."""
-    state, v_dot, total = draft.state(arrays["q"], arrays["v"]), arrays["v_dot"], draft.tail.total
-    segments = mechanism(draft).prepare(draft, state, False)
-    slopes = SegmentSlopes.declared(draft, "output")
-    wrench, d_wrench = draft.array("wrench", 6, total), draft.wide("d_wrench", 6 * total, OWN)
+A_TORSO = Argument("a_torso", (3,), "acceleration of B less gravity, torso axes")
+BASES = Argument("bases", ("segments", 9), "w, w_dot and a of the bases of all segments")
+BEYOND = Argument("beyond", ("segments", 6), "wrenches at the tips of all segments")
+WHOLE = Function(
+    "segment_motions",
+    "motions of the bases of all segments, and wrenches at their tips",
+    (Q, V, V_DOT, A_TORSO),
+    (BASES, BEYOND),
+    assemble_alone,
+)
+ALONE = Function(
+    "segments_alone",
+    "how each segment answers to the motion of its base, its coordinates and rates",
+    (Q, V, V_DOT, BASES, BEYOND),
+    (
+        Argument("tips", ("segments", 9), "w, w_dot and a of the tips of all segments"),
+        Argument("loads", ("segments", FORCES), "wrenches at their bases, and torques"),
+    ),
+    assemble_alone,
+)
+
+
+def segment_slopes_of(draft: Draft, arrays: dict[str, Array], v_dot: Array, a: Ref) -> "SegmentSlopes":
+    """Differentiate every segment along its own directions, which are the same lanes for all."""
+    tail, given = draft.tail, {"q": arrays["q"], "v": arrays["v"], "v_dot": v_dot}
+    given |= {x.name: draft.array(x.name, x.length(tail)) for x in (BASES, BEYOND)}
+    draft.call(assemble(WHOLE, tail), a_torso=a.array, **given)
 
     # directions of a segment's own: omega of its base, angles, rates
-    own = {}
-    for name, first in (("w", 0), ("angles", ANGLES), ("rates", RATES)):
-        own[name] = draft.wide(f"d_{name}_own", 3 if name == "w" else PER_SEGMENT, OWN)[0]
-        draft.unit(own[name], first)
-    links = LinkTangents(draft, segments, slopes, wrench, d_wrench, own)
-    links.outward(Motion(state.omega, block(v_dot, OMEGA), arrays["a_torso"][0]), v_dot)
-    links.inward()
-    add_passive_slopes(draft, state, own, slopes.torque)
+    sizes = {"d_q": tail.nq, "d_v": tail.nv, "d_bases": 9 * tail.segments}
+    own = {name: draft.wide(f"{name}_own", size, OWN) for name, size in sizes.items()}
+    for array in own.values():
+        draft.fill(array.whole(), 0)
+    with draft.loop("i", tail.segments) as i:
+        draft.unit(own["d_bases"].part(9 * i, 3), 0)
+        draft.unit(tail.segment_q(own["d_q"], i), ANGLES)
+        draft.unit(tail.segment_v(own["d_v"], i), RATES)
+    across(draft, mount.velocity_at_root, w=own["d_bases"].part(0, 3))
 
-
-SLOPES = Function(
-    "segment_slopes",
-    "how each segment answers to the motion of its base, its coordinates and rates",
-    (Q, V, V_DOT, Argument("a_torso", (3,), "acceleration of B less gravity, torso axes")),
-    (),
-    assemble_segment_slopes,
-)
+    slopes = SegmentSlopes.declared(draft)
+    inner = tangent_program(assemble(ALONE, tail), ("q", "v", "bases"), OWN)
+    draft.call(inner, **given, **own, d_tips=slopes.tip, d_loads=slopes.force)
+    across(draft, mount.wrench_at_mount, F_next=slopes.force.part(0, 6))
+    return slopes
 
 
 # ---- all segments --------------------------------------------------------------------------------
