@@ -8,8 +8,7 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from ..ir import program as ir
-from ..ir.builder import narrowed
-from ..ir.dataflow import forward_slice, inner_arrays, pruned, rule_of, writes
+from ..ir.dataflow import forward_slice, inner_arrays, names, pruned, rewritten, rule_of, writes
 from .angles import SinesAndCosinesArray, angle_inputs, kinds, sines_and_cosines_arrays
 from .step import tangent
 
@@ -52,10 +51,14 @@ def tangent_program(
     lanes: int = 0,
     bound: Bound = all_lanes,
     kept: Collection[str] = (),
+    cut: Collection[str] = (),
 ) -> ir.Program:
     """Return the program that takes ``d_<input>`` of the active inputs to ``d_<output>``.
 
-    lanes, bound: count and bound of ``Lanes``; kept: outputs that are given, too.
+    ``lanes`` is the number of directions, 0 for one direction in narrow scalars; ``bound`` tells
+    how many of the lanes are needed inside given loops.  ``kept`` outputs are given, too.
+    Tangents end where values are copied to a ``cut`` array and straight back: from there on they
+    have the tangents that are given, if the array is active, or none.
     """
     return tangents_together(program, [Lanes(active, lanes, bound)], kept)
 
@@ -65,16 +68,20 @@ def tangents_together(
 ) -> ir.Program:
     """Return the program of the tangents of several kinds at once, which share all values."""
     # every array that depends on the active ones has tangents, or its angles do
-    sweeps, angles = [], sines_and_cosines_arrays(program)
-    for lanes in kinds_of_lanes:
-        moving = forward_slice(program.body, lanes.active)
-        by_angles = {name: array for name, array in angles.items() if name in moving}
-        moving -= by_angles.keys()
-        companions = {a.name: lanes.companion(a) for a in program.arrays if a.name in moving}
-        sweeps.append(_Tangents(companions, by_angles, lanes.bound))
+    cuts = set(cut)
+    flowing = rewritten(program.body, lambda s: () if names(writes(s)) & cuts else (s,))
+    moving = forward_slice(flowing, active)
+    by_angles = {
+        name: array for name, array in sines_and_cosines_arrays(program).items() if name in moving
+    }
+    companions = {
+        a.name: ir.Array(f"d_{a.name}", _role(a, cuts), a.size, a.count, lanes=lanes)
+        for a in program.arrays
+        if a.name in moving - by_angles.keys()
+    }
 
     # lanes that a statement leaves out are zero from the start
-    body = _Together(sweeps).body(program.body, ())
+    body = _Tangents(companions, by_angles, bound, cuts).body(program.body, ())
     fills = tuple(ir.Fill(ref, (0,) * ref.size) for ref in _partly_written(body))
 
     own = inner_arrays(program)
@@ -84,6 +91,11 @@ def tangents_together(
     words = [word for lanes in kinds_of_lanes for word in (lanes.prefix, *lanes.active)]
     name = "_".join([*words, program.name, *(["rows_of", *counts] if counts else [])])
     return pruned(replace(program, name=name, arrays=arrays, body=fills + body))
+
+
+def _role(array: ir.Array, cut: Collection[str]) -> str:
+    """Return the role of an array's tangents; those of parameters and of cuts are inputs."""
+    return "input" if array.role == "parameters" or array.name in cut else array.role
 
 
 def _partly_written(body: ir.Body) -> list[ir.Ref]:
@@ -109,8 +121,10 @@ class _Tangents:
         companions: dict[str, ir.Array],
         by_angles: dict[str, SinesAndCosinesArray],
         bound: Bound,
+        cut: Collection[str] = (),
     ):
         self.companions, self.by_angles, self.bound = companions, by_angles, bound
+        self.cut = frozenset(cut)
 
     def moves(self, ref: ir.Ref) -> bool:
         """Tell if the scalars of a reference have tangents."""
@@ -185,9 +199,14 @@ class _Together:
 
     def copy(self, copy: ir.Copy, loops: tuple[ir.Loop, ...]) -> Iterator[ir.Statement]:
         """Yield a copy, and that of the tangents."""
-        yield copy
-        for sweep in self.sweeps:
-            yield from sweep.copy(copy)
+        if copy.target.array.name in self.cut:
+            return
+        if copy.source.array.name not in self.cut:
+            yield copy
+        if self.moves(copy.target) and self.moves(copy.source):
+            yield replace(copy, target=self.of(copy.target), source=self.of(copy.source))
+        elif not copy.adds:
+            yield from self.cleared(copy.target)
 
     def apply(self, call: ir.Apply, loops: tuple[ir.Loop, ...]) -> Iterator[ir.Statement]:
         """Yield a step with its tangents of the last kind; before it come those of the other kinds,

@@ -31,6 +31,7 @@ from .directions import Directions
 # lanes of a segment's own directions: omega of its base, angles, rates
 ANGLES, RATES, OWN = 3, 5, 7
 FORCES = 6 + PER_SEGMENT  # wrench at the base, torques
+SLOPES = {"tip": 9, "force": FORCES}
 
 
 @dataclass(frozen=True)
@@ -43,10 +44,34 @@ class SegmentSlopes:
     force: Array
 
     @classmethod
-    def declared(cls, draft: Draft) -> "SegmentSlopes":
-        """Declare the arrays."""
-        m = draft.tail.segments
-        return cls(draft.wide("tip", 9 * m, OWN), draft.wide("force", FORCES * m, OWN))
+    def computed(cls, draft: Draft, torso_motion: Motion, **arguments: Array) -> "SegmentSlopes":
+        """Differentiate every segment; all of them have their own directions in the same lanes."""
+        tail, start = draft.tail, draft.array("start", 9)
+        root = Motion(*(start.part(3 * k, 3) for k in range(3)))
+        draft.copy(root.w, torso_motion.w)
+        draft.copy(root.w_dot, torso_motion.w_dot)
+        draft.step(torso.mount_acceleration, torso_motion, a_mount=root.a)
+        across(draft, mount.motion_at_root, root.vectors())
+
+        # directions
+        sizes = {"q": tail.nq, "v": tail.nv, "base": 9 * tail.segments}
+        own = {name: draft.wide(f"d_{name}_own", size, OWN) for name, size in sizes.items()}
+        draft.fill(own["base"].whole(), 0)
+        with draft.loop("i", tail.segments) as i:
+            draft.unit(own["base"].part(9 * i, 3), 0)
+            draft.unit(tail.segment_q(own["q"], i), ANGLES)
+            draft.unit(tail.segment_v(own["v"], i), RATES)
+
+        # the base of the first segment has the axes of the torso
+        slopes = cls(*(draft.wide(n, size * tail.segments, OWN) for n, size in SLOPES.items()))
+        across(draft, mount.velocity_at_root, w=own["base"].part(0, 3))
+        inner = tangent_program(
+            assemble(SEGMENT_LOADS, tail), tuple(own), OWN, cut=("base", "beyond")
+        )
+        given = {f"d_{name}": array for name, array in own.items()}
+        draft.call(inner, start=start, **arguments, **given, d_tips=slopes.tip, d_loads=slopes.force)
+        across(draft, mount.wrench_at_mount, F_next=slopes.force.part(0, 6))
+        return slopes
 
     def by_omega(self, i: Index) -> dict[str, Ref]:
         """Slopes by omega of the base: of w_dot and a of the tip, and of the wrench and the
@@ -69,7 +94,7 @@ def derivatives_by_segments(draft: Draft, arrays: dict[str, Array]) -> None:
     a = draft.vector("a_torso", 3)
     draft.step(torso.torso_acceleration, reads, a=a)
     motion = Motion(state.omega, block(v_dot, OMEGA), a)
-    slopes = segment_slopes_of(draft, arrays, v_dot, a)
+    slopes = SegmentSlopes.computed(draft, motion, q=arrays["q"], v=arrays["v"], v_dot=v_dot)
 
     directions = Directions(tail, ("omega",))
     lanes = directions.count + tail.nt
@@ -88,96 +113,52 @@ def derivatives_by_segments(draft: Draft, arrays: dict[str, Array]) -> None:
 # ---- one segment ---------------------------------------------------------------------------------
 
 
-def assemble_alone(draft: Draft, arrays: dict[str, Array]) -> None:
-    """Wrench and torques at the base of every segment, and the motion of its tip, from that of its
-    base and the wrench beyond; these are those of the whole tail where they are not given.
-    """
-    state, v_dot, tail = draft.state(arrays["q"], arrays["v"]), arrays["v_dot"], draft.tail
-    segments, alone = mechanism(draft).prepare(draft, state, False), "loads" in arrays
-    bases, beyond = arrays["bases"], arrays["beyond"]
-    wrench, total = draft.array("wrench", 6, tail.pieces), draft.vectors(F_next=6)
-    wrenches = Wrenches(wrench, mechanism(draft).declare_torques(draft))
-    here = draft.vector("here", 9)
-    motion = Motion(*(here.array.part(3 * k, 3) for k in range(3)))
+def assemble_segment_loads(draft: Draft, arrays: dict[str, Array]) -> None:
+    """Motions of the tips of all segments, and wrenches and torques at their bases.
 
-    # from the torso to the tip
-    if not alone:
-        start = Motion(state.omega, draft.of_torso(v_dot, OMEGA), arrays["a_torso"][0])
-        draft.copy(motion.w, start.w)
-        draft.copy(motion.w_dot, start.w_dot)
-        draft.step(torso.mount_acceleration, start, a_mount=motion.a)
-        across(draft, mount.motion_at_root, motion.vectors())
+    Between two segments, all goes through ``base`` and ``beyond``, where derivatives may be cut.
+    """
+    tail, state, v_dot = draft.tail, draft.state(arrays["q"], arrays["v"]), arrays["v_dot"]
+    segments = mechanism(draft).prepare(draft, state, False)
+    wrench = draft.array("wrench", 6, tail.pieces)
+    wrenches = Wrenches(wrench, mechanism(draft).declare_torques(draft))
+
+    # from the mount to the tip
+    bases, here = draft.array("base", 9, tail.segments), draft.array("here", 9)
+    motion = Motion(*(here.part(3 * k, 3) for k in range(3)))
+    draft.copy(here[0], arrays["start"][0])
     for stretch, i in each_segment(draft):
-        base = bases.part(9 * i, 9)
-        draft.copy(*((here, base) if alone else (base, here)))
+        draft.copy(bases[i], here[0])
+        draft.copy(here[0], bases[i])
         with pieces_of(draft, stretch, i) as g:
             mechanism(draft).move(draft, segments, (i, g), motion, v_dot, wrenches.at(i, g))
-        if alone:
-            draft.copy(arrays["tips"].part(9 * i, 9), here)
+        draft.copy(arrays["tips"].part(9 * i, 9), here[0])
 
-    # and back
-    torque = draft.vector("torque", PER_SEGMENT)
+    # from the tip to the mount
+    beyond, total = draft.vector("beyond", 6), draft.vectors(F_next=6)
     draft.fill(total["F_next"], 0)
     for stretch, i in each_segment(draft, downward=True):
-        tip = beyond.part(6 * i, 6)
-        draft.copy(*((total["F_next"], tip) if alone else (tip, total["F_next"])))
+        torque = arrays["loads"].part(FORCES * i + 6, PER_SEGMENT)
+        draft.copy(beyond, total["F_next"])
+        draft.copy(total["F_next"], beyond)
         draft.fill(torque, 0)
         with pieces_of(draft, stretch, i, downward=True) as g:
             reads = segments.at(i, g), wrenches.at(i, g), total
             draft.step(mechanism(draft).gather_wrench, *reads, **total, torque_=torque)
-        if alone:
-            draft.copy(arrays["loads"].part(FORCES * i, 6), total["F_next"])
-            draft.copy(arrays["loads"].part(FORCES * i + 6, PER_SEGMENT), torque)
-    if alone:
-        add_passive_forces(
-            draft, state, lambda i: arrays["loads"].part(FORCES * i + 6, PER_SEGMENT)
-        )
+        draft.copy(arrays["loads"].part(FORCES * i, 6), total["F_next"])
+    add_passive_forces(draft, state, lambda i: arrays["loads"].part(FORCES * i + 6, PER_SEGMENT))
 
 
-A_TORSO = Argument("a_torso", (3,), "acceleration of B less gravity, torso axes")
-BASES = Argument("bases", ("segments", 9), "w, w_dot and a of the bases of all segments")
-BEYOND = Argument("beyond", ("segments", 6), "wrenches at the tips of all segments")
-WHOLE = Function(
-    "segment_motions",
-    "motions of the bases of all segments, and wrenches at their tips",
-    (Q, V, V_DOT, A_TORSO),
-    (BASES, BEYOND),
-    assemble_alone,
-)
-ALONE = Function(
-    "segments_alone",
-    "how each segment answers to the motion of its base, its coordinates and rates",
-    (Q, V, V_DOT, BASES, BEYOND),
+SEGMENT_LOADS = Function(
+    "segment_loads",
+    "motions of the tips of all segments, and wrenches and torques at their bases",
+    (Q, V, V_DOT, Argument("start", (9,), "w, w_dot and a of the tail's root")),
     (
-        Argument("tips", ("segments", 9), "w, w_dot and a of the tips of all segments"),
-        Argument("loads", ("segments", FORCES), "wrenches at their bases, and torques"),
+        Argument("tips", ("segments", 9), "w, w_dot and a of the tips"),
+        Argument("loads", ("segments", FORCES), "wrenches at the bases, and torques"),
     ),
-    assemble_alone,
+    assemble_segment_loads,
 )
-
-
-def segment_slopes_of(draft: Draft, arrays: dict[str, Array], v_dot: Array, a: Ref) -> "SegmentSlopes":
-    """Differentiate every segment along its own directions, which are the same lanes for all."""
-    tail, given = draft.tail, {"q": arrays["q"], "v": arrays["v"], "v_dot": v_dot}
-    given |= {x.name: draft.array(x.name, x.length(tail)) for x in (BASES, BEYOND)}
-    draft.call(assemble(WHOLE, tail), a_torso=a.array, **given)
-
-    # directions of a segment's own: omega of its base, angles, rates
-    sizes = {"d_q": tail.nq, "d_v": tail.nv, "d_bases": 9 * tail.segments}
-    own = {name: draft.wide(f"{name}_own", size, OWN) for name, size in sizes.items()}
-    for array in own.values():
-        draft.fill(array.whole(), 0)
-    with draft.loop("i", tail.segments) as i:
-        draft.unit(own["d_bases"].part(9 * i, 3), 0)
-        draft.unit(tail.segment_q(own["d_q"], i), ANGLES)
-        draft.unit(tail.segment_v(own["d_v"], i), RATES)
-    across(draft, mount.velocity_at_root, w=own["d_bases"].part(0, 3))
-
-    slopes = SegmentSlopes.declared(draft)
-    inner = tangent_program(assemble(ALONE, tail), ("q", "v", "bases"), OWN)
-    draft.call(inner, **given, **own, d_tips=slopes.tip, d_loads=slopes.force)
-    across(draft, mount.wrench_at_mount, F_next=slopes.force.part(0, 6))
-    return slopes
 
 
 # ---- all segments --------------------------------------------------------------------------------
