@@ -4,14 +4,13 @@ They act only on the coordinates: their forces are added to H v_dot + C, or subt
 torques.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 
-from ..autodiff.step import tangent
 from ..ir.program import Array, Index, Ref
 from ..mechanics import passive
-from ..mechanics.lower import declared_shapes, derive
+from ..mechanics.lower import declared_shapes
 from .draft import Draft
 from .layout import coordinates
 from .scope import Instead, State, Vectors
@@ -74,23 +73,6 @@ def net_torques(draft: Draft, state: State, tau: Array) -> Array:
         reads = {"tau": coordinates(tau, i), "passive": passive_force}
         draft.step(passive.net_torque, reads, net=coordinates(net, i))
     return net
-
-
-def add_passive_slopes(
-    draft: Draft, state: State, own: Mapping[str, Ref], slopes: Callable[[Index], Ref]
-) -> None:
-    """Add the derivatives of each segment's passive parts by its own ``angles`` and ``rates``,
-    whose directions are ``own``.
-    """
-    for name in draft.tail.passive:
-        function = FORCES[name]
-        active = sorted({"angles", "rates"} & declared_shapes(function).keys())
-        step = tangent(derive(function), frozenset(active))
-        turning = {f"d_{each}": own[each] for each in active}
-        with draft.loop("i", draft.tail.segments) as i:
-            moving = Vectors({"angles": state.angles(i), "rates": state.rates(i)}).only(*active)
-            parameters = passive_parameters(draft, function, partial(coordinates, i=i))
-            draft.step(step, moving, parameters, turning, d_passive_=slopes(i))
 
 
 def add_elastic_energy(draft: Draft, state: State, potential: Ref) -> None:

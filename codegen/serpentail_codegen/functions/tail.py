@@ -1,6 +1,6 @@
 """The sizes of a tail, which determine the sizes of arrays and the shapes of arguments."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import pi
 
 from serpentail_scene.layout import PER_SEGMENT, Sizes
@@ -41,13 +41,6 @@ class Tail(Sizes):
     def runs(self, kind: str) -> tuple[SegmentRun, ...]:
         """Consecutive segments of one kind, links or arcs; in most tails all of them."""
         return runs_of(self.stretches, kind)
-
-    @property
-    def uniform(self) -> bool:
-        """Tell if all links are equal, equally many in each segment, and mounted along the axes of
-        a free torso.
-        """
-        return replace(self.shape, weightless=False) == EQUAL
 
     @property
     def fixed(self) -> bool:  # type: ignore[override]

@@ -1,6 +1,6 @@
 """Derivatives of v_dot of a long tail, segment by segment: the work grows with m^2.
 
-Each segment's links are differentiated along 7 directions only, whatever m is: omega of the
+Each segment's pieces are differentiated along 7 directions only, whatever m is: omega of the
 segment's base, and its own coordinates and rates. The effect of accelerations is known from its
 inertia. One sweep carries the motion out along the tail. A second sweep carries loads back to the
 torso and eliminates the coordinates. A last one outward gives the accelerations that balance these
@@ -31,7 +31,6 @@ from .directions import Directions
 # lanes of a segment's own directions: omega of its base, angles, rates
 ANGLES, RATES, OWN = 3, 5, 7
 FORCES = 6 + PER_SEGMENT  # wrench at the base, torques
-SLOPES = {"tip": 9, "force": FORCES}
 
 
 @dataclass(frozen=True)
@@ -42,36 +41,6 @@ class SegmentSlopes:
 
     tip: Array
     force: Array
-
-    @classmethod
-    def computed(cls, draft: Draft, torso_motion: Motion, **arguments: Array) -> "SegmentSlopes":
-        """Differentiate every segment; all of them have their own directions in the same lanes."""
-        tail, start = draft.tail, draft.array("start", 9)
-        root = Motion(*(start.part(3 * k, 3) for k in range(3)))
-        draft.copy(root.w, torso_motion.w)
-        draft.copy(root.w_dot, torso_motion.w_dot)
-        draft.step(torso.mount_acceleration, torso_motion, a_mount=root.a)
-        across(draft, mount.motion_at_root, root.vectors())
-
-        # directions
-        sizes = {"q": tail.nq, "v": tail.nv, "base": 9 * tail.segments}
-        own = {name: draft.wide(f"d_{name}_own", size, OWN) for name, size in sizes.items()}
-        draft.fill(own["base"].whole(), 0)
-        with draft.loop("i", tail.segments) as i:
-            draft.unit(own["base"].part(9 * i, 3), 0)
-            draft.unit(tail.segment_q(own["q"], i), ANGLES)
-            draft.unit(tail.segment_v(own["v"], i), RATES)
-
-        # the base of the first segment has the axes of the torso
-        slopes = cls(*(draft.wide(n, size * tail.segments, OWN) for n, size in SLOPES.items()))
-        across(draft, mount.velocity_at_root, w=own["base"].part(0, 3))
-        inner = tangent_program(
-            assemble(SEGMENT_LOADS, tail), tuple(own), OWN, cut=("base", "beyond")
-        )
-        given = {f"d_{name}": array for name, array in own.items()}
-        draft.call(inner, start=start, **arguments, **given, d_tips=slopes.tip, d_loads=slopes.force)
-        across(draft, mount.wrench_at_mount, F_next=slopes.force.part(0, 6))
-        return slopes
 
     def by_omega(self, i: Index) -> dict[str, Ref]:
         """Slopes by omega of the base: of w_dot and a of the tip, and of the wrench and the
@@ -94,7 +63,7 @@ def derivatives_by_segments(draft: Draft, arrays: dict[str, Array]) -> None:
     a = draft.vector("a_torso", 3)
     draft.step(torso.torso_acceleration, reads, a=a)
     motion = Motion(state.omega, block(v_dot, OMEGA), a)
-    slopes = SegmentSlopes.computed(draft, motion, q=arrays["q"], v=arrays["v"], v_dot=v_dot)
+    slopes = segment_slopes_of(draft, motion, q=arrays["q"], v=arrays["v"], v_dot=v_dot)
 
     directions = Directions(tail, ("omega",))
     lanes = directions.count + tail.nt
@@ -116,7 +85,8 @@ def derivatives_by_segments(draft: Draft, arrays: dict[str, Array]) -> None:
 def assemble_segment_loads(draft: Draft, arrays: dict[str, Array]) -> None:
     """Motions of the tips of all segments, and wrenches and torques at their bases.
 
-    Between two segments, all goes through ``base`` and ``beyond``, where derivatives may be cut.
+    Between two segments all passes through ``base`` and ``beyond``: tangents that are cut there are
+    those of each segment alone.
     """
     tail, state, v_dot = draft.tail, draft.state(arrays["q"], arrays["v"]), arrays["v_dot"]
     segments = mechanism(draft).prepare(draft, state, False)
@@ -159,6 +129,38 @@ SEGMENT_LOADS = Function(
     ),
     assemble_segment_loads,
 )
+
+
+def segment_slopes_of(draft: Draft, torso_motion: Motion, **arguments: Array) -> SegmentSlopes:
+    """Differentiate every segment; the directions of each are in the same lanes.
+
+    The base of the first one has the axes of the torso. arguments: q, v and v_dot.
+    """
+    tail, start = draft.tail, draft.array("start", 9)
+    root = Motion(*(start.part(3 * k, 3) for k in range(3)))
+    draft.copy(root.w, torso_motion.w)
+    draft.copy(root.w_dot, torso_motion.w_dot)
+    draft.step(torso.mount_acceleration, torso_motion, a_mount=root.a)
+    across(draft, mount.motion_at_root, root.vectors())
+
+    # directions
+    sizes = {"q": tail.nq, "v": tail.nv, "base": 9 * tail.segments}
+    own = {name: draft.wide(f"d_{name}_own", size, OWN) for name, size in sizes.items()}
+    draft.fill(own["base"].whole(), 0)
+    with draft.loop("i", tail.segments) as i:
+        draft.unit(own["base"].part(9 * i, 3), 0)
+        draft.unit(tail.segment_q(own["q"], i), ANGLES)
+        draft.unit(tail.segment_v(own["v"], i), RATES)
+    across(draft, mount.velocity_at_root, w=own["base"].part(0, 3))
+
+    # slopes
+    inner = tangent_program(assemble(SEGMENT_LOADS, tail), tuple(own), OWN, cut=("base", "beyond"))
+    arguments |= {f"d_{name}": array for name, array in own.items()}
+    tip = draft.wide("tip", 9 * tail.segments, OWN)
+    force = draft.wide("force", FORCES * tail.segments, OWN)
+    draft.call(inner, start=start, **arguments, d_tips=tip, d_loads=force)
+    across(draft, mount.wrench_at_mount, F_next=force.part(0, 6))
+    return SegmentSlopes(tip, force)
 
 
 # ---- all segments --------------------------------------------------------------------------------

@@ -15,7 +15,7 @@ from ..layout import block, coordinates
 from ..scope import Motion, State, Vectors
 from .bodies import ArticulatedBody, Freed, Passes, lane
 from .pieces import IDENTITY, across, mechanism
-from .side_by_side import Group, groups_of, joined
+from .side_by_side import SegmentGroup, groups_of, joined
 
 UNKNOWNS = 8  # motion of a segment's base, and two coordinates
 OWN_INERTIA = {"h": 3, "I": 6, "pitch": 6, "yaw": 6, "H_pp": 1, "H_py": 1, "H_yy": 1}
@@ -66,7 +66,7 @@ def _base_velocities(draft: Draft, state: State, passes: Passes) -> Ref:
     return w
 
 
-def _own_inertia(group: Group) -> Vectors:
+def _own_inertia(group: SegmentGroup) -> Vectors:
     """Compute how each tip moves, and the composite inertia of each segment's own pieces.
 
     The base of the first segment has the axes of the torso.
@@ -94,14 +94,14 @@ def _own_inertia(group: Group) -> Vectors:
             reads = group.segments.at(first, j), mass, carried
             draft.step(tail.gather, *reads, **mass, **carried, **own)
     if not group.number:
-        h, I, *momenta = (lane(ref, first) for ref in carried.named.values())
-        across(draft, mount.composite_at_mount, h=h, I=I)
-        for momentum in momenta:
-            across(draft, mount.wrench_at_mount, F_next=momentum)
+        own = {name: lane(ref, first) for name, ref in carried.named.items()}
+        across(draft, mount.composite_at_mount, {name: own[name] for name in ("h", "I")})
+        for name in ("pitch", "yaw"):
+            across(draft, mount.wrench_at_mount, F_next=own[name])
     return Vectors({**inertia, **mass, **tip})
 
 
-def _bias(group: Group, w: Ref) -> Vectors:
+def _bias(group: SegmentGroup, w: Ref) -> Vectors:
     """Compute loads and tip accelerations of each segment that velocities alone cause."""
     draft, first = group.draft, as_index(0)
     with group.at_once():

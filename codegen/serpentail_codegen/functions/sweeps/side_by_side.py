@@ -19,7 +19,7 @@ ONE = Tail(1, 1, shape=Shape(fixed=True))  # whose q and v are the coordinates o
 
 
 @dataclass(frozen=True)
-class Group:
+class SegmentGroup:
     """Segments of one kind with equally many pieces, in their order along the tail.
 
     segments: their data as those of a single segment, whose vectors are wide.
@@ -87,23 +87,23 @@ class Group:
         return own
 
 
-def groups_of(draft: Draft, state: State) -> list[Group]:
+def groups_of(draft: Draft, state: State) -> list[SegmentGroup]:
     """Return all segments in groups, with the data of their pieces."""
     alike: dict[tuple[str, int], list[Stretch]] = {}
     for stretch in draft.tail.stretches:
         alike.setdefault((stretch.kind, stretch.pieces), []).append(stretch)
     properties: dict[str, Segments] = {}
-    groups = []
+    groups: list[SegmentGroup] = []
     for (kind, _), stretches in alike.items():
         draft.stretch = stretches[0]
         if kind not in properties:
             properties[kind] = mechanism(draft).properties(draft, state)
-        group = Group(draft, len(groups), tuple(stretches), properties[kind])
+        group = SegmentGroup(draft, len(groups), tuple(stretches), properties[kind])
         groups.append(replace(group, segments=_prepared(group)))
     return groups
 
 
-def joined(groups: Sequence[Group], found: Sequence[Vectors]) -> Vectors:
+def joined(groups: Sequence[SegmentGroup], found: Sequence[Vectors]) -> Vectors:
     """Return what was found of each group as vectors with a lane for each segment of the tail."""
     if len(groups) == 1:
         return found[0]
@@ -117,13 +117,13 @@ def joined(groups: Sequence[Group], found: Sequence[Vectors]) -> Vectors:
     return every
 
 
-def _prepared(group: Group) -> Segments:
+def _prepared(group: SegmentGroup) -> Segments:
     """Return properties, coordinates and data of the pieces of a group, side by side."""
     draft, own = group.draft, group.segments
     with group.at_once():
         wide, each = dict(own.shared), {}
         for name, array in own.arrays.items():
-            wide |= group.vectors(**{name: (0,) * array.size}).named
+            wide |= group.vectors(**{name: (0,) * array.size})
             for _, i, at in group.each():
                 draft.copy(lane(wide[name], at), array[i])
         for name, array in own.each.items():
@@ -132,12 +132,12 @@ def _prepared(group: Group) -> Segments:
         for _, i, at in group.each():
             draft.copy(lane(moving["angles"], at), own.state.angles(i))
             draft.copy(lane(moving["rates"], at), own.state.rates(i))
-        wide |= draft.vectors(**mechanism(draft).data).named
-        mechanism(draft).describe(draft, Vectors(wide | moving.named))
+        wide |= draft.vectors(**mechanism(draft).data)
+        mechanism(draft).describe(draft, Vectors({**wide, **moving}))
     return Segments(State(ONE, moving["angles"].array, moving["rates"].array), {}, wide, each)
 
 
-def _of_pieces(group: Group, name: str, array: Array) -> Array:
+def _of_pieces(group: SegmentGroup, name: str, array: Array) -> Array:
     """Return what each piece has of its own, side by side; array: of all pieces of the tail."""
     draft, n, size = group.draft, group.pieces, array.size
     own = f"{name}_lanes{group.suffix}"

@@ -57,9 +57,9 @@ def with_both(kind: Mechanism) -> Mechanism:
 
 
 # outside of loops over segments only the data of all segments are there
-STEPS = [field.name for field in fields(Mechanism)]
+NOTHING: dict[str, Any] = dict.fromkeys((f.name for f in fields(Mechanism)), of_no_segment)
 MIXED = {
     "articulated": with_both(ARTICULATED),
     "continuum": with_both(CONTINUUM),
-    "": with_both(Mechanism(**dict.fromkeys(STEPS, of_no_segment))),
+    "": with_both(Mechanism(**NOTHING)),
 }

@@ -21,11 +21,13 @@ STRAIGHT_BESIDE_LANES = 4100
 ALWAYS_IN_LOOPS = ("tail_point_jacobians",)
 # columns of H times links, the work of a sweep in lanes: from here on segments are as fast
 SEGMENTS_FROM = 128
+LINKS_OF_AN_ARC = 4  # an arc is as much work as so many links
 # what the manifest says of the choice
 RULE = {
     "straight_up_to": STRAIGHT_UP_TO,
     "straight_beside_lanes_up_to": STRAIGHT_BESIDE_LANES,
     "segments_from": SEGMENTS_FROM,
+    "links_of_an_arc": LINKS_OF_AN_ARC,
 }
 UNROLLED_ROWS = 12  # smaller matrices are factored without loops
 
@@ -62,7 +64,9 @@ def fastest(function: Function, tail: Tail) -> tuple[str, Program]:
     always run. Sweeps in lanes overtake them before that, and sweeps by segments overtake both.
     """
     # sweeps by segments, if the tail is long
-    long = tail.uniform and tail.segments > 1 and tail.nt * tail.total >= SEGMENTS_FROM
+    arcs = sum(run.stop - run.first for run in tail.runs("continuum"))
+    work = tail.nt * (tail.pieces + (LINKS_OF_AN_ARC - 1) * arcs)
+    long = tail.segments > 1 and work >= SEGMENTS_FROM
     form, swept = in_form("segments" if long else "lanes", function, tail)
     if form == "segments" or function.name in ALWAYS_IN_LOOPS:
         return form, swept

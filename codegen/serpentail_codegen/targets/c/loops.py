@@ -156,8 +156,12 @@ class LoopPrinter:
     def _guard(self, guard: ir.Guard) -> list[str]:
         scalars, zero = self._ref(guard.scalar), self.dialect.literal(0)
         if scalars.lanes:
-            length = scalars.size * scalars.array.row
-            holds = f"{self.helper('all_positive')}({length}, {pointer(scalars)})"
+            # rows that are not full hold anything behind their lanes
+            full, lanes = scalars.lanes == scalars.array.row, scalars.lanes
+            rows = [(scalars, scalars.size)] if full else [(one, 1) for one in singles(scalars)]
+            positive = self.helper("all_positive")
+            tests = [f"{positive}({size * lanes}, {pointer(ref)})" for ref, size in rows]
+            holds = tests[0] if full else f"({' && '.join(tests)})"
         else:
             tests = [f"{scalar(scalars, k)} > {zero}" for k in range(scalars.size)]
             holds = f"({' && '.join(tests)})"
