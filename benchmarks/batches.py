@@ -13,8 +13,9 @@ import numpy as np
 import serpentail as st
 from benchmarks.models import DFD, FD, HESSIAN, built, label
 from benchmarks.timing import best, best_of
-from serpentail.model.kernel import aligned, argument_record
+from serpentail.model.kernel import argument_record
 from serpentail.model.library import MIN_BATCH
+from serpentail.model.memory import aligned
 from serpentail_scene.signatures.table import AIRBORNE
 
 PER_PROCESSOR = True

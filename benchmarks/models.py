@@ -12,7 +12,7 @@ from benchmarks.peers.build import Compiler, build_library, compilers
 from benchmarks.timing import Closure
 from serpentail.compiling.compiler import compile_library
 from serpentail.compiling.toolchain import PROFILES
-from serpentail.model.kernel import aligned
+from serpentail.model.memory import aligned
 
 FD, DFD = "forward_dynamics", "forward_dynamics_derivatives"
 HESSIAN = "inverse_dynamics_hessian"

@@ -38,6 +38,7 @@ from typing import Any
 from numpy.typing import ArrayLike, NDArray
 
 from .compiled_functions import CompiledFunctions
+from .memory import Out
 
 Array = NDArray[Any]  # of doubles, or of floats if the scene asks for them
 
@@ -69,10 +70,11 @@ def method(signature: Signature) -> str:
     """Return the text of one method."""
     names = [argument.name for argument in signature.inputs]
     typed = [f"{name}: ArrayLike" for name in names]
-    call = f'self.kernels["{signature.name}"]({", ".join(names)})'
+    call = f'self.kernels["{signature.name}"]({", ".join(names)}, out=out)'
     if LEGS in signature.inputs:
         typed[-1] += " | None = None"
-        call = f'self.kernels.with_legs("{signature.name}", legs, {", ".join(names[:-1])})'
+        call = f'self.kernels.with_legs("{signature.name}", legs, {", ".join(names[:-1])}, out=out)'
+    typed += ["*", "out: Out = None"]
     results = ", ".join(["Array"] * len(signature.outputs))
     result = f"tuple[{results}]" if len(signature.outputs) > 1 else results
     of_state = [name for name in names if name in ("q", "v")]

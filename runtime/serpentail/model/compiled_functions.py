@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from ..basics.errors import ModelError, StateError
 from .kernel import Kernel
+from .memory import Out
 
 
 class CompiledFunctions(dict[str, Kernel]):
@@ -27,16 +28,18 @@ class CompiledFunctions(dict[str, Kernel]):
             "evaluate; load it again"
         )
 
-    def with_legs(self, name: str, legs: ArrayLike | None, *arrays: ArrayLike) -> Any:
+    def with_legs(
+        self, name: str, legs: ArrayLike | None, *arrays: ArrayLike, out: Out = None
+    ) -> Any:
         """Call a function that takes legs last if the model has feet."""
         kernel, model = self[name], self.manifest["prefix"]
         feet = any(entry["group"] == "feet" for entry in self.manifest["contacts"])
         if feet and legs is None:
             raise StateError(f"{model} has feet: give legs, 4 angles (rad) and 4 rates (rad/s)")
         if legs is None:
-            return kernel(*arrays)
+            return kernel(*arrays, out=out)
         if feet:
-            return kernel(*arrays, legs)
+            return kernel(*arrays, legs, out=out)
         raise StateError(
             f'{model} has no feet, but legs were given: leave them out, or add "feet" to `contacts`'
         )

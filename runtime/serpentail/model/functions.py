@@ -8,6 +8,7 @@ from typing import Any
 from numpy.typing import ArrayLike, NDArray
 
 from .compiled_functions import CompiledFunctions
+from .memory import Out
 
 Array = NDArray[Any]  # of doubles, or of floats if the scene asks for them
 
@@ -27,7 +28,7 @@ class ModelFunctions:
 
     kernels: CompiledFunctions
 
-    def mass_matrix(self, q: ArrayLike) -> Array:
+    def mass_matrix(self, q: ArrayLike, *, out: Out = None) -> Array:
         """Compute the inertia matrix H(q), Eq. 2.
 
         Parameters
@@ -39,9 +40,9 @@ class ModelFunctions:
         H : ndarray, shape (nv, nv)
             Inertia matrix, symmetric and positive definite (kg, kg m, kg m^2).
         """
-        return self.kernels["mass_matrix"](q)
+        return self.kernels["mass_matrix"](q, out=out)
 
-    def bias_force(self, q: ArrayLike, v: ArrayLike) -> Array:
+    def bias_force(self, q: ArrayLike, v: ArrayLike, *, out: Out = None) -> Array:
         """Compute the bias force C(q, v), Eq. 3: centrifugal and Coriolis terms, gravity, the
         passive tail.
 
@@ -55,9 +56,11 @@ class ModelFunctions:
             Generalised force: at B (N, world), moment (N m, body), torques of the tail coordinates
             (N m).
         """
-        return self.kernels["bias_force"](q, v)
+        return self.kernels["bias_force"](q, v, out=out)
 
-    def inverse_dynamics(self, q: ArrayLike, v: ArrayLike, v_dot: ArrayLike) -> Array:
+    def inverse_dynamics(
+        self, q: ArrayLike, v: ArrayLike, v_dot: ArrayLike, *, out: Out = None
+    ) -> Array:
         """Compute the generalised force H v_dot + C that an acceleration v_dot needs.
 
         Parameters
@@ -72,9 +75,9 @@ class ModelFunctions:
             Generalised force: at B (N, world), moment (N m, body), torques of the tail coordinates
             (N m).
         """
-        return self.kernels["inverse_dynamics"](q, v, v_dot)
+        return self.kernels["inverse_dynamics"](q, v, v_dot, out=out)
 
-    def energy(self, q: ArrayLike, v: ArrayLike) -> tuple[Array, Array]:
+    def energy(self, q: ArrayLike, v: ArrayLike, *, out: Out = None) -> tuple[Array, Array]:
         """Compute the kinetic and potential energy of torso and tail.
 
         Parameters
@@ -88,9 +91,9 @@ class ModelFunctions:
         potential : float
             Potential energy, zero at the height of the world's origin (J).
         """
-        return self.kernels["energy"](q, v)
+        return self.kernels["energy"](q, v, out=out)
 
-    def momentum(self, q: ArrayLike, v: ArrayLike) -> tuple[Array, Array]:
+    def momentum(self, q: ArrayLike, v: ArrayLike, *, out: Out = None) -> tuple[Array, Array]:
         """Compute the linear and angular momentum of torso and tail.
 
         Parameters
@@ -104,9 +107,9 @@ class ModelFunctions:
         angular : ndarray, shape (3,)
             Angular momentum about the centre of mass (kg m^2/s, world).
         """
-        return self.kernels["momentum"](q, v)
+        return self.kernels["momentum"](q, v, out=out)
 
-    def tail_points(self, q: ArrayLike) -> Array:
+    def tail_points(self, q: ArrayLike, *, out: Out = None) -> Array:
         """Compute the positions of the tail points, Eqs. 13 to 15.
 
         Parameters
@@ -118,9 +121,9 @@ class ModelFunctions:
         points : ndarray, shape (N + 1, 3)
             Positions of the joints, then of the tip (m, world).
         """
-        return self.kernels["tail_points"](q)
+        return self.kernels["tail_points"](q, out=out)
 
-    def tail_point_jacobians(self, q: ArrayLike) -> Array:
+    def tail_point_jacobians(self, q: ArrayLike, *, out: Out = None) -> Array:
         """Compute the Jacobians of the tail points, Eqs. A5 to A8.
 
         Parameters
@@ -132,9 +135,11 @@ class ModelFunctions:
         J : ndarray, shape (N + 1, 3, nv)
             Jacobians of the tail points: velocity of a point (m/s, world) = J v.
         """
-        return self.kernels["tail_point_jacobians"](q)
+        return self.kernels["tail_point_jacobians"](q, out=out)
 
-    def center_of_mass(self, q: ArrayLike, v: ArrayLike) -> tuple[Array, Array, Array]:
+    def center_of_mass(
+        self, q: ArrayLike, v: ArrayLike, *, out: Out = None
+    ) -> tuple[Array, Array, Array]:
         """Compute the centre of mass of torso and tail, its velocity and its Jacobian.
 
         Parameters
@@ -150,9 +155,9 @@ class ModelFunctions:
         J : ndarray, shape (3, nv)
             Jacobian of the centre of mass, world.
         """
-        return self.kernels["center_of_mass"](q, v)
+        return self.kernels["center_of_mass"](q, v, out=out)
 
-    def mass_matrix_world(self, q: ArrayLike) -> Array:
+    def mass_matrix_world(self, q: ArrayLike, *, out: Out = None) -> Array:
         """Compute the inertia matrix H for the velocity (p_dot, omega in world axes, q_t_dot).
 
         Parameters
@@ -164,9 +169,9 @@ class ModelFunctions:
         H : ndarray, shape (nv, nv)
             Inertia matrix, symmetric and positive definite (kg, kg m, kg m^2).
         """
-        return self.kernels["mass_matrix_world"](q)
+        return self.kernels["mass_matrix_world"](q, out=out)
 
-    def bias_force_world(self, q: ArrayLike, v: ArrayLike) -> Array:
+    def bias_force_world(self, q: ArrayLike, v: ArrayLike, *, out: Out = None) -> Array:
         """Compute the bias force C for the velocity (p_dot, omega in world axes, q_t_dot).
 
         Parameters
@@ -179,10 +184,10 @@ class ModelFunctions:
             Generalised force: at B (N, world), moment (N m, body), torques of the tail coordinates
             (N m).
         """
-        return self.kernels["bias_force_world"](q, v)
+        return self.kernels["bias_force_world"](q, v, out=out)
 
     def inverse_dynamics_derivatives(
-        self, q: ArrayLike, v: ArrayLike, v_dot: ArrayLike
+        self, q: ArrayLike, v: ArrayLike, v_dot: ArrayLike, *, out: Out = None
     ) -> tuple[Array, Array]:
         """Compute the Jacobians of H v_dot + C with respect to q and v; the Jacobian with respect
         to v_dot is H.
@@ -200,10 +205,10 @@ class ModelFunctions:
         dv : ndarray, shape (nv, nv)
             d(force)/d(v).
         """
-        return self.kernels["inverse_dynamics_derivatives"](q, v, v_dot)
+        return self.kernels["inverse_dynamics_derivatives"](q, v, v_dot, out=out)
 
     def forward_dynamics_derivatives(
-        self, q: ArrayLike, v: ArrayLike, tau: ArrayLike
+        self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, *, out: Out = None
     ) -> tuple[Array, Array, Array]:
         """Compute the Jacobians of v_dot, Eq. 1, with respect to q, v and tau.
 
@@ -222,10 +227,10 @@ class ModelFunctions:
         dtau : ndarray, shape (nv, 2m)
             d(v_dot)/d(tau).
         """
-        return self.kernels["forward_dynamics_derivatives"](q, v, tau)
+        return self.kernels["forward_dynamics_derivatives"](q, v, tau, out=out)
 
     def inverse_dynamics_parameter_derivatives(
-        self, q: ArrayLike, v: ArrayLike, v_dot: ArrayLike
+        self, q: ArrayLike, v: ArrayLike, v_dot: ArrayLike, *, out: Out = None
     ) -> Array:
         """Compute the Jacobian of H v_dot + C with respect to the parameters.
 
@@ -240,10 +245,10 @@ class ModelFunctions:
         dparameters : ndarray, shape (nv, parameters)
             Derivative with respect to the values of the parameter struct, in their order.
         """
-        return self.kernels["inverse_dynamics_parameter_derivatives"](q, v, v_dot)
+        return self.kernels["inverse_dynamics_parameter_derivatives"](q, v, v_dot, out=out)
 
     def forward_dynamics_parameter_derivatives(
-        self, q: ArrayLike, v: ArrayLike, tau: ArrayLike
+        self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, *, out: Out = None
     ) -> Array:
         """Compute the Jacobian of v_dot, Eq. 1, with respect to the parameters.
 
@@ -258,10 +263,16 @@ class ModelFunctions:
         dparameters : ndarray, shape (nv, parameters)
             Derivative with respect to the values of the parameter struct, in their order.
         """
-        return self.kernels["forward_dynamics_parameter_derivatives"](q, v, tau)
+        return self.kernels["forward_dynamics_parameter_derivatives"](q, v, tau, out=out)
 
     def inverse_dynamics_vjp(
-        self, q: ArrayLike, v: ArrayLike, v_dot: ArrayLike, multiplier: ArrayLike
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        v_dot: ArrayLike,
+        multiplier: ArrayLike,
+        *,
+        out: Out = None,
     ) -> tuple[Array, Array, Array]:
         """Compute the gradients of lambda^T (H v_dot + C) with respect to q, v and v_dot.
 
@@ -282,7 +293,7 @@ class ModelFunctions:
         dv_dot : ndarray, shape (nv,)
             Gradient with respect to v_dot, H lambda.
         """
-        return self.kernels["inverse_dynamics_vjp"](q, v, v_dot, multiplier)
+        return self.kernels["inverse_dynamics_vjp"](q, v, v_dot, multiplier, out=out)
 
     def forward_dynamics_jvp(
         self,
@@ -292,6 +303,8 @@ class ModelFunctions:
         dq: ArrayLike,
         dv: ArrayLike,
         dtau: ArrayLike,
+        *,
+        out: Out = None,
     ) -> Array:
         """Compute the directional derivative of v_dot, Eq. 1.
 
@@ -312,10 +325,10 @@ class ModelFunctions:
         dv_dot : ndarray, shape (nv,)
             Derivative of v_dot along the direction.
         """
-        return self.kernels["forward_dynamics_jvp"](q, v, tau, dq, dv, dtau)
+        return self.kernels["forward_dynamics_jvp"](q, v, tau, dq, dv, dtau, out=out)
 
     def forward_dynamics_vjp(
-        self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, multiplier: ArrayLike
+        self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, multiplier: ArrayLike, *, out: Out = None
     ) -> tuple[Array, Array, Array]:
         """Compute lambda^T times the Jacobians of v_dot, Eq. 1.
 
@@ -336,10 +349,16 @@ class ModelFunctions:
         dtau : ndarray, shape (2m,)
             lambda^T d(v_dot)/d(tau).
         """
-        return self.kernels["forward_dynamics_vjp"](q, v, tau, multiplier)
+        return self.kernels["forward_dynamics_vjp"](q, v, tau, multiplier, out=out)
 
     def inverse_dynamics_hessian(
-        self, q: ArrayLike, v: ArrayLike, v_dot: ArrayLike, multiplier: ArrayLike
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        v_dot: ArrayLike,
+        multiplier: ArrayLike,
+        *,
+        out: Out = None,
     ) -> tuple[Array, Array, Array, Array]:
         """Compute the second derivatives of lambda^T (H v_dot + C); those with respect to v_dot
         twice, and to v_dot and v, are zero.
@@ -363,9 +382,11 @@ class ModelFunctions:
         aq : ndarray, shape (nv, nv)
             With respect to v_dot (row) and q (column): d(H lambda)/d(q).
         """
-        return self.kernels["inverse_dynamics_hessian"](q, v, v_dot, multiplier)
+        return self.kernels["inverse_dynamics_hessian"](q, v, v_dot, multiplier, out=out)
 
-    def energy_derivatives(self, q: ArrayLike, v: ArrayLike) -> tuple[Array, Array, Array]:
+    def energy_derivatives(
+        self, q: ArrayLike, v: ArrayLike, *, out: Out = None
+    ) -> tuple[Array, Array, Array]:
         """Compute the gradients of kinetic and potential energy.
 
         Parameters
@@ -381,9 +402,11 @@ class ModelFunctions:
         potential_dq : ndarray, shape (nv,)
             Gradient of the potential energy with respect to q, in its tangent space.
         """
-        return self.kernels["energy_derivatives"](q, v)
+        return self.kernels["energy_derivatives"](q, v, out=out)
 
-    def momentum_derivatives(self, q: ArrayLike, v: ArrayLike) -> tuple[Array, Array, Array, Array]:
+    def momentum_derivatives(
+        self, q: ArrayLike, v: ArrayLike, *, out: Out = None
+    ) -> tuple[Array, Array, Array, Array]:
         """Compute the Jacobians of linear and angular momentum.
 
         Parameters
@@ -401,10 +424,10 @@ class ModelFunctions:
         angular_dv : ndarray, shape (3, nv)
             Jacobian of the angular momentum with respect to v.
         """
-        return self.kernels["momentum_derivatives"](q, v)
+        return self.kernels["momentum_derivatives"](q, v, out=out)
 
     def contact_points(
-        self, q: ArrayLike, v: ArrayLike, legs: ArrayLike | None = None
+        self, q: ArrayLike, v: ArrayLike, legs: ArrayLike | None = None, *, out: Out = None
     ) -> tuple[Array, Array]:
         """Compute the points that can touch the ground, and their velocities: A, M, T of the right
         foot, then of the left; the tail's points; the lowest point of the torso.
@@ -423,9 +446,9 @@ class ModelFunctions:
         velocities : ndarray, shape (K, 3)
             Their velocities (m/s, world).
         """
-        return self.kernels.with_legs("contact_points", legs, q, v)
+        return self.kernels.with_legs("contact_points", legs, q, v, out=out)
 
-    def leg_points(self, q: ArrayLike, angles: ArrayLike) -> Array:
+    def leg_points(self, q: ArrayLike, angles: ArrayLike, *, out: Out = None) -> Array:
         """Compute the positions of the joints of both legs, from the hips to the toes, Eqs. 5 to 9.
 
         Parameters
@@ -439,7 +462,7 @@ class ModelFunctions:
         joints : ndarray, shape (2, 6, 3)
             Positions of hip, D, knee, A, M and T of the right leg, then of the left (m, world).
         """
-        return self.kernels["leg_points"](q, angles)
+        return self.kernels["leg_points"](q, angles, out=out)
 
     def contact_dynamics(
         self,
@@ -448,6 +471,8 @@ class ModelFunctions:
         tau: ArrayLike,
         bristles: ArrayLike,
         legs: ArrayLike | None = None,
+        *,
+        out: Out = None,
     ) -> tuple[Array, Array, Array]:
         """Compute the acceleration v_dot, Eq. 1, with the contact forces of the ground, Eqs. 35 to
         37.
@@ -472,9 +497,11 @@ class ModelFunctions:
         forces : ndarray, shape (K, 3)
             Forces of the ground on the points (N, world).
         """
-        return self.kernels.with_legs("contact_dynamics", legs, q, v, tau, bristles)
+        return self.kernels.with_legs("contact_dynamics", legs, q, v, tau, bristles, out=out)
 
-    def pfl(self, q: ArrayLike, v: ArrayLike, accelerations: ArrayLike) -> Array:
+    def pfl(
+        self, q: ArrayLike, v: ArrayLike, accelerations: ArrayLike, *, out: Out = None
+    ) -> Array:
         """Compute the partial feedback linearisation: torques that give the tail desired
         accelerations in flight, Eq. 46.
 
@@ -489,9 +516,11 @@ class ModelFunctions:
         tau : ndarray, shape (2m,)
             Torques conjugate to the tail coordinates (N m).
         """
-        return self.kernels["pfl"](q, v, accelerations)
+        return self.kernels["pfl"](q, v, accelerations, out=out)
 
-    def airborne_rates(self, x: ArrayLike, tau: ArrayLike, angular: ArrayLike) -> Array:
+    def airborne_rates(
+        self, x: ArrayLike, tau: ArrayLike, angular: ArrayLike, *, out: Out = None
+    ) -> Array:
         """Compute the rates of an airborne state, from which translation and omega are eliminated.
 
         Parameters
@@ -509,10 +538,10 @@ class ModelFunctions:
         y : ndarray, shape (7 + 4m,)
             Rates of x, then omega (rad/s, body), which follows from the angular momentum.
         """
-        return self.kernels["airborne_rates"](x, tau, angular)
+        return self.kernels["airborne_rates"](x, tau, angular, out=out)
 
     def airborne_rates_derivatives(
-        self, x: ArrayLike, tau: ArrayLike, angular: ArrayLike
+        self, x: ArrayLike, tau: ArrayLike, angular: ArrayLike, *, out: Out = None
     ) -> tuple[Array, Array]:
         """Compute airborne_rates and its Jacobian.
 
@@ -533,10 +562,16 @@ class ModelFunctions:
         J : ndarray, shape (7 + 4m, 4 + 6m)
             d(y)/d(x, tau).
         """
-        return self.kernels["airborne_rates_derivatives"](x, tau, angular)
+        return self.kernels["airborne_rates_derivatives"](x, tau, angular, out=out)
 
     def airborne_rates_hessian(
-        self, x: ArrayLike, tau: ArrayLike, angular: ArrayLike, weights: ArrayLike
+        self,
+        x: ArrayLike,
+        tau: ArrayLike,
+        angular: ArrayLike,
+        weights: ArrayLike,
+        *,
+        out: Out = None,
     ) -> tuple[Array, Array, Array]:
         """Compute airborne_rates, its Jacobian, and the Hessian of weights^T y.
 
@@ -561,4 +596,4 @@ class ModelFunctions:
         hessian : ndarray, shape (4 + 6m, 4 + 6m)
             Second derivatives of weights^T y with respect to (x, tau), both triangles.
         """
-        return self.kernels["airborne_rates_hessian"](x, tau, angular, weights)
+        return self.kernels["airborne_rates_hessian"](x, tau, angular, weights, out=out)

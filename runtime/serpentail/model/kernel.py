@@ -18,11 +18,11 @@ from ..basics.errors import StateError
 from ..compiling.threads import shared
 from .fast_call import Call, fast_call, no_call
 from .library import NOT_POSITIVE_DEFINITE, OUT_OF_RANGE, BatchLibrary, RecordFunction
+from .memory import Out, address_of, aligned, aligned_rows, received
 
 MOST_ARRAYS = 10
 # numbers in a function's arrays; above, calls are so long that other threads should run meanwhile
 MOST_UNDER_LOCK = 8192
-CACHE_LINE = 64  # bytes, and the widest vector
 QUATERNIONS = {"q": QUATERNION, "x": slice(0, 4)}  # where they are, by the first argument's name
 Arrays = Sequence[ndarray]
 Shapes = Sequence[tuple[int, ...]]
@@ -46,31 +46,6 @@ def argument_record(
     """Return a record of arrays, which the caller keeps alive."""
     addresses = (ctypes.c_void_p * MOST_ARRAYS)(*map(address_of, arrays))
     return ArgumentRecord(address_of(parameters), count, 0, address_of(work), addresses)
-
-
-def address_of(array: ndarray) -> int:
-    """Return the address of an array's numbers; ``array.ctypes.data`` is three times as slow."""
-    if array.flags.carray and array.size:
-        return ctypes.addressof(ctypes.c_char.from_buffer(array))  # type: ignore[arg-type]
-    return array.ctypes.data
-
-
-def aligned_rows(shape: tuple[int, ...], dtype: DTypeLike) -> ndarray:
-    """Return an uninitialised array that begins at a cache line.
-
-    Storing vectors takes half the time if none of them crosses a cache line.
-    """
-    size = math.prod(shape) * np.dtype(dtype).itemsize
-    memory = np.empty(size + CACHE_LINE, np.uint8)
-    first = -address_of(memory) % CACHE_LINE
-    return memory[first : first + size].view(dtype).reshape(shape)
-
-
-def aligned(count: int, dtype: DTypeLike) -> ndarray:
-    """Return a workspace of zeros that begins at a cache line; it is never empty."""
-    workspace = aligned_rows((count + 1,), dtype)
-    workspace.fill(0)
-    return workspace
 
 
 class Buffers:
@@ -144,8 +119,13 @@ class Kernel:
         self.thread = threading.local()  # buffers of each thread
         self.fast: Call | None = None  # made at the first call
 
-    def __call__(self, *arrays: ArrayLike) -> Any:
-        """Return the output, or a tuple of outputs; StateError names an argument that is wrong."""
+    def __call__(self, *arrays: ArrayLike, out: Out = None) -> Any:
+        """Return the output, or a tuple of outputs; StateError names an argument that is wrong.
+
+        out: what receives the outputs, and is returned: an array, or a sequence of arrays.
+        """
+        if out is not None:
+            return self._by_ctypes(arrays, out)
         outputs = (self.fast or self._prepared())(*arrays)
         return self._by_ctypes(arrays) if outputs is None else outputs
 
@@ -165,14 +145,16 @@ class Kernel:
         """Return buffers of our own."""
         return Buffers(self.dtype, self.shapes, self.out_shapes, self.work, self.parameters)
 
-    def _by_ctypes(self, arrays: Sequence[ArrayLike]) -> Any:
+    def _by_ctypes(self, arrays: Sequence[ArrayLike], out: Out = None) -> Any:
         """Return outputs for any arguments."""
         if len(arrays) != len(self.names):
             raise TypeError(f"{self.name} takes {', '.join(self.names)}")
         dtype = self.dtype
+        if out is not None:
+            return self._any(arrays, out)
         for array, shape in zip(arrays, self.shapes):  # noqa: B905  counted above: strict costs 0.2 us
             if type(array) is not ndarray or array.shape != shape or array.dtype is not dtype:
-                return self._any(arrays)
+                return self._any(arrays, None)
         return self._one(arrays)
 
     def _one(self, arrays: Sequence[Any]) -> Any:
@@ -187,21 +169,27 @@ class Kernel:
             self.fail(status, 0, [b[None] for b in buffers.inputs])
         return buffers.only.copy() if buffers.only is not None else buffers.results()
 
-    def _any(self, values: Sequence[ArrayLike]) -> Any:
+    def _any(self, values: Sequence[ArrayLike], out: Out) -> Any:
         """Return outputs for any arrays of numbers, some of which may have a batch axis."""
         arguments = zip(self.names, self.shapes, values, strict=True)
         arrays = [self._checked(name, shape, value) for name, shape, value in arguments]
         # sizes of the batches among them
         dimensions = zip(arrays, self.shapes, strict=True)
         counts = {array.shape[0] for array, shape in dimensions if array.ndim > len(shape)}
-        if not counts:
+        if not counts and out is None:
             return self._one(arrays)
         if len(counts) > 1:
             raise StateError(
                 f"{self.name}: batch sizes differ ({', '.join(map(str, sorted(counts)))}): give "
                 "one size"
             )
-        return self._batch(counts.pop(), arrays)
+        shapes = [(*counts, *shape) for shape in self.out_shapes]
+        if out is None:
+            outputs = [aligned_rows(shape, self.dtype) for shape in shapes]
+        else:
+            outputs = received(f"{self.name}: out", out, shapes, self.dtype, arrays)
+        self._batch(counts.pop() if counts else 1, arrays, outputs)
+        return outputs[0] if len(outputs) == 1 else tuple(outputs)
 
     def _checked(self, name: str, shape: tuple[int, ...], value: ArrayLike) -> ndarray:
         """Return an argument as an array of the shape, or with a batch axis before it."""
@@ -213,17 +201,16 @@ class Kernel:
             )
         return array
 
-    def _batch(self, count: int, arrays: Arrays) -> Any:
-        """Return outputs for a batch; single states are repeated."""
+    def _batch(self, count: int, arrays: Arrays, outputs: Arrays) -> None:
+        """Evaluate a batch; single states are repeated."""
         whole = [
             np.ascontiguousarray(np.broadcast_to(a, (count, *shape)))
             for a, shape in zip(arrays, self.shapes, strict=True)
         ]
-        outputs = [aligned_rows((count, *shape), self.dtype) for shape in self.out_shapes]
+        rows = [a.reshape(count, *shape) for a, shape in zip(outputs, self.out_shapes, strict=True)]
         function = self.batch_library.entry(self.name, count)
         run = self._each if function is None else partial(self._side_by_side, function)
-        shared(count, self.batch_library.threads, partial(run, whole, outputs))
-        return outputs[0] if len(outputs) == 1 else tuple(outputs)
+        shared(count, self.batch_library.threads, partial(run, whole, rows))
 
     def _each(self, inputs: Arrays, outputs: Arrays, first: int, last: int) -> None:
         """Evaluate states [first, last) one by one."""

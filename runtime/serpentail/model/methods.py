@@ -13,6 +13,7 @@ from .compiled_functions import absent, generated_functions
 from .functions import Array, ModelFunctions
 from .kernel import Kernel
 from .lazy import lazy_property
+from .memory import Out, filled
 from .state_space import jacobians, q_dot, split
 
 if TYPE_CHECKING:
@@ -34,7 +35,13 @@ class ModelMethods(ModelFunctions):
     rnea = ModelFunctions.inverse_dynamics
 
     def forward_dynamics(
-        self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, f_ext: ArrayLike | None = None
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        tau: ArrayLike,
+        f_ext: ArrayLike | None = None,
+        *,
+        out: Out = None,
     ) -> Array:
         """Compute the acceleration v_dot of Eq. 1.
 
@@ -53,8 +60,8 @@ class ModelMethods(ModelFunctions):
             Acceleration: time derivative of v (m/s^2, rad/s^2).
         """
         if f_ext is None:
-            return self.kernels["forward_dynamics"](q, v, tau)
-        return self.kernels["forward_dynamics_external"](q, v, tau, f_ext)
+            return self.kernels["forward_dynamics"](q, v, tau, out=out)
+        return self.kernels["forward_dynamics_external"](q, v, tau, f_ext, out=out)
 
     aba = forward_dynamics
 
@@ -94,7 +101,7 @@ class ModelMethods(ModelFunctions):
             parts.append(array.ravel())
         return np.concatenate(parts)
 
-    def x_dot(self, x: ArrayLike, u: ArrayLike) -> Array:
+    def x_dot(self, x: ArrayLike, u: ArrayLike, *, out: Out = None) -> Array:
         """Compute the time derivative of the state x = (q, v).
 
         Parameters
@@ -118,9 +125,11 @@ class ModelMethods(ModelFunctions):
         v_dot = self.forward_dynamics(q, v, u)
         rates = v if self.layout.fixed else q_dot(q, v)
         kinematics = np.broadcast_to(rates, (*v_dot.shape[:-1], q.shape[-1]))
-        return np.concatenate([kinematics, v_dot], axis=-1)
+        return filled("x_dot: out", out, np.concatenate([kinematics, v_dot], axis=-1))
 
-    def x_dot_derivatives(self, x: ArrayLike, u: ArrayLike) -> tuple[Array, Array]:
+    def x_dot_derivatives(
+        self, x: ArrayLike, u: ArrayLike, *, out: Out = None
+    ) -> tuple[Array, Array]:
         """Compute the exact Jacobians of ``x_dot``.
 
         Parameters
@@ -136,7 +145,8 @@ class ModelMethods(ModelFunctions):
             Derivative with respect to ``u``.
         """
         q, v = split(self.layout, finite_array("x", x))
-        return jacobians(self.layout, q, v, self.forward_dynamics_derivatives(q, v, u))
+        found = jacobians(self.layout, q, v, self.forward_dynamics_derivatives(q, v, u))
+        return filled("x_dot_derivatives: out", out, found)
 
     def step(
         self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, h: float, **settings: Any

@@ -116,6 +116,12 @@ class Model(ModelMethods):
     of the batch. Every method raises ``StateError`` if a shape is wrong or a value is not
     finite, and ``ModelError`` if the scene left the function out.
 
+    Every numeric method takes ``out``: an array for its result, or a sequence of arrays for its
+    results, which it fills and returns. They must be writeable C arrays of the result's type and
+    shape, apart from the arguments and from each other; after an error their numbers are undefined.
+    Without ``out``, the memory of large results that are gone serves later ones: at most 8 arrays
+    of 16 MB each are kept for all models.
+
     ``crba``, ``nle``, ``rnea`` and ``aba`` are other names of ``mass_matrix``, ``bias_force``,
     ``inverse_dynamics`` and ``forward_dynamics``.
 

@@ -12,7 +12,7 @@ from serpentail_scene.layout import TAIL_V
 
 from ..basics.checks import refusal
 from ..basics.errors import SimulationError
-from ..model.kernel import aligned
+from ..model.memory import aligned
 from ..model.model import Model
 from ..planning.result.plan import Plan
 from ..simulation.controllers.parts import ControllerState, NativeTorque, Parts

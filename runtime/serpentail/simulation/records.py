@@ -7,7 +7,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..model.kernel import address_of
+from ..model.memory import address_of
 from ..model.model import Model
 from ..model.structures import REALS, structure
 

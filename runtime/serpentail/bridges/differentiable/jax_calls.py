@@ -13,8 +13,8 @@ import numpy as np
 from ...basics.errors import CompileFailed
 from ...compiling.compiler import compile_library, opened
 from ...compiling.threads import MIN_STATES_PER_THREAD, threads
-from ...model.kernel import address_of
 from ...model.library import MIN_BATCH
+from ...model.memory import address_of
 from ...model.model import Model
 
 SOURCE = Path(__file__).with_name("native") / "jax_calls.cc"

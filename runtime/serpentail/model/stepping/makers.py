@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..kernel import address_of, aligned
 from ..library import BatchLibrary
+from ..memory import address_of, aligned
 from ..structures import REALS, structure
 
 MOST = 2**31 - 1  # that the C interface counts

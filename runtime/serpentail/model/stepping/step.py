@@ -16,13 +16,13 @@ from ...basics.checks import (
     number,
     one_of,
     real_array,
-    refusal,
     refuse_not_finite,
     whole_number,
 )
 from ...basics.errors import SimulationError, StateError
 from ...compiling.threads import MIN_STATES_PER_THREAD, checked_threads, shared
 from ..library import WHY
+from ..memory import writeable
 from ..parameters import RunParameters
 from .makers import ENTRIES, LaneSteps, SingleSteps, StepCall
 
@@ -225,28 +225,18 @@ def _outputs(
     for name, array in zip(names, out, strict=True):
         size = arrays[name].shape[-1]
         shape = (size,) if runs is None else (runs, size)
-        if not (isinstance(array, np.ndarray) and _serves(array, dtype, shape)):
-            needs = f"a writeable C array of {dtype} of shape {shape}"
-            raise refusal(f"step: out: {name}", array, needs, StateError)
+        writeable(f"step: out: {name}", array, shape, dtype)
         if array is not arrays[name]:
             np.copyto(array, arrays[name])
         moved[name] = array.reshape(-1, size)
     return moved
 
 
-def _serves(array: np.ndarray, dtype: np.dtype, shape: tuple[int, ...]) -> bool:
-    """Tell whether the C can write to an array of this type and shape."""
-    return array.dtype == dtype and array.shape == shape and array.flags.carray
-
-
 def _statuses(given: object, runs: int) -> np.ndarray:
     """Return the array for the statuses of the runs: a new one, or the caller's."""
     if given is None:
         return np.zeros(runs, np.intc)
-    if isinstance(given, np.ndarray) and _serves(given, np.dtype(np.intc), (runs,)):
-        return given
-    needs = f"a writeable C array of {np.dtype(np.intc)} of shape ({runs},)"
-    raise refusal("step: statuses", given, needs, StateError)
+    return writeable("step: statuses", given, (runs,), np.intc)
 
 
 def _fail(call: StepCall, many: bool) -> None:

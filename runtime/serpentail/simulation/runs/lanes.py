@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ...compiling.threads import threads as allowed
-from ...model.kernel import address_of, aligned
 from ...model.library import PAUSED
+from ...model.memory import address_of, aligned
 from ...model.model import Model
 from ...model.structures import structure
 from .single import PAUSE, CompiledRun, RunSet, called

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ...model.kernel import address_of, aligned
 from ...model.library import PAUSED, STOPPED_AT_EVENT
+from ...model.memory import address_of, aligned
 from ...model.parameters import RunParameters
 from ..controllers.actuation import RunActuations
 from ..ground import MOST_EVENTS, GroundSettings
