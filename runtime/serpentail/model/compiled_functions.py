@@ -29,7 +29,7 @@ class CompiledFunctions(dict[str, Kernel]):
         )
 
     def with_legs(
-        self, name: str, legs: ArrayLike | None, *arrays: ArrayLike, out: Out = None
+        self, name: str, legs: ArrayLike | None, arrays: tuple[ArrayLike, ...], out: Out
     ) -> Any:
         """Call a function that takes legs last if the model has feet."""
         kernel, model = self[name], self.manifest["prefix"]
@@ -37,9 +37,9 @@ class CompiledFunctions(dict[str, Kernel]):
         if feet and legs is None:
             raise StateError(f"{model} has feet: give legs, 4 angles (rad) and 4 rates (rad/s)")
         if legs is None:
-            return kernel(*arrays, out=out)
+            return kernel.at(arrays, out)
         if feet:
-            return kernel(*arrays, legs, out=out)
+            return kernel.at((*arrays, legs), out)
         raise StateError(
             f'{model} has no feet, but legs were given: leave them out, or add "feet" to `contacts`'
         )

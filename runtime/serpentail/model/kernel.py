@@ -120,14 +120,16 @@ class Kernel:
         self.fast: Call | None = None  # made at the first call
 
     def __call__(self, *arrays: ArrayLike, out: Out = None) -> Any:
+        """Return ``at(arrays, out)``."""
+        return self.at(arrays, out)
+
+    def at(self, arrays: Sequence[ArrayLike], out: Out = None) -> Any:
         """Return the output, or a tuple of outputs; StateError names an argument that is wrong.
 
-        out: what receives the outputs, and is returned: an array, or a sequence of arrays.
+        out: an array, or a sequence of arrays, which receive the outputs and are returned.
         """
-        if out is not None:
-            return self._by_ctypes(arrays, out)
-        outputs = (self.fast or self._prepared())(*arrays)
-        return self._by_ctypes(arrays) if outputs is None else outputs
+        outputs = (self.fast or self._prepared())(*arrays) if out is None else None
+        return self._by_ctypes(arrays, out) if outputs is None else outputs
 
     def _prepared(self) -> Call:
         """Return a fast call of the function; it returns None for arguments that it declines."""
@@ -145,7 +147,7 @@ class Kernel:
         """Return buffers of our own."""
         return Buffers(self.dtype, self.shapes, self.out_shapes, self.work, self.parameters)
 
-    def _by_ctypes(self, arrays: Sequence[ArrayLike], out: Out = None) -> Any:
+    def _by_ctypes(self, arrays: Sequence[ArrayLike], out: Out) -> Any:
         """Return outputs for any arguments."""
         if len(arrays) != len(self.names):
             raise TypeError(f"{self.name} takes {', '.join(self.names)}")
