@@ -138,6 +138,8 @@ def numbers(
     most: float = np.inf,
 ) -> NDArray[np.float64]:
     """Return finite numbers (size,) within bounds; a single one is repeated."""
+    if type(value) is float and least <= value <= most and abs(value) < np.inf:
+        return np.full(size, value)
     numbers, rule = numbers_in(value), NumberRule("", least=least, most=most)
     shapes = ((), (size,))
     if numbers is None or numbers.shape not in shapes or not satisfying(numbers, rule).all():

@@ -122,7 +122,8 @@ def checked_states(name: str, value: ArrayLike, size: int) -> np.ndarray:
             f"{name} has shape {array.shape}, not ({size},) of one start state, or (k, {size}) of "
             "k runs"
         )
-    if not math.isfinite(np.vdot(array, array)) and not np.isfinite(array).all():
+    quickly = array.ndim == 1 and math.isfinite(np.vdot(array, array))  # large ones take threads
+    if not quickly and not np.isfinite(array).all():
         rows = np.atleast_2d(array)
         run = int(np.isfinite(rows).all(axis=1).argmin())
         refuse_not_finite(name, rows[run], StateError, f" of run {run}" if array.ndim == 2 else "")

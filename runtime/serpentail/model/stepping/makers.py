@@ -9,7 +9,7 @@ import numpy as np
 
 from ..library import BatchLibrary
 from ..memory import address_of, aligned
-from ..structures import REALS, structure
+from ..structures import REALS, rows_of, structure
 
 MOST = 2**31 - 1  # that the C interface counts
 SCRATCH = {"q_out": "q", "v_out": "v", "tau_out": "tau", "bristles_out": "bristles"}
@@ -110,7 +110,7 @@ class SingleSteps:
     def _records(self, name: str, **members: Any) -> np.ndarray:
         """Return a record for each run, zero except for these members, shared or one for each."""
         count = max(np.size(value) for value in members.values())
-        records = np.zeros(count, np.dtype(self.types[name]))
+        records = np.zeros(count, rows_of(self.types[name]))
         for member, value in members.items():
             records[member] = value
         return records

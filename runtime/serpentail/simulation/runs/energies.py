@@ -43,8 +43,10 @@ class EnergiesOfRuns:
         def measure(runs: np.ndarray) -> None:
             if not len(runs):
                 return
-            arrays = [self.runs.out[name][runs] for name in ("q", "v", "bristles")]
-            numbers = (self.runs.parameters.vectors[runs], *arrays)
+            whole = runs[-1] - runs[0] + 1 == len(runs)  # then nothing is copied
+            of = slice(runs[0], runs[-1] + 1) if whole else runs
+            arrays = [self.runs.out[name][of] for name in ("q", "v", "bristles")]
+            numbers = (self.runs.parameters.vectors[of], *arrays)
             late = certain_runs(self.model, self.method.name, numbers)
             self.late[runs[late]] = True
             for k in runs[~late].tolist():

@@ -12,6 +12,7 @@ import numpy as np
 from ...model.library import PAUSED, STOPPED_AT_EVENT
 from ...model.memory import address_of, aligned
 from ...model.parameters import RunParameters
+from ...model.structures import rows_of
 from ..controllers.actuation import RunActuations
 from ..ground import MOST_EVENTS, GroundSettings
 from ..methods import IntegrationMethod
@@ -122,7 +123,7 @@ class CompiledRun:
     def records_of(self, runs: Sequence[int]) -> np.ndarray:
         """Return records of runs at their starts, which share the workspace."""
         numbers = np.array(runs)
-        records = np.repeat(np.frombuffer(self.blank, np.dtype(type(self.record))), len(numbers))
+        records = np.repeat(np.frombuffer(self.blank, rows_of(type(self.record))), len(numbers))
         for member, first, apart in self.runs.places:
             records[member] = first + numbers * apart
         records["drive"] = self.runs.actuations.drives[numbers]
