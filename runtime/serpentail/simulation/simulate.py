@@ -76,7 +76,8 @@ def simulate(
     Other Parameters
     ----------------
     output_step : float, optional
-        Time between samples (s); it is rounded to divide the span. Default: span / 200.
+        Time between samples (s); it is rounded to divide the span. Default: span / 200,
+        of k starts span / 20.
     rtol, atol : float, optional
         Tolerances of adaptive methods. At the same ``rtol`` all methods have errors of about the
         same size. Defaults: 1e-8 in flight, 1e-4 with contacts and for "ros34pw2" by name (float

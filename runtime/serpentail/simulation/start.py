@@ -14,6 +14,8 @@ from ..basics.errors import SimulationError, StateError
 from ..model.lazy import lazy_property
 from ..model.model import Model
 
+# by default, of one start and of each of many: a hundred samples take as long as a flight in lanes
+INTERVALS, INTERVALS_OF_MANY = 200, 20
 MOST_SAMPLES = 10_000_000  # of all runs: more are a mistake, and would fill the memory
 SHORTEST = 1e-100  # s: between samples; methods multiply times
 EPS = float(np.finfo(float).eps)
@@ -48,7 +50,8 @@ class Start:
         q0, v0, many = checked_starts(model, state)
         # the grid of output times, the end among them
         start, end = checked_span(t_span)
-        output_step = (end - start) / 200 if output_step is None else output_step
+        if output_step is None:
+            output_step = (end - start) / (INTERVALS_OF_MANY if many else INTERVALS)
         step = number("output_step", output_step, SimulationError, above=0)
         if len(q0) * (end - start) > MOST_SAMPLES * step:
             remedy = f"give {len(q0) * (end - start) / MOST_SAMPLES:.2g} s or more"

@@ -21,6 +21,7 @@ from ...scenes.simulate import scenario_of
 from ...simulation.controllers.controller import Damping, TorqueCurve, TorqueTable
 from ...simulation.rollouts import Rollouts
 from ...simulation.simulate import simulate
+from ...simulation.start import INTERVALS
 from .job import DATA, STARTS, Job
 from .points import Point
 from .shards import Row
@@ -143,8 +144,9 @@ def _side_by_side(job: Job, model: Model, points: Sequence[Point]) -> list[Outco
     )
     if not isinstance(settings["controller"], SHARED):
         return None
-    if set(job.outputs) <= set(ENDS) and "output_step" not in settings:  # they need no other sample
-        settings["output_step"] = float(np.ptp([0.0, *np.atleast_1d(settings["t_span"])][-2:]))
+    span = float(np.ptp([0.0, *np.atleast_1d(settings["t_span"])][-2:]))
+    ends_alone = set(job.outputs) <= set(ENDS)  # which need no other sample
+    settings.setdefault("output_step", span / (1 if ends_alone else INTERVALS))
     flight = replace(
         flight,
         q0=np.broadcast_to(q0, (len(points), model.nq)),
