@@ -18,6 +18,7 @@ from .controllers.controller import Controller
 from .ground import GroundSettings
 from .methods import (
     ADAPTIVE,
+    LONG,
     SCIPY,
     IntegrationMethod,
     checked_method,
@@ -64,13 +65,13 @@ def choose(
     model, single = actuations.model, actuations.records.real is ctypes.c_float
     available, reason = model.manifest["simulation"]["methods"], "asked for"
     if isinstance(name, str) and name == "auto":
-        decay = 0.0
+        decay, drifts = 0.0, "dp8" in available and long_and_free(actuations, start, parameters)
         if "step" not in settings:
-            usual = default_rtol("switching" if "switching" in available else "tsit5", single)
-            rtol = number("rtol", settings.get("rtol", usual), SimulationError, above=0)
-            settings["rtol"] = rtol
+            usual = "switching" if "switching" in available else "dp8" if drifts else "tsit5"
+            rtol = settings.get("rtol", default_rtol(usual, single))
+            settings["rtol"] = number("rtol", rtol, SimulationError, above=0)
             decay = fastest_decay(actuations, start, parameters)
-        name, reason = chosen(settings, available, decay, place_of(model))
+        name, reason = chosen(settings, available, decay, place_of(model), drifts)
     refuse_misplaced(model, settings)
     span = start.end - start.start
     method = checked_method(name, settings, available, single)
@@ -88,6 +89,13 @@ def choose(
         )
         return replace(method, reason=reason, settings={"step": start.interval / steps})
     return replace(method, reason=reason)
+
+
+def long_and_free(actuations: RunActuations, start: Start, parameters: RunParameters) -> bool:
+    """Tell whether it is a single long run in which neither damping nor torques act."""
+    long = not start.many and start.end - start.start >= LONG
+    damped = np.any(parameters.values.get("tail_damping", 0.0))
+    return long and not damped and not any(each.acts for each in actuations.distinct)
 
 
 def place_of(model: Model) -> str:

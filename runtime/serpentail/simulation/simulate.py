@@ -64,9 +64,9 @@ def simulate(
         Start and end (s), or the end alone.
     method : str, default "auto"
         "tsit5" or "ros34pw2": adaptive, in C; "switching": the first in flight, the second while
-        a point touches the ground; "rk4" or "implicit_euler": steps of a fixed length, in C;
-        "dop853" or "lsoda": SciPy's, as a check; "auto" chooses, and ``info`` of the result gives
-        its choice and reason.
+        a point touches the ground; "dp8": adaptive, of order 8, in C, without contacts; "rk4" or
+        "implicit_euler": steps of a fixed length, in C; "dop853" or "lsoda": SciPy's, as a check;
+        "auto" chooses, and ``info`` of the result gives its choice and reason.
 
     Returns
     -------
@@ -80,11 +80,11 @@ def simulate(
         of k starts span / 20.
     rtol, atol : float, optional
         Tolerances of adaptive methods. At the same ``rtol`` all methods have errors of about the
-        same size. Defaults: 1e-8 in flight, 1e-4 with contacts and for "ros34pw2" by name (float
-        models: 1e-4 and 1e-3), ``atol`` equal to ``rtol``; for SciPy's methods 1e-10 and 1e-12
-        (float models: 1e-6 and 1e-6).
+        same size. Defaults: 1e-8 in flight, 3e-11 for "dp8", 1e-4 with contacts and for
+        "ros34pw2" by name (float models: 1e-4, 2e-5 and 1e-3), ``atol`` equal to ``rtol``; for
+        SciPy's methods 1e-10 and 1e-12 (float models: 1e-6 and 1e-6).
     first_step, least_step, most_step : float, optional
-        Bounds of the steps of "tsit5", "ros34pw2" and "switching" (s).
+        Bounds of the steps of adaptive methods in C (s).
     most_steps : int, optional
         Largest number of steps of these. Default: 300000 for each second, at least 300000 and at
         most 1000000.

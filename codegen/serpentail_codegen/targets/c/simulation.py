@@ -8,7 +8,7 @@ from ...functions.tail import Tail
 from ...scene.scene import Scene
 from .records import DESCRIPTIONS, record_views
 from .simulation_features import METHODS, SimulationFeatures
-from .tableaux import RK4, ROS34PW2, TSIT5, transformed
+from .tableaux import DP8, RK4, ROS34PW2, TSIT5, transformed
 
 LOOKS = 24  # parts of parts of a step in which contacts are looked for: up to 2^-23 of it
 # heights (m): how exactly the sides of the ground are told apart; depths from which a point counts
@@ -21,10 +21,8 @@ TURNED_AT = {  # where along a tail its turn grows, and by what
 }
 # ros34pw2's error in flight at one tolerance, over that of tsit5: measured, docs/simulation.md
 AIR = 5.0
-# s: how long ros34pw2 takes an error of a rate to last in contact; measured: with it, short steps
-# after a touch and long ones add equally to the error at the end
-LASTING = 1e-3
-SLOTS = 11  # states in the workspace: see simulation/workspace.c.jinja
+# states in the workspace, see simulation/workspace.c.jinja: with contacts; without, dp8 has stages
+SLOTS = {True: 11, False: 2 + len(DP8.nodes) + 2}
 # of simulation/workspace.c.jinja, undefined again where the file ends
 MACROS = (
     *("NQ", "NV", "NT", "SIZE", "SLOT", "START", "END", "STAGES", "END_RATE", "TRIAL", "RIGHT"),
@@ -48,7 +46,8 @@ def simulation_context(
     single = scene.real == "float"
     ledger, table = sum(size for _, size in has.ledger), max(4 * tail.nt, 2 * tail.nv)
     size = tail.nq + tail.nv + 2 * has.contacts + ledger
-    states = SLOTS * size + tail.nt + table + (12 + 2 * LOOKS) * has.contacts + 4
+    slots = SLOTS[has.contacts > 0]
+    states = slots * size + tail.nt + table + (12 + 2 * LOOKS) * has.contacts + 4
     resolution, level, felt = RESOLUTION[scene.real]
     return {
         **{name: name + ("f" if single else "") for name in ("pow", "fabs", "ceil")},
@@ -80,13 +79,14 @@ def simulation_context(
         "lengths": "real ",
         "turns": 1 if tail.kind == "continuum" else tail.links,  # of a tip, for a coordinate
         "macros": MACROS,
-        "slots": SLOTS,
+        "slots": slots,
         "table": table,
         "rollout_work": states + has.factors + max(works.values()),
         "descriptions": DESCRIPTIONS,
         "records": record_views(scene.name, has),
         "tsit5": TSIT5,
         "rk4": RK4,
+        "dp8": DP8,
         "ros34pw2": transformed(ROS34PW2),
     }
 

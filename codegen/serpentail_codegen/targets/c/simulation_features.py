@@ -12,6 +12,7 @@ METHODS = {
     "ros34pw2": ("implicit",),
     "implicit_euler": ("implicit",),
     "switching": ("implicit", "contacts"),
+    "dp8": ("free_of_contacts",),
 }
 
 
@@ -48,6 +49,11 @@ class SimulationFeatures:
     def implicit(self) -> bool:
         """Tell if it can take implicit steps."""
         return self.factors > 0
+
+    @property
+    def free_of_contacts(self) -> bool:
+        """Tell if it is a model of flights, or of a tail on a fixed base."""
+        return not self.contacts
 
     @property
     def tracked(self) -> bool:

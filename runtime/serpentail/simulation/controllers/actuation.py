@@ -60,6 +60,15 @@ class Actuation:
         return self.records.model
 
     @property
+    def acts(self) -> bool:
+        """Whether any torque acts."""
+        return any(
+            each is not None
+            for parts in self.parts
+            for each in (parts.damping, parts.torques, parts.pfl, parts.native, parts.user)
+        )
+
+    @property
     def of_python(self) -> bool:
         """Whether a function of Python acts."""
         return any(parts.user is not None for parts in self.parts)
