@@ -137,7 +137,7 @@ def test_many_runs_are_measured_when_somebody_asks(name):
         np.testing.assert_array_equal(twin.kinetic, runs.kinetic)
 
 
-METHODS = ["tsit5", "ros34pw2", "rk4", "implicit_euler", "dop853", "lsoda"]
+METHODS = ["tsit5", "dp8", "ros34pw2", "rk4", "implicit_euler", "dop853", "lsoda"]
 
 
 @pytest.fixture(autouse=True)

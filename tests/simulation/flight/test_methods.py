@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail_codegen.targets.c.tableaux import RK4, ROS34PW2, TSIT5
+from serpentail_codegen.targets.c.tableaux import DP8, RK4, ROS34PW2, TSIT5
 from tests.support import zoo
 from tests.support.rows import row
 
@@ -53,11 +53,18 @@ def residuals(method, weights, order):
 
 
 def test_explicit_methods_have_their_order():
-    for method, order in ((RK4, 4), (TSIT5, 5)):
+    for method, order in ((RK4, 4), (TSIT5, 5), (DP8, 8)):
         assert max(residuals(method, method.weights, order)) < ROUNDING
-        assert max(residuals(method, method.weights, order + 1)) > 1e-5
+        assert max(residuals(method, method.weights, order + 1)) > 1e-7
         rows = square(method.rows).sum(axis=1)
         np.testing.assert_allclose(rows, method.nodes, rtol=0, atol=1e-14)
+
+
+def test_dp8_embeds_orders_five_and_three():
+    for estimate, order in ((DP8.error, 5), (DP8.coarse, 3)):
+        embedded = np.subtract(DP8.weights, estimate)
+        assert max(residuals(DP8, embedded, order)) < ROUNDING
+        assert max(residuals(DP8, embedded, order + 1)) > 1e-5
 
 
 def test_tsit5_embeds_order_four_and_interpolates_with_it():
@@ -92,6 +99,7 @@ ORDERS = {
     "tsit5": (4, (50, 100, 200)),
     "ros34pw2": (3, (100, 200, 400)),
     "implicit_euler": (1, (400, 800, 1600)),
+    "dp8": (8, (6, 12, 24)),
 }
 
 
@@ -137,8 +145,9 @@ def test_methods_agree_and_errors_follow_the_tolerance():
         ({"method": "lsoda"}, 0, 1e-6),
         ({"method": "dop853"}, 0, 1e-7),
         ({"rtol": 1e-10}, 0, 1e-8),
+        ({"method": "dp8"}, 0, 1e-9),
     ]
-    for method in ("tsit5", "ros34pw2"):
+    for method in ("tsit5", "ros34pw2", "dp8"):
         rows += [({"method": method, "rtol": r}, 0.01 * r, 100 * r) for r in (1e-4, 1e-6, 1e-8)]
     for settings, least, most in rows:
         with row(settings):
@@ -155,7 +164,7 @@ def test_one_tolerance_is_one_accuracy():
         q[7:], v[3] = rng.uniform(-0.3, 0.3, model.nq - 7), 15
         how = {"t_span": 0.3, "output_step": 0.3}
         end = st.simulate(model, q, v, method="tsit5", rtol=1e-12, **how).q[-1]
-        for method in ("tsit5", "ros34pw2", "dop853", "lsoda"):
+        for method in ("tsit5", "ros34pw2", "dp8", "dop853", "lsoda"):
             for rtol in 10.0 ** -np.arange(2, 10):
                 run = st.simulate(model, q, v, method=method, rtol=rtol, atol=rtol, **how)
                 error = np.abs(run.q[-1] - end).max() / rtol

@@ -22,6 +22,7 @@ def own_info(info):
 TABLE = st.TorqueTable([0.0, 0.02], [[1e-5] * NT, [-1e-5] * NT], 1e-6)
 SETTINGS = [
     {"method": "tsit5"},
+    {"method": "dp8"},
     {"method": "ros34pw2"},
     {"method": "rk4", "step": 1e-3},
     {"method": "implicit_euler", "step": 1e-3},

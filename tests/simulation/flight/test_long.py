@@ -1,0 +1,84 @@
+"""Long flights without damping keep energy and momentum to 1e-10, and "auto" sees to it."""
+
+import numpy as np
+import pytest
+
+import serpentail as st
+from tests.support import zoo
+from tests.support.rows import row
+
+from ..runs import DAMPING, Q0, V0, fly, rat, tail
+
+LONG = {"t_span": 60.0, "output_step": 0.3}
+
+
+def tumbling(model, spin):
+    """A bent tail at rest on a torso that tumbles about all axes."""
+    q, v = np.eye(1, model.nq, 3)[0], np.zeros(model.nv)
+    q[7:], v[3:6] = 0.1, np.array([1.0, 0.05, -0.1]) * spin
+    return q, v
+
+
+def drift(flight):
+    """Largest changes of kinetic energy and angular momentum, relative."""
+    energy, momentum = flight.kinetic, flight.angular_momentum
+    lost = np.linalg.norm(momentum - momentum[0], axis=1).max() / np.linalg.norm(momentum[0])
+    return max(lost, np.abs(energy - energy[0]).max() / energy[0])
+
+
+def test_a_minute_of_tumbling_conserves():
+    for name, spin in (("m1_n3", 20), ("m2_n2", 10), ("m3_n4", 5), ("m3_n4", 20), ("arcs3", 10)):
+        model = zoo.model(name).with_parameters(gravity=0.0)
+        with row(name, spin):
+            flight = st.simulate(model, *tumbling(model, spin), **LONG)
+            assert flight.info["method"] == "dp8" and not flight.warnings
+            assert drift(flight) < 1e-10
+            assert drift(st.simulate(model, *tumbling(model, spin), method="tsit5", **LONG)) > 1e-9
+
+
+def test_a_flight_flies_back():
+    """Free motion is its own reverse: from its end, at the opposite velocity, to its start."""
+    there = fly(method="dp8", t_span=1.0)
+    back = st.simulate(tail(), there.q[-1], -there.v[-1], method="dp8", t_span=1.0)
+    np.testing.assert_allclose(np.abs(back.q[-1]), np.abs(there.q[0]), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(back.v[-1], -V0, rtol=0, atol=1e-7)
+
+
+def test_samples_between_steps_are_as_accurate_as_their_ends():
+    how = {"t_span": 0.5, "output_step": 2e-3}
+    exact = fly(method="dop853", rtol=1e-13, atol=1e-15, **how)
+    found = fly(method="dp8", **how)
+    assert found.info["steps"] < 0.7 * len(found.t)
+    errors = np.abs(found.q - exact.q).max(axis=1)
+    assert errors.max() < 1e-9 and errors[:-20].max() < 3 * errors[-20:].max()
+    seldom = fly(method="dp8", t_span=0.5, output_step=0.1)
+    np.testing.assert_array_equal(found.q[::50], seldom.q)
+
+
+def test_auto_takes_it_for_long_runs_that_nothing_acts_on():
+    damped = zoo.model("elastic_arcs")
+    assert np.any(damped.parameters["tail_damping"])
+    rows = [
+        ("dp8", tail(), {}),
+        ("dp8", tail(), {"controller": st.Phases([(0.0, None), (5.0, None)])}),
+        ("dp8", tail(), {"rtol": 1e-6}),
+        ("tsit5", tail(), {"t_span": 9.9}),
+        ("tsit5", tail(), {"controller": DAMPING}),
+        ("tsit5", tail(), {"controller": lambda t, q, v: np.zeros(4)}),
+        ("rk4", tail(), {"step": 1e-3}),
+        ("tsit5", damped, {}),
+    ]
+    for method, model, settings in rows:
+        how = {"t_span": 10.0, "rtol": 1e-3} | settings
+        if "step" in how:
+            del how["rtol"]
+        with row(settings):
+            run = st.simulate(model, *tumbling(model, 1.0), **how)
+            assert run.info["method"] == method
+    many = st.simulate(tail(), Q0, [V0, V0], t_span=10.0, rtol=1e-3)
+    assert many.info["method"] == "tsit5"
+
+
+def test_models_with_contacts_do_not_have_it():
+    with pytest.raises(st.SimulationError, match=r"method.*dp8"):
+        st.simulate(rat(), np.eye(1, rat().nq, 3)[0], np.zeros(rat().nv), method="dp8")
