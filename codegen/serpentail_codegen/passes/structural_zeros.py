@@ -37,6 +37,7 @@ class Bits:
     @staticmethod
     def placed(a: int, lane: int, lanes: int, value: int) -> int:
         """Return the lanes of a value of which one is replaced."""
+        a = a or NONE  # lanes that nothing has stored are zero
         return a | 1 << lane if value else a & ~(1 << lane)
 
 

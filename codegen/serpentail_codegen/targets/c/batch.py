@@ -15,7 +15,7 @@ from ...passes.narrow_directions import directions_in_turn, has_directions
 from ...passes.unrolled_ldl import unrolled_ldl
 from ...scene.scene import Scene
 from ..templating import render
-from .form import UNROLLED_ROWS, PrintedFunction, baked_values
+from .form import UNROLLED_ROWS, PrintedFunction, baked_values, in_form
 from .loops import in_loops
 from .routine import CFunction
 from .views import ArgumentView, callee_view, quaternion_in, step_views
@@ -68,8 +68,12 @@ def batches(scene: Scene, tail: Tail, printed: Sequence[PrintedFunction]) -> lis
 
 
 def _batch(scene: Scene, tail: Tail, function: Function) -> Batch:
-    fixed, single, states = baked_values(scene), assemble(function, tail), STATES[scene.real]
-    if has_directions(single):
+    fixed, single, states = (
+        baked_values(scene),
+        of_one_state(scene, tail, function),
+        STATES[scene.real],
+    )
+    if has_directions(assemble(function, tail)):
         single = _of_directions(scene, single, fixed)
     elif straight(scene, single):
         single = unrolled_step(single, fixed)
@@ -77,12 +81,31 @@ def _batch(scene: Scene, tail: Tail, function: Function) -> Batch:
     return Batch(function, states, lanes, in_loops(lanes, scene.real, scene.name, fixed))
 
 
-def _of_directions(scene: Scene, single: Program, fixed: dict[str, list]) -> Program:
+def of_one_state(scene: Scene, tail: Tail, function: Function) -> Program:
+    """Return what lanes of states run: a program whose own lanes are in loops.
+
+    It goes by segments if the scene asks for that, or if that takes fewer operations: with states
+    as lanes, no lane of a sweep over segments is free of charge.
+    """
+    composite = _in_turn(assemble(function, tail))
+    form, swept = in_form("segments", function, tail)
+    if form != "segments" or scene.emission not in ("auto", form):
+        return composite
+    segments = _in_turn(swept)
+    return segments if scene.emission == form else min(composite, segments, key=executed)
+
+
+def _in_turn(program: Program) -> Program:
+    if not has_directions(program):
+        return program
+    return directions_in_turn(unrolled_ldl(program, UNROLLED_ROWS))
+
+
+def _of_directions(scene: Scene, turns: Program, fixed: dict[str, list]) -> Program:
     """Return a program whose directions are in loops, or one straight line if that is short.
 
     It is never a long straight line: a compiler would work on it for minutes.
     """
-    turns = directions_in_turn(unrolled_ldl(single, UNROLLED_ROWS))
     if scene.emission in ("auto", "straight") and applied(turns) <= MOST_APPLIED:
         line = unrolled_step(turns, fixed)
         if executed(line) <= STRAIGHT_UP_TO:

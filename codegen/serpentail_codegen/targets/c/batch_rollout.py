@@ -6,13 +6,12 @@ from itertools import accumulate
 from typing import Any
 
 from ...functions.catalogue import function_of
-from ...functions.function import assemble
 from ...functions.tail import Tail, struct_parameters
 from ...ir.dataflow import on_arrays
 from ...ir.program import Program, padded
 from ...scene.scene import Scene
 from ..templating import render
-from .batch import STATES, LaneFunction, lane_function, lanes_context
+from .batch import STATES, LaneFunction, lane_function, lanes_context, of_one_state
 from .form import PrintedFunction
 from .records import ROLLOUTS, layout, member_views, steps_record
 from .simulation import own_damping
@@ -80,7 +79,7 @@ def batch_rollout(
     count = 0 if scene.baked else sum(p.size for p in struct_parameters(scene))
     if not scene.contacts:
         size = tail.nq + tail.nv + 2  # with the works of torques and of damping
-        dynamics = assemble(function_of("forward_dynamics", tail), tail)
+        dynamics = of_one_state(scene, tail, function_of("forward_dynamics", tail))
         parts = {"dynamics": lane_function(scene, dynamics, "forward_dynamics_of_flights")}
         torques = [(name, tail.nt) for name in ("GIVEN", "DAMPING", "TAU")]
         rows = (("OWN", count), *torques, ("STATE", SLOTS * size))
@@ -106,7 +105,7 @@ def batch_rollout(
 
 def _part(scene: Scene, tail: Tail, name: str) -> LaneFunction:
     """Return a function over lanes."""
-    single = _with_zeros(assemble(function_of(name, tail), tail))
+    single = _with_zeros(of_one_state(scene, tail, function_of(name, tail)))
     return lane_function(scene, single, f"{name}_of_runs")
 
 
