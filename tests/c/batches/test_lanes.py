@@ -18,11 +18,12 @@ from serpentail.model.library import NOT_FINITE
 from serpentail_codegen.functions.catalogue import CATALOGUE
 from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.tail import Tail
+from serpentail_codegen.ir.cost import executed
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.passes.batch import batched as widened
 from serpentail_codegen.passes.batch import unrolled_step
 from serpentail_codegen.passes.narrow_directions import directions_in_turn, places_lanes
-from serpentail_codegen.targets.c.batch import BATCHED, STATES
+from serpentail_codegen.targets.c.batch import BATCHED, STATES, of_one_state
 from tests.support import zoo
 from tests.support.models import folder_of
 from tests.support.rows import row
@@ -225,3 +226,14 @@ def test_batches_stay_straight_for_longer_tails_than_single_states():
                     assert manifest["functions"][name]["emission"] in ("lanes", "segments")
                 else:
                     assert ("for (int d = 0;" in source) != straight
+
+
+def test_long_tails_go_by_segments_where_that_is_less_work():
+    """Sizes are the point: H of many segments costs more than articulated bodies do."""
+    function = CATALOGUE["forward_dynamics"]
+    for segments, links, swept in ((3, 4, False), (8, 16, False), (24, 2, True)):
+        scene, tail = zoo.scene("bare", segments=segments, links=links), Tail(segments, links)
+        chosen = of_one_state(scene, tail, function)
+        with row(segments, links):
+            assert (chosen != assemble(function, tail)) == swept
+            assert executed(chosen) <= executed(assemble(function, tail))
