@@ -2,21 +2,26 @@
 mean, and are chosen where they are faster.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from serpentail_codegen.functions.catalogue import CATALOGUE
 from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.tail import Tail
+from serpentail_codegen.ir.cost import CountingRun
 from serpentail_codegen.ir.dataflow import inlined
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.ir.program import Factor, Solve, statements
 from serpentail_codegen.passes.unrolled_ldl import unrolled_ldl
+from serpentail_codegen.scene.variant import EQUAL, Shape
 from serpentail_codegen.targets.c.form import RULE, fastest
 from tests.support import zoo
 from tests.support.rows import row
 
 FUNCTION = "forward_dynamics"
+LONG = [Tail(m, 3, "continuum") for m in (8, 16, 24)]
 SIZES = [(1, 1), (1, 3), (2, 1), (2, 3), (4, 2), (7, 1), (9, 1)]
 
 
@@ -60,14 +65,38 @@ def test_derivatives_by_segments_are_those_of_long_segments_too():
     assert_same("forward_dynamics_derivatives", Tail(1, 96), "segments", 1e-11)
 
 
+def test_arcs_and_mixed_tails_go_by_segments():
+    """With all that a tail can have: own segments, a tilted mount, stops, contacts."""
+    kinds = ("articulated", "continuum", "continuum", "articulated", "continuum")
+    own = Shape((2, 5, 5, 3, 5), kinds, links=5, arcs=3, tilted=True)
+    passive = ("spring", "damping", "stops")
+    for size, shape in (((9, 3, "continuum"), EQUAL), ((5, 5, "mixed"), own)):
+        tail = Tail(*size, shape=shape, passive=passive)
+        assert_same(FUNCTION, tail, "segments", 1e-11)
+        assert_same("forward_dynamics_derivatives", tail, "segments", 1e-10)
+        ground = replace(tail, contacts=("tail", "torso"))
+        assert_same("contact_dynamics", ground, "segments", 1e-10)
+
+
+def test_work_by_segments_grows_with_their_number():
+    counts = [operations(assemble(CATALOGUE[FUNCTION], tail, "segments")) for tail in LONG]
+    assert counts[2] - counts[1] == counts[1] - counts[0]
+
+
+def operations(program):
+    """Additions, multiplications and divisions of a run."""
+    given = (*program.of_role("parameters"), *program.of_role("input"))
+    return CountingRun(program, {a.name: [a.lanes] * a.length for a in given}).counter.count
+
+
 def test_functions_without_a_form_have_another():
-    """What needs the matrix goes in lanes, and a continuum has one form of dynamics."""
+    """What needs the matrix goes in lanes, and arcs have no lanes."""
     for name in ("forward_dynamics_jvp", "mass_matrix", "pfl"):
         segments, lanes = (assemble(CATALOGUE[name], Tail(3, 2), x) for x in ("segments", "lanes"))
         assert segments == lanes, name
     arcs = Tail(3, 2, "continuum")
     for name in (FUNCTION, "mass_matrix"):
-        assert assemble(CATALOGUE[name], arcs, "segments") == assemble(CATALOGUE[name], arcs), name
+        assert assemble(CATALOGUE[name], arcs, "lanes") == assemble(CATALOGUE[name], arcs), name
 
 
 def signs(segments, **changed):
@@ -98,6 +127,8 @@ def test_forms_are_chosen_where_they_are_faster():
             with row(form, size):
                 assert fastest(CATALOGUE[FUNCTION], Tail(*size))[0] == form
     assert {2 * m * m * n for m, n in table["segments"]} == {RULE["segments_from"]}
+    for arcs, form in ((1, "straight"), (3, "straight"), (4, "segments")):
+        assert fastest(CATALOGUE[FUNCTION], Tail(arcs, 5, "continuum"))[0] == form, arcs
     for size, form in (((1, 64), "lanes"), ((3, 4), "lanes"), ((4, 4), "segments")):
         assert fastest(CATALOGUE["forward_dynamics_derivatives"], Tail(*size))[0] == form, size
     assert fastest(CATALOGUE["mass_matrix"], Tail(1, 96))[0] == "loops"

@@ -16,11 +16,14 @@ from serpentail_codegen.functions.sweeps.pieces import each_segment, mechanism
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.scene.variant import SegmentRun, Shape
 from tests.functions.test_columns import arguments, assert_same, outputs
+from tests.references.body_set import MP, exact, moved
 from tests.references.metrics import block_error, force_error, mass_matrix_error
 from tests.support import zoo
+from tests.support.models import folder_of
 from tests.support.own_tails import IN_ZOO, animal, dynamics, states
 from tests.support.rows import row
 
+SHIFT = MP.mpf(10) ** -12
 every_tail = pytest.mark.parametrize("name", IN_ZOO)
 
 
@@ -32,9 +35,7 @@ def test_a_model_is_its_set_of_bodies(name):
     assert mass_matrix_error(model.mass_matrix(q), H) < 1e-14
     assert force_error(model.inverse_dynamics(q, v, v_dot), force, H) < 1e-14
     assert force_error(model.bias_force(q, v), bias, H) < 1e-14
-    scale = np.sqrt(np.diag(H))
-    applied = np.concatenate([np.zeros(6), tau]) - bias
-    expected = np.linalg.solve(H / np.outer(scale, scale), applied / scale) / scale
+    expected = accelerated(H, np.concatenate([np.zeros(6), tau]) - bias)
     assert block_error(model.forward_dynamics(q, v, tau), expected) < 1e-12
     graph = model.casadi.forward_dynamics(q, v, tau).full().ravel()
     assert block_error(graph, expected) < 1e-12
@@ -42,6 +43,38 @@ def test_a_model_is_its_set_of_bodies(name):
     for found, momentum in zip(model.momentum(q, v), bodies.momentum(q, v), strict=True):
         assert np.abs(found - momentum).max() < 1e-14 * np.abs(momentum).max()
     assert np.abs(model.tail_points(q) - bodies.tail_points(q)).max() < 1e-15
+
+
+def accelerated(H, force):
+    """H^-1 times a force."""
+    scale = np.sqrt(np.diag(H))
+    return np.linalg.solve(H / np.outer(scale, scale), force / scale) / scale
+
+
+@every_tail
+def test_by_segments_a_model_is_its_set_of_bodies_too(name):
+    """The form is the point: v_dot, and how it changes, against forces of 60 digits."""
+    functions = ["forward_dynamics", "forward_dynamics_derivatives"]
+    scene = zoo.scene(name, functions=functions, emission="segments")
+    model, bodies = st.load(folder_of(scene)), animal(IN_ZOO[name], True)
+    for function in functions:
+        assert model.manifest["functions"][function]["emission"] == "segments"
+    q, v, _, tau = next(states(model.nq))
+    q[3:7] /= np.linalg.norm(q[3:7])
+    v_dot = model.forward_dynamics(q, v, tau)
+    H, force, _ = dynamics(bodies, q, v, v_dot)
+    assert force_error(force, np.concatenate([np.zeros(6), tau]), H) < 1e-13
+
+    (by_q, by_v), by_tau = np.random.default_rng(3).normal(size=(2, model.nv)), 1e-3 * tau
+    by_q[:3] = by_v[:3] = 0
+    low, high = (
+        bodies.inverse_dynamics(moved(exact(q), by_q, h), exact(v) + h * exact(by_v), v_dot)
+        for h in (-SHIFT, SHIFT)
+    )
+    change = ((high - low) / (2 * SHIFT)).astype(float)
+    dq, dv, dtau = model.forward_dynamics_derivatives(q, v, tau)
+    expected = accelerated(H, np.concatenate([np.zeros(6), by_tau]) - change)
+    assert block_error(dq @ by_q + dv @ by_v + dtau @ by_tau, expected) < 1e-12
 
 
 def test_every_law_holds():
@@ -74,15 +107,11 @@ def test_equal_pieces_by_themselves_are_the_default_tail(kind):
 
 
 @pytest.mark.parametrize("counts", [(3, 2, 2), (1, 4), (2,)])
-def test_sweeps_in_lanes_give_the_same_acceleration(counts):
-    """What goes by segments needs equal links: other tails get lanes."""
+def test_sweeps_in_lanes_and_by_segments_give_the_same_acceleration(counts):
     shape = Shape(counts if len(counts) > 1 else (), links=sum(counts), tilted=True)
     tail = Tail(len(counts), max(counts), shape=shape)
-    assert_same("forward_dynamics", tail, "lanes", 1e-12)
-    lanes, segments = (
-        assemble(FUNCTIONS["forward_dynamics"], tail, form) for form in ("lanes", "segments")
-    )
-    assert lanes == segments
+    for form in ("lanes", "segments"):
+        assert_same("forward_dynamics", tail, form, 1e-12)
 
 
 def test_stretches_number_the_pieces_of_their_kind_and_have_its_steps():

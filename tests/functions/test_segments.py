@@ -5,6 +5,7 @@ import pytest
 
 import serpentail as st
 from tests.references.exact_chain import ExactChain
+from tests.references.exact_continuum import ExactContinuum
 from tests.references.metrics import block_error, equilibrated_condition
 from tests.references.parameters import KINDS, TABLE_1, random_states
 from tests.support import zoo
@@ -52,6 +53,20 @@ def test_many_segments_are_exact_too():
     for at, state in states(8):
         if at in ("random 0", "folded 1", "coiled 0", "coiled 1"):
             assert_exact(model, exact, at, state, limit=1e-13)
+
+
+@pytest.mark.parametrize("arcs", [5, pytest.param(16, marks=pytest.mark.slow)])
+def test_many_arcs_are_exact_too(arcs):
+    """The size is the point: lanes that fill no vector, and two vectors."""
+    model = st.load(model_folder(arcs, None, functions=[FUNCTION]), profile="reproducible")
+    assert model.manifest["functions"][FUNCTION]["emission"] == "segments"
+    exact = ExactContinuum(dict(TABLE_1), arcs)
+    q, v, _, tau = (x[0] for x in random_states(arcs, 11, 1, "random"))
+    error = block_error(model.forward_dynamics(q, v, tau), exact.forward_dynamics(q, v, tau))
+    assert error <= 1e-13
+    q[-1] = 6.4
+    with pytest.raises(st.StateError, match=rf"segment {arcs} .*6\.4"):
+        model.forward_dynamics(q, v, tau)
 
 
 def long_model(segments, links):

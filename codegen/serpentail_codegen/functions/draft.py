@@ -30,8 +30,8 @@ class Draft(Builder):
     """A function that is being assembled: the builder, the sizes of the tail, and the parameters of
     the model.
 
-    ``dynamics`` of an articulated tail: "composite" forms H column by column; "lanes" computes its
-    columns in lanes; "segments" computes v_dot without H if no other result needs H.
+    ``dynamics``: "composite" forms H column by column; "lanes" computes its columns in lanes, of an
+    articulated tail; "segments" computes v_dot without H if no other result needs H.
     """
 
     tail: Tail

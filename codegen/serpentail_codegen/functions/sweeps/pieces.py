@@ -131,7 +131,11 @@ def mount_axes(draft: Draft) -> dict[str, Ref]:
     if not draft.tail.shape.tilted:
         return {}
     known = [array[0] for array in draft.arrays if array.name == "mount"]
-    return {"mount": known[0] if known else draft.store(mount.mount_rotation, mount=9)["mount"]}
+    if known:
+        return {"mount": known[0]}
+    axes = {"mount": draft.array("mount", 9)[0]}
+    draft.step(mount.mount_rotation, **axes)
+    return axes
 
 
 def across(

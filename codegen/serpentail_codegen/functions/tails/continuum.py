@@ -44,7 +44,8 @@ def section_properties(draft: Draft, state: State) -> Segments:
     if draft.tail.shape.own:
         return Segments(state, {"section": own_sections(draft, "section", Fraction(1))})
     share = draft.fixed("share", [Fraction(1, draft.tail.segments)])
-    return Segments(state, {}, draft.store(arc.section_properties, {"share": share}, section=2))
+    one = draft.store(arc.section_properties, {"share": share}, section=2)
+    return Segments(state, {}, one.named)
 
 
 def describe_arc(draft: Draft, piece: Vectors) -> None:
