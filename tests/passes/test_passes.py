@@ -60,7 +60,7 @@ MOST = {
     ("forward_dynamics_derivatives", "m3_n4"): 1.2,
     ("inverse_dynamics_derivatives", "m1_n3"): 1.35,
     ("forward_dynamics_derivatives", "m1_n3"): 1.35,
-    ("inverse_dynamics_hessian", "m3_n4"): 1.55,
+    ("inverse_dynamics_hessian", "m3_n4"): 1.6,  # of 33700; a direction of omega fills its vectors
 }
 LESS = {
     "inverse_dynamics_hessian": 0.97,
