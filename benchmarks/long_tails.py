@@ -1,4 +1,4 @@
-"""Nanoseconds of one call from C of v_dot and its Jacobians: many links, segments, and arcs."""
+"""Nanoseconds of one call from C of v_dot and of its Jacobians: long tails, and arcs."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ from benchmarks.models import DFD, FD, built, label, timed_function
 from benchmarks.timing import random_states, time_rounds
 
 PER_PROCESSOR = True
-SIZES = ((1, 512), (16, 4), (64, None))
+SIZES = ((1, 512), (16, 4), (64, 8), (3, None), (64, None))
 ROUNDS, CALLS = 30, 8
 
 

@@ -2,7 +2,8 @@
 
 A measure has a docstring, which says what it measures, with units and conditions, and a function
 ``measured`` of a scratch folder that returns the rows of its table. ``PER_PROCESSOR`` is there and
-true if its result depends on the width of vectors.
+true if its result depends on the width of vectors, ``RUNS`` if it is repeated in processes of its
+own: then times are the least of all runs, and ratios have a span.
 """
 
 import hashlib
@@ -28,7 +29,7 @@ from serpentail.basics.progress import Stage
 
 ROOT = Path(__file__).resolve().parents[1]
 SOURCES = ("codegen", "runtime", "benchmarks", "examples/righting.py")
-# a process that uses a lesser processor; its arguments: two folders, then names of measures
+# a run in a process of its own; its arguments: two folders, then names of measures
 CHILD = """
 import sys
 from pathlib import Path
@@ -49,8 +50,8 @@ def per_processor(name: str) -> bool:
     return getattr(module(name), "PER_PROCESSOR", False)
 
 
-def bench(output: Path, names: Sequence[str]) -> None:
-    """Run the named measures, write the report, and print it.
+def bench(output: Path, names: Sequence[str]) -> dict:
+    """Run the named measures, write the report, print and return it.
 
     What is measured is kept in OUTPUT/measured until the report is written, so that an interrupted
     run resumes if neither the sources nor the machine have changed.
@@ -70,6 +71,7 @@ def bench(output: Path, names: Sequence[str]) -> None:
             module(name).draw(report[name], output / f"{name}.png")
     print(f"written: {output}: report.md, report.json", file=sys.stderr)
     shutil.rmtree(kept.parent)
+    return report
 
 
 def state() -> str:
@@ -80,18 +82,36 @@ def state() -> str:
 
 
 def on(processor: Processor, names: list[str], kept: Path) -> dict[str, dict]:
-    """Return what measures found on a processor, which a process of its own uses if it is a lesser
-    one.
-    """
-    kept.mkdir(parents=True, exist_ok=True)
-    missing = [name for name in names if not (kept / f"{name}.json").exists()]
-    with tempfile.TemporaryDirectory() as scratch:
-        if missing and processor.level is None:
-            measure(missing, Path(scratch), kept)
-        elif missing:
-            command = [sys.executable, "-c", CHILD, scratch, str(kept), *missing]
-            subprocess.run(command, cwd=ROOT, env=processor.environment, check=True)
-    return {name: json.loads((kept / f"{name}.json").read_text()) for name in names}
+    """Return what measures found on a processor; each run has a process of its own."""
+    counts = {name: getattr(module(name), "RUNS", 1) for name in names}
+    for run in range(max(counts.values(), default=0)):
+        folder = kept / f"run_{run}"
+        folder.mkdir(parents=True, exist_ok=True)
+        here = [name for name in names if run < counts[name]]
+        if missing := [name for name in here if not (folder / f"{name}.json").exists()]:
+            with tempfile.TemporaryDirectory() as scratch:
+                command = [sys.executable, "-c", CHILD, scratch, str(folder), *missing]
+                subprocess.run(command, cwd=ROOT, env=processor.environment, check=True)
+    found = {}
+    for name, count in counts.items():
+        files = [kept / f"run_{run}" / f"{name}.json" for run in range(count)]
+        runs = [json.loads(file.read_text()) for file in files]
+        rows = [spanned(rows) for rows in zip(*(run["rows"] for run in runs), strict=True)]
+        found[name] = {"rows": rows, "seconds": sum(run["seconds"] for run in runs)}
+    return found
+
+
+def spanned(rows: Sequence[dict]) -> dict:
+    """Return one row for those of several runs: least times, spans of ratios, largest errors."""
+    row = {}
+    for key, value in rows[0].items():
+        row[key] = value
+        if len(rows) > 1 and isinstance(value, float):
+            least, most = (choose(each[key] for each in rows) for choose in (min, max))
+            row[key] = most if key in ("difference", "error") else least
+            if "ratio" in key:
+                row[f"{key}, most"] = most
+    return row
 
 
 def measure(names: Sequence[str], scratch: Path, kept: Path) -> None:

@@ -4,7 +4,6 @@ import itertools
 import json
 from pathlib import Path
 
-from benchmarks import first_table
 from benchmarks.targets import judged
 
 NOTABLE = 1.15  # ratio to the last run from which a figure is listed
@@ -26,8 +25,6 @@ def written(folder: Path, report: dict, words: dict[str, str]) -> str:
     lines = ["# Benchmark", "", "; ".join(str(value) for value in report["machine"].values())]
     for name, about, rows in sections:
         lines += ["", f"## {name}", "", about, "", *table(rows)]
-    if first := first_table.block(report):
-        lines += ["", "## docs/benchmarks.md", "", "Its first table:", "", *first]
     text = "\n".join([*lines, ""])
     (folder / "report.md").write_text(text)
     path.write_text(json.dumps(report, indent=1))
