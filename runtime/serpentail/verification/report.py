@@ -4,6 +4,7 @@
 model and reports them in the same form.
 """
 
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -145,13 +146,31 @@ def summary(model: Model, checks: list[Check]) -> dict[str, Any]:
 
 
 def as_text(model: Model, checks: list[Check]) -> str:
-    """Return the report: an overview, then every check."""
-    return "\n".join([*_overview(model, checks), "", *_table(checks, lambda _: True)])
+    """Return the report: an overview, every check, what was not checked, and the verdict."""
+    lines = [*_overview(model, checks), "", *_table(checks, lambda c: not c.omitted), ""]
+    return "\n".join([*lines, *_omitted(checks), verdict(model, checks)])
 
 
 def as_short_text(model: Model, checks: list[Check]) -> str:
     """Return the overview, then the checks that failed."""
     return "\n".join([*_overview(model, checks), *_table(checks, lambda c: not c.passed)])
+
+
+def verdict(model: Model, checks: list[Check]) -> str:
+    """Return one line: whether all that was checked holds, or what does not."""
+    failed = [c.name for c in checks if not c.passed]
+    if failed:
+        return f"{model.name}: {len(failed)} FAILED: {', '.join(failed)}"
+    return f"{model.name}: all {counts(checks)['passed']} laws that were checked hold"
+
+
+def _omitted(checks: list[Check]) -> list[str]:
+    """Return a line with how many checks were left out for which kind of reason, if any were."""
+    reasons = Counter(c.omitted.partition(": ")[0] for c in checks if c.omitted)
+    if not reasons:
+        return []
+    parts = ", ".join(f"{count} {reason}" for reason, count in reasons.items())
+    return [f"not checked: {parts} (--json - names them)"]
 
 
 def _overview(model: Model, checks: list[Check]) -> list[str]:
@@ -179,9 +198,6 @@ def _table(checks: list[Check], shown: Callable[[Check], bool]) -> list[str]:
     lines = [f"  {'check':<{width}}  {'error':>9}  {'limit':>9}  largest at"]
     for c in rows:
         name = f"  {c.name:<{width}}  "
-        if c.omitted:
-            lines.append(f"{name}not checked: {c.omitted}")
-            continue
         verdict = "" if c.passed else "FAILED "
         lines.append(f"{name}{c.error:>9.2g}  {c.limit:>9.2g}  {verdict}{c.where}".rstrip())
         if not c.passed:
