@@ -123,7 +123,7 @@ class CompiledRun:
     def records_of(self, runs: Sequence[int]) -> np.ndarray:
         """Return records of runs at their starts, which share the workspace."""
         numbers = np.array(runs)
-        records = np.repeat(np.frombuffer(self.blank, rows_of(type(self.record))), len(numbers))
+        records = np.repeat(np.frombuffer(self.blank, rows_of(self.record.__class__)), len(numbers))
         for member, first, apart in self.runs.places:
             records[member] = first + numbers * apart
         records["drive"] = self.runs.actuations.drives[numbers]
