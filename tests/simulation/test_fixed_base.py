@@ -47,7 +47,13 @@ def test_runs_are_those_of_another_integrator_and_derivation(peer):
 
     how = {"rtol": 1e-10, "atol": 1e-12, "method": "DOP853"}
     expected = solve_ivp(x_dot, (0, 0.15), np.concatenate(START), **how).y[:, -1]
-    settings = {"tsit5": {"rtol": 1e-10}, "rk4": {}, "ros34pw2": {"rtol": 1e-8}, "dp8": {}, "dop853": {}}
+    settings = {
+        "tsit5": {"rtol": 1e-10},
+        "rk4": {},
+        "ros34pw2": {"rtol": 1e-8},
+        "dp8": {},
+        "dop853": {},
+    }
     settings |= {"lsoda": {}, "implicit_euler": {"step": 1e-5}}
     for method, own in settings.items():
         run = swing(controller=torque, t_span=0.15, method=method, **own)

@@ -68,17 +68,14 @@ def tangents_together(
 ) -> ir.Program:
     """Return the program of the tangents of several kinds at once, which share all values."""
     # every array that depends on the active ones has tangents, or its angles do
-    cuts = set(cut)
-    flowing = rewritten(program.body, lambda s: () if names(writes(s)) & cuts else (s,))
-    moving = forward_slice(flowing, active)
-    by_angles = {
-        name: array for name, array in sines_and_cosines_arrays(program).items() if name in moving
-    }
-    companions = {
-        a.name: ir.Array(f"d_{a.name}", _role(a, cuts), a.size, a.count, lanes=lanes)
-        for a in program.arrays
-        if a.name in moving - by_angles.keys()
-    }
+    sweeps, angles = [], sines_and_cosines_arrays(program)
+    for lanes in kinds_of_lanes:
+        cut = set(lanes.cut)
+        moving = forward_slice(without_writes(program.body, cut), lanes.active)
+        by_angles = {name: array for name, array in angles.items() if name in moving}
+        moving -= by_angles.keys()
+        companions = {a.name: lanes.companion(a) for a in program.arrays if a.name in moving}
+        sweeps.append(_Tangents(companions, by_angles, lanes.bound, cut))
 
     # lanes that a statement leaves out are zero from the start
     body = _Tangents(companions, by_angles, bound, cuts).body(program.body, ())
@@ -93,9 +90,9 @@ def tangents_together(
     return pruned(replace(program, name=name, arrays=arrays, body=fills + body))
 
 
-def _role(array: ir.Array, cut: Collection[str]) -> str:
-    """Return the role of an array's tangents; those of parameters and of cuts are inputs."""
-    return "input" if array.role == "parameters" or array.name in cut else array.role
+def without_writes(body: ir.Body, arrays: Collection[str]) -> ir.Body:
+    """Return a body without the statements that write to some arrays."""
+    return rewritten(body, lambda s: () if names(writes(s)) & set(arrays) else (s,))
 
 
 def _partly_written(body: ir.Body) -> list[ir.Ref]:
