@@ -28,7 +28,7 @@ LONG = 10.0  # s: in shorter flights the drift of tsit5 is seldom seen
 MIN_ROUNDINGS = 100  # rounding errors that a relative tolerance must allow, as in SciPy's methods
 # default tolerances
 SINGLE_RTOL = {"tsit5": 1e-4, "ros34pw2": 1e-3, "switching": 1e-3, "dp8": 2e-5}
-DOUBLE_RTOL = {"tsit5": 1e-8, "ros34pw2": 1e-4, "switching": 1e-4, "dp8": 3e-11}
+DOUBLE_RTOL = {"tsit5": 1e-8, "ros34pw2": 1e-4, "switching": 1e-4, "dp8": 1e-12}
 
 
 @dataclass(frozen=True)

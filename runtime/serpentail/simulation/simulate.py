@@ -80,7 +80,7 @@ def simulate(
         of k starts span / 20.
     rtol, atol : float, optional
         Tolerances of adaptive methods. At the same ``rtol`` all methods have errors of about the
-        same size. Defaults: 1e-8 in flight, 3e-11 for "dp8", 1e-4 with contacts and for
+        same size. Defaults: 1e-8 in flight, 1e-12 for "dp8", 1e-4 with contacts and for
         "ros34pw2" by name (float models: 1e-4, 2e-5 and 1e-3), ``atol`` equal to ``rtol``; for
         SciPy's methods 1e-10 and 1e-12 (float models: 1e-6 and 1e-6).
     first_step, least_step, most_step : float, optional

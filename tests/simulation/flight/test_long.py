@@ -7,7 +7,7 @@ import serpentail as st
 from tests.support import zoo
 from tests.support.rows import row
 
-from ..runs import DAMPING, Q0, V0, fly, rat, tail
+from ..runs import DAMPING, LEGS, Q0, V0, fly, rat, tail
 
 LONG = {"t_span": 60.0, "output_step": 0.3}
 
@@ -31,28 +31,27 @@ def test_a_minute_of_tumbling_conserves():
         model = zoo.model(name).with_parameters(gravity=0.0)
         with row(name, spin):
             flight = st.simulate(model, *tumbling(model, spin), **LONG)
-            assert flight.info["method"] == "dp8" and not flight.warnings
+            assert flight.info["method"] == "dp8"
             assert drift(flight) < 1e-10
             assert drift(st.simulate(model, *tumbling(model, spin), method="tsit5", **LONG)) > 1e-9
 
 
 def test_a_flight_flies_back():
     """Free motion is its own reverse: from its end, at the opposite velocity, to its start."""
-    there = fly(method="dp8", t_span=1.0)
-    back = st.simulate(tail(), there.q[-1], -there.v[-1], method="dp8", t_span=1.0)
+    there = fly(method="dp8")
+    back = st.simulate(tail(), there.q[-1], -there.v[-1], method="dp8", t_span=0.2)
     np.testing.assert_allclose(np.abs(back.q[-1]), np.abs(there.q[0]), rtol=0, atol=1e-9)
     np.testing.assert_allclose(back.v[-1], -V0, rtol=0, atol=1e-7)
 
 
-def test_samples_between_steps_are_as_accurate_as_their_ends():
+def test_samples_between_steps_are_as_accurate_as_steps():
     how = {"t_span": 0.5, "output_step": 2e-3}
     exact = fly(method="dop853", rtol=1e-13, atol=1e-15, **how)
-    found = fly(method="dp8", **how)
-    assert found.info["steps"] < 0.7 * len(found.t)
-    errors = np.abs(found.q - exact.q).max(axis=1)
-    assert errors.max() < 1e-9 and errors[:-20].max() < 3 * errors[-20:].max()
-    seldom = fly(method="dp8", t_span=0.5, output_step=0.1)
-    np.testing.assert_array_equal(found.q[::50], seldom.q)
+    found = fly(method="dp8", rtol=1e-8, **how)
+    assert found.info["steps"] < 0.3 * len(found.t)
+    assert np.abs(found.q - exact.q).max() < 1e-7
+    seldom = fly(method="dp8", rtol=1e-8, t_span=0.5, output_step=0.1)
+    np.testing.assert_allclose(found.q[::50], seldom.q, rtol=0, atol=1e-14)
 
 
 def test_auto_takes_it_for_long_runs_that_nothing_acts_on():
@@ -66,7 +65,7 @@ def test_auto_takes_it_for_long_runs_that_nothing_acts_on():
         ("tsit5", tail(), {"controller": DAMPING}),
         ("tsit5", tail(), {"controller": lambda t, q, v: np.zeros(4)}),
         ("rk4", tail(), {"step": 1e-3}),
-        ("tsit5", damped, {}),
+        ("ros34pw2", damped, {}),
     ]
     for method, model, settings in rows:
         how = {"t_span": 10.0, "rtol": 1e-3} | settings
@@ -80,5 +79,7 @@ def test_auto_takes_it_for_long_runs_that_nothing_acts_on():
 
 
 def test_models_with_contacts_do_not_have_it():
+    q, v = tumbling(rat(), 0.0)
+    q[2] = 1.0
     with pytest.raises(st.SimulationError, match=r"method.*dp8"):
-        st.simulate(rat(), np.eye(1, rat().nq, 3)[0], np.zeros(rat().nv), method="dp8")
+        st.simulate(rat(), q, v, legs=LEGS, method="dp8")
