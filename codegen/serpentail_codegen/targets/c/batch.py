@@ -21,8 +21,9 @@ from .routine import CFunction
 from .views import ArgumentView, callee_view, quaternion_in, step_views
 
 STATES = {"double": 8, "float": 16}  # side by side: lanes of the widest vector
-# nodes: beyond, loops are hardly slower, and compile in a quarter of the time
-STRAIGHT_UP_TO = 11000
+# nodes of one line; beyond, loops are hardly slower, or a compiler takes more than some seconds
+STRAIGHT_UP_TO = 20000
+SLOPES_UP_TO = 11000
 MOST_APPLIED = 28000  # nodes: longer lines stay too long even without their zeros
 # by source file: each file is compiled when it is first needed
 PARTS = {
@@ -108,7 +109,7 @@ def _of_directions(scene: Scene, turns: Program, fixed: dict[str, list]) -> Prog
     """
     if scene.emission in ("auto", "straight") and applied(turns) <= MOST_APPLIED:
         line = unrolled_step(turns, fixed)
-        if executed(line) <= STRAIGHT_UP_TO:
+        if executed(line) <= SLOPES_UP_TO:
             return line
     return turns
 
