@@ -129,6 +129,12 @@ class _Turns:
             if body:
                 yield replace(self.each(last, *body), start=first)
 
+    def guard(self, guard: ir.Guard) -> Iterator[ir.Statement]:
+        """Yield the guard for each direction; it protects whole arrays."""
+        protects = tuple(self.narrow(ref.array).whole() for ref in guard.protects)
+        one = replace(guard, scalar=self.at(guard.scalar), protects=protects)
+        yield self.each(guard.scalar.lanes, one) if guard.scalar.lanes else one
+
     def solve(self, solve: ir.Solve) -> Iterator[ir.Statement]:
         """Yield a solution for each direction."""
         yield self.each(solve.x.lanes, replace(solve, x=self.at(solve.x)))

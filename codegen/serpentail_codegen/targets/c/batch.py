@@ -15,7 +15,7 @@ from ...passes.narrow_directions import directions_in_turn, has_directions
 from ...passes.unrolled_ldl import unrolled_ldl
 from ...scene.scene import Scene
 from ..templating import render
-from .form import UNROLLED_ROWS, PrintedFunction, baked_values, in_form
+from .form import UNROLLED_ROWS, PrintedFunction, baked_values, in_form, long
 from .loops import in_loops
 from .routine import CFunction
 from .views import ArgumentView, callee_view, quaternion_in, step_views
@@ -69,11 +69,8 @@ def batches(scene: Scene, tail: Tail, printed: Sequence[PrintedFunction]) -> lis
 
 
 def _batch(scene: Scene, tail: Tail, function: Function) -> Batch:
-    fixed, single, states = (
-        baked_values(scene),
-        of_one_state(scene, tail, function),
-        STATES[scene.real],
-    )
+    fixed, single = baked_values(scene), of_one_state(scene, tail, function)
+    states = STATES[scene.real]
     if has_directions(assemble(function, tail)):
         single = _of_directions(scene, single, fixed)
     elif straight(scene, single):
@@ -88,12 +85,13 @@ def of_one_state(scene: Scene, tail: Tail, function: Function) -> Program:
     It goes by segments if the scene asks for that, or if that takes fewer operations: with states
     as lanes, no lane of a sweep over segments is free of charge.
     """
-    composite = _in_turn(assemble(function, tail))
-    form, swept = in_form("segments", function, tail)
-    if form != "segments" or scene.emission not in ("auto", form):
-        return composite
-    segments = _in_turn(swept)
-    return segments if scene.emission == form else min(composite, segments, key=executed)
+    forms = []
+    if scene.emission == "segments" or (scene.emission == "auto" and long(tail)):
+        form, swept = in_form("segments", function, tail)
+        forms = [_in_turn(swept)] if form == "segments" else []
+    if not forms or scene.emission == "auto":
+        forms.append(_in_turn(assemble(function, tail)))
+    return min(forms, key=executed) if len(forms) > 1 else forms[0]
 
 
 def _in_turn(program: Program) -> Program:

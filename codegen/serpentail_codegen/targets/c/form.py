@@ -64,10 +64,7 @@ def fastest(function: Function, tail: Tail) -> tuple[str, Program]:
     always run. Sweeps in lanes overtake them before that, and sweeps by segments overtake both.
     """
     # sweeps by segments, if the tail is long
-    arcs = sum(run.stop - run.first for run in tail.runs("continuum"))
-    work = tail.nt * (tail.pieces + (LINKS_OF_AN_ARC - 1) * arcs)
-    long = tail.segments > 1 and work >= SEGMENTS_FROM
-    form, swept = in_form("segments" if long else "lanes", function, tail)
+    form, swept = in_form("segments" if long(tail) else "lanes", function, tail)
     if form == "segments" or function.name in ALWAYS_IN_LOOPS:
         return form, swept
 
@@ -77,6 +74,13 @@ def fastest(function: Function, tail: Tail) -> tuple[str, Program]:
     if applied(program) <= longest and not branches(program):
         return "straight", program
     return form, swept
+
+
+def long(tail: Tail) -> bool:
+    """Tell if a tail is so long that sweeps by segments are fast."""
+    arcs = sum(run.stop - run.first for run in tail.runs("continuum"))
+    work = tail.nt * (tail.pieces + (LINKS_OF_AN_ARC - 1) * arcs)
+    return tail.segments > 1 and work >= SEGMENTS_FROM
 
 
 def in_form(form: str, function: Function, tail: Tail) -> tuple[str, Program]:
