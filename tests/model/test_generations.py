@@ -56,7 +56,7 @@ def test_late_code_is_of_the_model_and_needs_nothing_of_the_cache(folder, cache,
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
     shutil.rmtree(folder)
     shutil.rmtree(cache)
-    settings = {"t_span": 0.01, "method": "rk4", "step": 1e-3}
+    settings = {"t_span": 0.01, "method": "rk4", "step": 1e-3, "output_step": 1e-3}
     runs = st.simulate(model, np.tile(Q, (9, 1)), 0.1 * v[:9], **settings)
     assert runs.info["abreast"] == 8
     alone = st.simulate(model, Q, 0.1 * v[8], **settings)

@@ -95,8 +95,9 @@ def test_phases_are_made_again_one_after_another():
     of = st.summary(scene.model, run.trajectory, errors=True)
     wanted = st.summary(scene.model, true.trajectory)
     assert run.complete and len(run.phases) == 2
-    for name in ("apex_m", "take_off_s"):
-        assert 0 < abs(of[name] - wanted[name]) < 3 * of.errors[name] < 0.01
+    assert 0 < abs(of["apex_m"] - wanted["apex_m"]) < 3 * of.errors["apex_m"] < 0.01
+    # the schedule of the legs alone decides when the feet leave
+    assert abs(of["take_off_s"] - wanted["take_off_s"]) < 1e-14 > of.errors["take_off_s"]
 
 
 @pytest.mark.filterwarnings("error")

@@ -170,7 +170,7 @@ def test_runs_that_share_a_controller_have_memories_of_their_own(plan):
     q, v = start(rat(), 1)
     turns = v + np.outer([0.0, 0.4, -0.8], np.eye(len(v))[3])
     mpc = st.Mpc(rat(), plan)
-    settings = {"controller": mpc, "t_span": 0.2, "method": "tsit5"}
+    settings = {"controller": mpc, "t_span": 0.2, "method": "tsit5", "output_step": 0.01}
     runs = st.simulate(rat(), q, turns, threads=2, **settings)
     for k, own in enumerate(turns):
         alone = st.simulate(rat(), q, own, **settings)
