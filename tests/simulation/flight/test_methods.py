@@ -3,7 +3,6 @@ the generated loops keep what they promise: order, tolerance, steps, the same bi
 """
 
 from functools import cache
-from itertools import combinations_with_replacement
 
 import numpy as np
 import pytest
@@ -23,12 +22,12 @@ def trees(order):
     """Rooted trees of an order, as sorted tuples of their branches."""
     if order == 1:
         return [()]
-    found = set()
-    for count in range(1, order):
-        smaller = [(size, tree) for size in range(1, order) for tree in trees(size)]
-        for branches in combinations_with_replacement(smaller, count):
-            if sum(size for size, _ in branches) == order - 1:
-                found.add(tuple(sorted(tree for _, tree in branches)))
+    found = {
+        tuple(sorted((*tree, branch)))
+        for size in range(1, order)
+        for tree in trees(order - size)
+        for branch in trees(size)
+    }
     return sorted(found)
 
 
@@ -55,7 +54,7 @@ def residuals(method, weights, order):
 def test_explicit_methods_have_their_order():
     for method, order in ((RK4, 4), (TSIT5, 5), (DP8, 8)):
         assert max(residuals(method, method.weights, order)) < ROUNDING
-        assert max(residuals(method, method.weights, order + 1)) > 1e-7
+        assert max(residuals(method, method.weights, order + 1)) > 1e-5
         rows = square(method.rows).sum(axis=1)
         np.testing.assert_allclose(rows, method.nodes, rtol=0, atol=1e-14)
 
@@ -99,7 +98,7 @@ ORDERS = {
     "tsit5": (4, (50, 100, 200)),
     "ros34pw2": (3, (100, 200, 400)),
     "implicit_euler": (1, (400, 800, 1600)),
-    "dp8": (8, (6, 12, 24)),
+    "dp8": (8, (12, 24, 48)),
 }
 
 
