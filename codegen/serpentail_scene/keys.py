@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from .purposes import PURPOSES
 from .rules import (
     ANY,
     COUNT,
@@ -22,7 +23,6 @@ from .rules import (
     table,
     within,
 )
-from .signatures.table import DEFAULT
 
 KINDS = ("articulated", "continuum", "mixed")
 GROUPS = ("feet", "tail", "torso")  # of contact points, in their order
@@ -58,6 +58,10 @@ BEND = KeyRule(
 CONTACTS = different(
     GROUPS, 'an array of different names out of "feet", "tail" and "torso", such as ["feet"]'
 )
+PURPOSE = different(
+    list(PURPOSES),
+    f'an array of different names out of {", ".join(PURPOSES)}, such as ["plan"]',
+)
 TARGET_NAMES = different(
     TARGETS,
     'an array of different names out of "c" and "casadi", at least one, such as ["c"]',
@@ -84,7 +88,8 @@ KEYS = {
     "links": SceneKey(1, COUNT),
     "samples": SceneKey(5, COUNT),
     "bend_range": SceneKey(2 * math.pi, BEND),
-    "functions": SceneKey(DEFAULT, ANY),
+    "functions": SceneKey(None, ANY),  # of those that `purpose` and the tables take
+    "purpose": SceneKey((), PURPOSE),
     "parameters": SceneKey({}, ANY),
     "coordinates": SceneKey("joint", ANY),
     "baked": SceneKey(False, FLAG),

@@ -5,6 +5,7 @@ from typing import Any
 
 from .keys import BODY, KEYS, ONLY, SEGMENT, TAPER, TORSOS, Key, foreign_to, one_word
 from .parameters import PARAMETERS, PASSIVE, Parameter
+from .purposes import ADDED
 from .rules import COUNT
 from .signatures.table import ALL
 from .units import MEASURES, choices, pattern, plain
@@ -17,8 +18,10 @@ def scene_schema(verbs: Mapping[str, Key]) -> Schema:
     """Return the schema of a whole scene file; verbs: the keys of tables such as [simulate]."""
     keys: dict[str, Schema] = {name: dict(key.rule.schema) for name, key in KEYS.items()}
     keys["bend_range"] = _number(keys["bend_range"], ["rad"])
-    names = {"type": "array", "items": {"enum": list(ALL)}, "uniqueItems": True, "minItems": 1}
-    keys["functions"] = {"anyOf": [{"const": "all"}, names]}
+    listed = {"type": "array", "uniqueItems": True, "minItems": 1}
+    sorts = [list(ALL), [f"{ADDED}{name}" for name in ALL]]
+    arrays = [listed | {"items": {"enum": names}} for names in sorts]
+    keys["functions"] = {"anyOf": [{"const": "all"}, *arrays]}
     keys["coordinates"] = {"enum": [name for only in ONLY.values() for name in only.coordinates]}
     keys["parameters"] = _table({p.name: _parameter(p) for p in (*PARAMETERS, *PASSIVE)})
     of_segment: Schema = {"kind": {"enum": ["articulated", "continuum"]}, "links": COUNT.schema}

@@ -5,6 +5,7 @@ from typing import Any
 
 from serpentail_scene.keys import KEYS, ONLY, foreign_to
 from serpentail_scene.parameters import NAMES, PARAMETERS, PARTS, PASSIVE_NAMES, Parameter, Value
+from serpentail_scene.purposes import ADDED
 from serpentail_scene.rules import COUNT
 from serpentail_scene.signatures.table import AIRBORNE, ALL, DERIVATIVES, FIXED, NEEDS
 
@@ -89,12 +90,15 @@ def kind_problems(table: Mapping[str, Any], kind: str) -> list[Problem]:
     return problems
 
 
-def polar_problems(table: Mapping[str, Any], kind: str, contacts: Collection[str]) -> list[Problem]:
+def polar_problems(
+    table: Mapping[str, Any], kind: str, contacts: Collection[str], wanted: Any
+) -> list[Problem]:
     """Return a problem for each entry that polar coordinates do not have."""
     if table.get("coordinates") != "polar":
         return []
     problems, parameters = [], parameters_in(table)
-    derivatives = _derivatives_in(table.get("functions"))
+    listed = wanted if isinstance(wanted, list | tuple) else ()
+    derivatives = [name for name in listed if name in (*DERIVATIVES, *AIRBORNE)]
     if derivatives and "polar" in ONLY[kind].coordinates:
         remedy = f'has no derivatives, such as {derivatives[0]}: use "bend", which has'
         problems.append(Problem("coordinates", "polar", remedy))
@@ -159,12 +163,6 @@ def parameters_in(table: Mapping[str, Any]) -> Mapping[str, Any]:
     return parameters if isinstance(parameters, Mapping) else {}
 
 
-def _derivatives_in(wanted: Any) -> list[str]:
-    """Return the derivatives among wanted functions."""
-    names = ALL if wanted == "all" else wanted if isinstance(wanted, list | tuple) else ()
-    return [name for name in names if name in (*DERIVATIVES, *AIRBORNE)]
-
-
 def single_problems(parameters: Mapping[str, Value]) -> list[Problem]:
     """Return a problem for each parameter that single precision cannot hold."""
     least, largest = SINGLE
@@ -197,6 +195,9 @@ def function_problems(wanted: Any) -> list[Problem]:
             '"all"'
         )
         return [Problem("functions", wanted, remedy)]
+    if any(str(name).startswith(ADDED) for name in wanted):
+        remedy = "names with and without +: + adds to what the scene is for, others name all"
+        return [Problem("functions", list(wanted), remedy)]
     problems = []
     for i, name in enumerate(wanted):
         if name not in ALL:

@@ -2,22 +2,16 @@
 
 import json
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 from serpentail_scene.keys import CONTACTS, GROUPS, KEYS, ONLY, TARGETS, Only, foreign_to
-from serpentail_scene.parameters import PARAMETERS, parts_of
-from serpentail_scene.signatures.table import (
-    ALL,
-    DEFAULT,
-    DEFAULT_ON_GROUND,
-    DERIVATIVES,
-    FIXED,
-    NEEDS,
-)
+from serpentail_scene.parameters import PARAMETERS
+from serpentail_scene.purposes import functions_of
+from serpentail_scene.signatures.table import ALL
 from serpentail_scene.source import tables_of
 from serpentail_scene.units import in_unit
 
@@ -29,8 +23,6 @@ from .checks import (
     function_problems,
     key_problems,
     kind_problems,
-    lacking,
-    parameters_in,
     plain,
     polar_problems,
     segments_in,
@@ -72,7 +64,7 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
     rules = ONLY[kind]
     values = _with_defaults(table, name, rules)
     contacts = tuple(values["contacts"]) if CONTACTS.holds(values["contacts"]) else ()
-    values["functions"] = _chosen_functions(table, values, contacts)
+    values["functions"] = functions_of(table)
     with suppress(ValueError):  # the rule for the key refuses a text
         values["bend_range"] = in_unit(values["bend_range"], "rad")
 
@@ -82,7 +74,8 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
     values |= tail.values
     problems += [*tail.problems, *key_problems(values), *kind_problems(table, kind)]
     problems += function_problems(values["functions"]) + contact_problems(table, values, contacts)
-    problems += polar_problems(table, kind, contacts) + fixed_problems(values, contacts)
+    problems += polar_problems(table, kind, contacts, values["functions"])
+    problems += fixed_problems(values, contacts)
 
     # the kind and the contacts determine which parameters there are
     links = min(sum(values["shape"].counts) or tail_pieces(values), MOST_LINKS)
@@ -123,27 +116,6 @@ def _with_defaults(table: Mapping[str, Any], name: str, rules: Only) -> dict[str
     values |= dict.fromkeys(rules.required) | {"shape": EQUAL, "tables": ""}
     values |= {"unscaled": None, "size": Scene.size}
     return values | dict(table)
-
-
-def _chosen_functions(
-    table: Mapping[str, Any], values: Mapping[str, Any], contacts: Collection[str]
-) -> Any:
-    """Return the functions of a scene: those that it names, "all", or the default ones."""
-    chosen = table.get("functions")
-    if "functions" in table and chosen != "all":
-        return chosen
-
-    # all that the scene can have, or the default ones; a passive tail may be stiff
-    names = DEFAULT + DEFAULT_ON_GROUND if contacts else DEFAULT
-    if not contacts and parts_of(parameters_in(table)):
-        names += ("implicit",)
-    if chosen == "all":
-        names = ALL
-    elif values["coordinates"] == "polar":
-        names = tuple(name for name in names if name not in DERIVATIVES)
-    if values["base"] == "fixed":
-        names = tuple(name for name in names if name in FIXED)
-    return tuple(name for name in names if not lacking(NEEDS.get(name, ""), contacts))
 
 
 def scene_to_dict(scene: Scene) -> dict[str, Any]:

@@ -1,9 +1,12 @@
 """``build`` makes a model in one call: it generates, compiles and loads it, or uses the cache."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from os import PathLike
 from typing import Any, Unpack
+
+from serpentail_scene.purposes import functions_of
 
 from ..model.load import model_from
 from ..model.manifest import CheckedFolder
@@ -102,24 +105,42 @@ def build(
     return model_from(*chosen, compiled=compiled, threads=threads)
 
 
+@dataclass(frozen=True)
+class Growth:
+    """Generates a model again with other functions; it can be pickled.
+
+    scene: its tables; name: the model's, unless the tables give one.
+    """
+
+    scene: Mapping[str, Any]
+    name: str
+
+    def __call__(self, functions: Sequence[str]) -> CheckedFolder:
+        """Return the checked files of the model with these functions."""
+        return generated({**self.scene, "functions": functions}, self.name, {})
+
+
 def built(
     tables: Mapping[str, Any], name: str, parameters: Mapping[str, object]
-) -> tuple[CheckedFolder, Mapping[str, object] | None]:
-    """Return the checked files of a scene's model, and the parameters to load it with.
+) -> tuple[CheckedFolder, Mapping[str, object] | None, Growth | None]:
+    """Return the checked files of a scene's model, the parameters to load it with, and its growth.
 
     ``name`` is the model's name unless the tables give one.
     """
     scene = {key: value for key, value in tables.items() if key not in LEFT_OUT}
+    if scene.get("functions") != "all":
+        scene["functions"] = functions_of(tables)  # which other tables decide
     own = scene.get("parameters", {})
     if not isinstance(own, Mapping):
-        return generated(scene, name, {}), parameters or None
+        return generated(scene, name, {}), parameters or None, None
     if scene.get("baked") is True and parameters:
-        return generated(scene | {"parameters": merged(own, parameters)}, name, {}), None
+        scene |= {"parameters": merged(own, parameters)}
+        return generated(scene, name, {}), None, Growth(scene, name)
     shaping = {n: x for n, x in parameters.items() if _shapes(n, scene, own)}
     if shaping:
         scene |= {"parameters": merged(own, shaping)}
     given = {n: x for n, x in parameters.items() if n not in shaping}
-    return generated(scene, name, given), given or None
+    return generated(scene, name, given), given or None, Growth(scene, name)
 
 
 def _shapes(name: str, scene: Mapping[str, Any], own: Mapping[str, Any]) -> bool:
@@ -153,7 +174,8 @@ def with_contacts(tables: Mapping[str, Any], contacts: Any) -> dict[str, Any]:
         own = scene["parameters"]
         scene["parameters"] = {name: own[name] for name in own if name not in without}
     if isinstance(scene.get("functions"), list):
-        scene["functions"] = [n for n in scene["functions"] if NEEDS.get(n) not in lacking]
+        names = scene["functions"]
+        scene["functions"] = [n for n in names if NEEDS.get(str(n).lstrip("+")) not in lacking]
     return scene
 
 

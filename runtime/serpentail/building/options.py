@@ -63,6 +63,7 @@ class SceneKeys(TypedDict, total=False):
     links: int
     samples: int
     functions: Sequence[str] | str
+    purpose: Sequence[str]
     contacts: Sequence[str]
     friction: str
     coordinates: str

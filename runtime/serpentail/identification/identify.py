@@ -150,11 +150,11 @@ def check_model(model: Any, estimate: Any) -> None:
     if not isinstance(model, Model):
         raise refusal("model", model, "a Model, as serpentail.load returns", IdentificationError)
     refuse_unlike(model, "identify")
-    for name in FUNCTIONS:
-        model.kernel(name)
+    wanted = list(FUNCTIONS)
     names = list(estimate) if isinstance(estimate, Mapping | Sequence) else []
     if any(not str(name).startswith("marker:") for name in names):
-        model.kernel("forward_dynamics_parameter_derivatives")
+        wanted.append("forward_dynamics_parameter_derivatives")
+    model.need(*wanted)
 
 
 def refuse_unlike(model: Model, who: str) -> None:

@@ -36,7 +36,7 @@ class CasadiFunctions:
     def __init__(self, model: "Model"):
         self._model = model
 
-    @lazy_property
+    @property
     def _module(self) -> ModuleType:
         """The generated module; ModelError if the scene did not ask for it."""
         if not self._has_module:
@@ -202,12 +202,11 @@ class CasadiFunctions:
         if derivatives and not orders:
             raise ModelError(f"{name} has no compiled derivatives for CasADi: use casadi.symbolic")
         wanted = [part for order in orders[:derivatives] for part in order]
-        lacking = [part for part in dict.fromkeys(wanted) if part not in functions]
-        if lacking:
-            raise self._model.without(*lacking)
+        self._model.need(*dict.fromkeys(wanted))
 
     def _known(self, name: str) -> str:
         """Return the name if the scene has the function; ModelError otherwise."""
+        self._model.need(name)
         if name not in self._model.manifest["functions"]:
             raise self._model.without(name)
         return name

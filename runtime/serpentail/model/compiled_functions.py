@@ -1,32 +1,52 @@
 """The compiled functions of a model by name, and the errors about those that it lacks."""
 
 from collections.abc import Mapping
-from typing import Any
+from ctypes import CDLL
+from typing import TYPE_CHECKING, Any
+from weakref import ref
 
 from numpy.typing import ArrayLike
 
+from serpentail_scene.signatures.table import ALL
+
+from ..basics.checks import did_you_mean
 from ..basics.errors import ModelError, StateError
 from .kernel import Kernel
-from .memory import Out
+from .library import BatchLibrary
+from .manifest import CheckedFolder
+
+if TYPE_CHECKING:
+    from .model import Model
 
 
 class CompiledFunctions(dict[str, Kernel]):
-    """Compiled functions by name; ModelError about one that the model lacks.
+    """Compiled functions by name, and the code that they are part of.
 
-    compiled: whether the model was loaded with its C.
+    One that is missing is added to the model, which then has other ones of these; ModelError if
+    that cannot be. library: None of a model that was loaded without its C.
     """
 
-    def __init__(self, manifest: Mapping[str, Any], compiled: bool):
+    def __init__(
+        self, model: "Model", checked: CheckedFolder, library: CDLL | None, batches: BatchLibrary
+    ):
         super().__init__()
-        self.manifest, self.compiled = manifest, compiled
+        self.model, self.checked, self.library, self.batches = ref(model), checked, library, batches
+        self.manifest = checked.manifest
+        if library is not None:
+            for name in self.manifest["functions"]:
+                self[name] = Kernel(library, batches, self.manifest, name, model.parameter_vector)
 
     def __missing__(self, name: str) -> Kernel:
-        if self.compiled:
+        model = self.model()
+        if self.library is None:
+            raise ModelError(
+                f"{self.manifest['prefix']} was loaded with compiled=False: only model.casadi can "
+                "evaluate; load it again"
+            )
+        if model is None or name in generated_functions(self.manifest):  # C alone calls it
             raise absent(self.manifest, name)
-        raise ModelError(
-            f"{self.manifest['prefix']} was loaded with compiled=False: only model.casadi can "
-            "evaluate; load it again"
-        )
+        model.need(name)
+        return model.kernels[name]
 
     def with_legs(
         self, name: str, legs: ArrayLike | None, arrays: tuple[ArrayLike, ...], out: Out
@@ -47,7 +67,9 @@ class CompiledFunctions(dict[str, Kernel]):
 
 def generated_functions(manifest: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the names of all functions that were generated, also of those that only C calls."""
-    return tuple(manifest["functions"] | manifest.get("work", {}))
+    scene = manifest["scene"]
+    in_c = manifest["work"] | dict.fromkeys(scene["functions"]) if "c" in scene["targets"] else {}
+    return tuple(manifest["functions"] | in_c)
 
 
 def absent(manifest: Mapping[str, Any], *names: str) -> ModelError:
@@ -62,10 +84,13 @@ def absent(manifest: Mapping[str, Any], *names: str) -> ModelError:
             "for CasADi or single calls: use st.simulate, or CasADi's own integrators with "
             "forward_dynamics"
         )
+    remedy = f'add it to `functions` of the scene, as "+{names[0]}" beside the usual ones'
+    unknown = next((name for name in names if name not in ALL), None)
+    if unknown is not None:
+        remedy = did_you_mean(unknown, ALL) or f"{model} cannot have {unknown!r}"
     return ModelError(
         f"{model} was generated without {', '.join(map(repr, names))} (it has "
-        f"{', '.join(generated_functions(manifest))}): add it to `functions` of the scene, then "
-        "generate it again"
+        f"{', '.join(generated_functions(manifest))}): {remedy}"
     )
 
 

@@ -10,6 +10,7 @@ from ..basics.errors import ModelError
 from ..compiling.threads import checked_threads
 from .compiled_functions import without_c
 from .even_arcs import warn_of_even_arcs
+from .growth import Grow
 from .library import BatchLibrary, open_library
 from .manifest import CheckedFolder, read_folder
 from .model import Model
@@ -81,17 +82,21 @@ def load(
         raise ModelError(
             f"folder: value {folder!r:.60}: needs the path of a generated folder"
         ) from None
-    return model_from(read_folder(folder), parameters, profile, compiled, threads)
+    return model_from(read_folder(folder), parameters, None, profile, compiled, threads)
 
 
 def model_from(
     checked: CheckedFolder,
     parameters: Mapping[str, object] | None,
+    grow: Grow | None = None,
     profile: str | None = None,
     compiled: bool = True,
     threads: int | None = None,
 ) -> Model:
-    """Return the model of a folder that was checked; arguments and errors as of ``load``."""
+    """Return the model of a folder that was checked; arguments and errors as of ``load``.
+
+    grow: generates the model with other functions.
+    """
     manifest = checked.manifest
     values = resolve(manifest, parameters)
     warn_of_parameters(manifest, values, 3)  # 3: the caller of st.load
@@ -104,4 +109,4 @@ def model_from(
     threads = None if threads is None else checked_threads("threads", threads, ModelError)
     library = open_library(checked, profile) if compiled else None
     batches = BatchLibrary(checked, profile, threads)
-    return Model(checked, values, library, profile, batches)
+    return Model(checked, values, library, profile, batches, grow)

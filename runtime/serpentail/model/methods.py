@@ -6,11 +6,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from serpentail_scene.layout import Layout
+from serpentail_scene.purposes import possible
 
 from ..basics.checks import finite_array
 from ..basics.errors import ModelError, StateError
-from .compiled_functions import absent, generated_functions
+from .compiled_functions import absent
 from .functions import Array, ModelFunctions
+from .growth import Grow, grown
 from .kernel import Kernel
 from .lazy import lazy_property
 from .memory import Out, filled
@@ -28,6 +30,8 @@ class ModelMethods(ModelFunctions):
     manifest: dict[str, Any]
     layout: Layout
     fixed: bool
+    generated: tuple[str, ...]  # names of all functions, also of those that only C calls
+    grow: Grow | None
 
     # names of the methods in Pinocchio; aba is below
     crba = ModelFunctions.mass_matrix
@@ -234,10 +238,33 @@ class ModelMethods(ModelFunctions):
         """
         return self.kernels[name]
 
-    @lazy_property
-    def generated(self) -> tuple[str, ...]:
-        """Names of all functions that were generated, also of those that only C calls."""
-        return generated_functions(self.manifest)
+    def need(self, *names: str) -> None:
+        """Have functions: those that a built model lacks are generated, compiled and added.
+
+        Parameters
+        ----------
+        *names : str
+            Names of functions of a scene.
+
+        Raises
+        ------
+        ModelError
+            The model was loaded, not built, or cannot have a function.
+
+        Notes
+        -----
+        Whatever asks for a function that is missing adds it so. The cache keeps the larger model,
+        and what was made of the smaller one stays valid.
+        """
+        if not {*names} <= {*self.generated}:
+            grown(cast("Model", self), names)
+
+    def has(self, *names: str) -> bool:
+        """Tell if the model has functions, after those that can be were added."""
+        scene = self.manifest["scene"]
+        if self.grow is not None and {*names} <= {*possible(scene, names), *self.generated}:
+            self.need(*names)
+        return {*names} <= {*self.generated}
 
     def without(self, *names: str) -> ModelError:
         """Return the ModelError about functions that the model was generated without."""

@@ -16,8 +16,8 @@ from serpentail_scene.layout import Layout
 from ..basics.errors import SerpentailError
 from ..basics.extras import needed
 from ..compiling.cache import cache_folder
-from .compiled_functions import CompiledFunctions
-from .kernel import Kernel
+from .compiled_functions import CompiledFunctions, generated_functions
+from .growth import Grow
 from .lazy import lazy_property
 from .library import BatchLibrary
 from .manifest import CheckedFolder, links_of, restored, snapshot
@@ -43,11 +43,12 @@ def _unpickled(
     parameters: Mapping[str, object],
     profile: str,
     options: tuple[bool, int | None],
+    grow: Grow | None,
 ) -> Model:
     """Return a pickled model: its files are those of the manifest that it was pickled with."""
     from .load import model_from
 
-    return model_from(restored(manifest_hash, folder), parameters, profile, *options)
+    return model_from(restored(manifest_hash, folder), parameters, grow, profile, *options)
 
 
 class Model(ModelMethods):
@@ -137,6 +138,14 @@ class Model(ModelMethods):
     (8,)
     """
 
+    checked: CheckedFolder
+    folder: Path
+    manifest: dict[str, Any]
+    library: ctypes.CDLL | None
+    batch_library: BatchLibrary
+    kernels: CompiledFunctions
+    generated: tuple[str, ...]
+
     def __init__(
         self,
         checked: CheckedFolder,
@@ -144,10 +153,10 @@ class Model(ModelMethods):
         library: ctypes.CDLL | None,
         profile: str = "fast",
         batch_library: BatchLibrary | None = None,
+        grow: Grow | None = None,
     ):
         manifest = checked.manifest
-        self.checked, self.folder, self.manifest = checked, checked.folder, manifest
-        self.parameters, self.library, self.profile = parameters, library, profile
+        self.parameters, self.profile, self.grow = parameters, profile, grow
         # the tail
         self.name: str = manifest["prefix"]
         self.kind: str = manifest["scene"]["kind"]
@@ -169,13 +178,22 @@ class Model(ModelMethods):
         # its compiled functions
         self.parameter_vector = np.array(flat(manifest, parameters), real_type(manifest))
         self.parameter_vector.setflags(write=False)  # with_parameters makes another model
-        self.batch_library = batch_library or BatchLibrary(checked, profile)
-        self.kernels = CompiledFunctions(manifest, library is not None)
-        if library is not None:
-            for name in manifest["functions"]:
-                self.kernels[name] = Kernel(
-                    library, self.batch_library, manifest, name, self.parameter_vector
-                )
+        self.take(checked, library, batch_library or BatchLibrary(checked, profile))
+
+    def take(
+        self, checked: CheckedFolder, library: ctypes.CDLL | None, batch_library: BatchLibrary
+    ) -> None:
+        """Take over generated code, at once: no thread sees parts of the code before."""
+        vars(self).update(
+            checked=checked,
+            folder=checked.folder,
+            manifest=checked.manifest,
+            library=library,
+            batch_library=batch_library,
+            kernels=CompiledFunctions(self, checked, library, batch_library),
+            generated=generated_functions(checked.manifest),
+        )
+        vars(self).pop("stepping", None)  # it is made anew
 
     def __repr__(self) -> str:
         return f"<serpentail.Model {self.name}: {self.tail_words()}, nv = {self.nv}>"
@@ -224,7 +242,8 @@ class Model(ModelMethods):
 
     def _twin(self, parameters: Mapping[str, Any]) -> Model:
         """Return a model of the same code with these parameters."""
-        return Model(self.checked, parameters, self.library, self.profile, self.batch_library)
+        code, grow = self.kernels, self.grow
+        return Model(code.checked, parameters, code.library, self.profile, code.batches, grow)
 
     def __copy__(self) -> Model:
         return self._twin(self.parameters)
@@ -275,6 +294,7 @@ class Model(ModelMethods):
             self._independent(),
             self.profile,
             (self.library is not None, self.batch_library.threads),
+            self.grow,
         )
 
     @lazy_property

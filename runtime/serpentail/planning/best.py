@@ -35,9 +35,7 @@ def best_plan(
 ) -> Plan:
     """Search round by round, and return the best plan."""
     begun, easier = read_clocks(), None
-    missing = [name for name in NEEDED if name not in model.generated]
-    if missing:
-        raise model.without(*missing)
+    model.need(*NEEDED)
     refuse_impossible(model, problem)
     refuse_violated(model, problem)
     with forks_wait(), Stage("plan", model.name) as stage:

@@ -40,9 +40,6 @@ IDENTIFY = Key(
     },
     needs=("marker",),
 )
-# functions that an identification calls besides the default ones of scenes
-NEEDS = ("forward_dynamics_derivatives", "forward_dynamics_parameter_derivatives")
-USES = ("forward_dynamics", "energy", "momentum", "tail_points", "mass_matrix", "bias_force")
 READING = ("unit", "axes", "zeros")  # keys for reading files
 
 
@@ -58,16 +55,9 @@ def identified(path: str, data: Sequence[str], folder: str | None = None) -> Ide
     arguments = identify_arguments(table)  # errors are raised before a model is built
     reading = {name: arguments[name] for name in READING if name in arguments}
     tracks = [read_markers(each, **reading) for each in data]
-    model = model_of(with_functions(tables) if folder is None else tables, place, folder, {})
+    model = model_of(tables, place, folder, {})
     arguments = identify_arguments(table, size_of(model))
     return identify(model, tracks, **{"estimate": ()} | arguments)
-
-
-def with_functions(tables: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a scene that also names the functions that an identification calls."""
-    functions = tables.get("functions")
-    named = functions if isinstance(functions, list) else USES
-    return dict(tables) | {"functions": list(dict.fromkeys([*named, *USES, *NEEDS]))}
 
 
 def identify_arguments(table: Mapping, size: Mapping[str, float] = UNSIZED) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from ..model.structures import REALS, structure
 CFunction: Any = type(ctypes.CFUNCTYPE(None)()).__mro__[1]  # base class of all ctypes functions
 
 
-_types: WeakKeyDictionary[Model, dict[str, type[ctypes.Structure]]] = WeakKeyDictionary()
+_types: WeakKeyDictionary[Any, dict[str, type[ctypes.Structure]]] = WeakKeyDictionary()  # by CDLL
 
 
 OF_MEMORY = ctypes.Structure, ctypes.Array
@@ -28,11 +28,13 @@ class Records:
         self.kept: list[Any] = []
         self.dtype = model.parameter_vector.dtype
         self.real = REALS[self.dtype]
-        self.types = _types.get(model) or _types.setdefault(model, self._made())
+        # all of one code: the model's is another one once a function was added
+        self.code = code = model.kernels
+        self.types = _types.get(code.library) or _types.setdefault(code.library, self._made())
 
     def _made(self) -> dict[str, type[ctypes.Structure]]:
         """Structure types by name."""
-        members = self.model.manifest["simulation"]["records"]
+        members = self.code.manifest["simulation"]["records"]
         return {
             name: structure(name, tuple(map(tuple, each)), self.real)
             for name, each in members.items()

@@ -47,6 +47,7 @@ class JaxFunctions(DifferentiableFunctions):
 
         @function.defjvp
         def derivative(primals: Any, tangents: Any) -> tuple[Array, Array]:
+            self.model.need(*(each for each, _ in JACOBIANS[name]))
             jacobians = [
                 matrix
                 for each, inputs in JACOBIANS[name]

@@ -50,9 +50,9 @@ def _refuse_others(model: Model) -> None:
     if model.manifest["real"] != "double":
         raise _refused(model, "real", model.manifest["real"], 'FMI uses double: give "double" to')
     needs = TOUCHING if model.contacts else FLYING
-    absent = [name for name in needs if name not in model.generated]
-    if absent or "c" not in scene["targets"]:
-        raise model.without(*(absent or needs))
+    if "c" not in scene["targets"]:
+        raise model.without(*needs)
+    model.need(*needs)
 
 
 def _refused(model: Model, field: str, value: object, words: str) -> ExportError:

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from serpentail_scene.purposes import PURPOSES, possible
+
 from ... import __version__
 from ...basics.checks import Refusals, did_you_mean, numbers_in, shown
 from ...basics.errors import IdentificationError, PlanningError, SimulationError, SweepError
@@ -157,6 +159,8 @@ def _of_model(model: Model, axes: Axes, job: Job) -> Subject:
     job = replace(
         job, keys=others, parameters=parameters, profile=model.profile, parent=str(Path.cwd())
     )
+    if isinstance(job.run, str) and model.grow is not None:
+        model.need(*possible(model.manifest["scene"], PURPOSES[job.run]))
     bundle = Bundle.of(model.checked)
     return Subject(job, units, lambda _: bundle)
 
@@ -178,10 +182,10 @@ def _of_scene(scene: Any, axes: Axes, job: Job) -> Subject:
         read(changed(table, {name: first[name] for name in keys}), key, job.run, refused)
         refused.tell()
         job = replace(job, table=table)
+        asked = tables.get("purpose", [])
+        if isinstance(asked, list) and job.run not in asked:  # workers add no functions
+            tables = {**tables, "purpose": [*asked, job.run]}
     if job.run == "identify":
-        from ...scenes.identify import with_functions
-
-        tables = with_functions(tables)
         if DATA not in {*axes.names, *job.settings}:
             raise SweepError(f"over: no {DATA}: needs files of marker tracks, here or in settings")
         keys += [DATA] if DATA in axes.names else []
@@ -191,7 +195,7 @@ def _of_scene(scene: Any, axes: Axes, job: Job) -> Subject:
     if isinstance(job.run, str):
         _refuse_unknown(others, job.run, ParameterOptions.__annotations__)  # before a model is made
     first_scene = tables | {name: first[name] for name in shape}
-    checked, left = built(first_scene, path.stem, {name: first[name] for name in others})
+    checked, left, _ = built(first_scene, path.stem, {name: first[name] for name in others})
     known = _parameter_units(checked.manifest)
     units |= {name: known[name] for name in others if name in known}
     if isinstance(job.run, str):
@@ -202,7 +206,7 @@ def _of_scene(scene: Any, axes: Axes, job: Job) -> Subject:
 
     def bundle(point: Point) -> Bundle:
         scene = tables | {name: point[name] for name in shape}
-        checked, _ = built(scene, path.stem, {name: point[name] for name in making})
+        checked, *_ = built(scene, path.stem, {name: point[name] for name in making})
         return Bundle.of(checked)
 
     job = replace(

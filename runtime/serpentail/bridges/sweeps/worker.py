@@ -49,7 +49,7 @@ def _model(bundle: Bundle, parameters: bytes, profile: str | None) -> Model:
     """Return the model of a folder that is put into this machine's cache."""
     checked: CheckedFolder = pickle.loads(zlib.decompress(bundle.content))
     checked = replace(checked, folder=snapshot(checked, cache_folder(None)))
-    return model_from(checked, pickle.loads(parameters) or None, profile)
+    return model_from(checked, pickle.loads(parameters) or None, profile=profile)
 
 
 def main(descriptor: int) -> None:

@@ -40,9 +40,10 @@ class Stepping:
     """What advances runs of a model: its compiled C with workspaces, and shared parameters."""
 
     def __init__(self, model: Model):
-        assert model.library is not None
+        self.code = code = model.kernels
+        assert code.library is not None
         self.dtype = model.parameter_vector.dtype
-        self.singly = SingleSteps(model.manifest, model.library, self.dtype)
+        self.singly = SingleSteps(code.manifest, code.library, self.dtype)
         self.lanes: dict[str, LaneSteps] = {}  # by method, made when it is first used
         self.alike = np.zeros((0, len(model.parameter_vector)), self.dtype)
 
@@ -61,13 +62,13 @@ class Stepping:
             self.alike = alike = np.tile(model.parameter_vector, (runs, 1))
         return alike[:runs]
 
-    def maker(self, model: Model, call: StepCall) -> tuple[SingleSteps | LaneSteps, int]:
+    def maker(self, call: StepCall) -> tuple[SingleSteps | LaneSteps, int]:
         """Return what makes steps of runs, and the number of runs that is worth a thread."""
-        entry = model.manifest.get(ENTRIES[call.method])
+        entry = self.code.manifest.get(ENTRIES[call.method])
         if entry is None or call.runs < entry["states"]:
             return self.singly, max(1, SINGLY_LEAST // call.steps)
         if call.method not in self.lanes:
-            lanes = LaneSteps(model.manifest, model.batch_library, call.method, self.singly)
+            lanes = LaneSteps(self.code.manifest, self.code.batches, call.method, self.singly)
             self.lanes[call.method] = lanes
         return self.lanes[call.method], max(entry["states"], LANES_LEAST // (4 * call.steps))
 
@@ -102,7 +103,8 @@ def step(
 ) -> tuple[np.ndarray, ...]:
     """Return the states after the steps: see ``Model.step``."""
     asked = StepSettings.named(settings)
-    method, stepping = _method(model, asked.method), model.stepping
+    method = _method(model, asked.method)
+    stepping = model.stepping
     length = number("step: h", h, SimulationError, above=0)
     steps = whole_number("step: steps", asked.steps, SimulationError, least=1, most=MOST_STEPS)
     threads = model.batch_library.threads
@@ -125,7 +127,7 @@ def step(
         method,
         _statuses(asked.statuses, runs),
     )
-    maker, least = stepping.maker(model, call)
+    maker, least = stepping.maker(call)
     shared(runs, threads, lambda first, last: maker.make(call, first, last), least)
     if asked.statuses is None and call.statuses.any():
         _fail(call, many)
@@ -140,17 +142,8 @@ def _method(model: Model, asked: object) -> str:
         name = one_of("step: method", asked, METHODS, SimulationError)
     if model.library is None:
         model.kernel("rollout")  # raises the error with the remedy
-    needs = ["rollout"] + ["implicit"] * (name == "implicit_euler")
-    has = {"rollout": "rollout" in model.generated, "implicit": _implicit(model)}
-    missing = [each for each in needs if not has[each]]
-    if missing:
-        raise model.without(*missing)
+    model.need("rollout", *["implicit"] * (name == "implicit_euler"))
     return name
-
-
-def _implicit(model: Model) -> bool:
-    """Tell whether the model's rollout has implicit steps."""
-    return "implicit_euler" in model.manifest.get("simulation", {}).get("methods", {})
 
 
 def _states(

@@ -29,9 +29,8 @@ FUNCTIONS = {  # of a model, by the names of Node in optimal/native/node.h
 
 def is_compiled(model: Model, problem: PlanningProblem) -> bool:
     """Tell if a plan's dynamics is the model's C: not with free parameters or a free start."""
-    missing = [name for name in FUNCTIONS.values() if name not in model.generated]
-    real = model.manifest["real"] == "double"
-    return bool(not missing and real and model.library is not None and not problem.is_free)
+    fit = model.manifest["real"] == "double" and model.library is not None
+    return fit and not problem.is_free and model.has(*FUNCTIONS.values())
 
 
 @dataclass(frozen=True, eq=False)

@@ -229,11 +229,7 @@ class Plan:
 def refuse_unfit(name: str, model: Model, plan: Plan, functions: Iterable[str]) -> None:
     """ModelError or PlanningError if a model cannot fly a plan by a controller of this name."""
     model.refuse_fixed(name)
-    missing = [function for function in functions if function not in model.generated]
-    if missing:
-        raise PlanningError(
-            f"{name}: the model lacks {', '.join(missing)}: add them to the scene's functions"
-        )
+    model.need(*functions)
     if model.library is None:
         raise PlanningError(
             f"{name}: the model was loaded with compiled=False: load it again with C"

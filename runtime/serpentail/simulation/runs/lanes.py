@@ -51,13 +51,13 @@ class LaneRuns:
     """Runs of a set, each with its own clock."""
 
     def __init__(self, all_runs: RunSet):
-        self.all_runs, model = all_runs, all_runs.model
-        entry = model.manifest["flights"]
+        self.all_runs, code = all_runs, all_runs.records.code
+        entry = code.manifest["flights"]
         self.states, self.work = entry["states"], entry["work"]
         members = tuple(map(tuple, entry["rollouts"]))
         self.record = structure("side_by_side", members, all_runs.records.real)
-        name = f"{model.name}_side_by_side_rollouts"
-        self.function = model.batch_library.rollouts.function(name)
+        name = f"{all_runs.model.name}_side_by_side_rollouts"
+        self.function = code.batches.rollouts.function(name)
 
     def parts(self, runs: range, threads: int) -> list[range]:
         """Return which of some runs a thread makes at once."""

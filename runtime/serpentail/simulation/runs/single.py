@@ -105,7 +105,7 @@ class CompiledRun:
             self.event_kinds = np.empty(MOST_EVENTS, np.intc)
             members |= {"event_times": self.event_times, "event_kinds": self.event_kinds}
             members |= {"most_events": MOST_EVENTS, "stop_at": ground.stop_at}
-        members["work"] = aligned(self.model.manifest["work"]["rollout"], records.dtype)
+        members["work"] = aligned(records.code.manifest["work"]["rollout"], records.dtype)
         members["method"] = self.model.manifest["simulation"]["methods"].get(method.name, 0)
         self.record: Any = records.record("run", t=start.start, **members)
         self.blank = bytes(self.record)
@@ -136,7 +136,7 @@ class CompiledRun:
 
     def function(self, name: str, *arguments: type) -> Callable[..., int]:
         """Return a function of the compiled model that takes a run."""
-        function = getattr(self.model.library, f"{self.model.name}_{name}")
+        function = getattr(self.runs.records.code.library, f"{self.model.name}_{name}")
         function.argtypes = (ctypes.c_void_p, *arguments)
         return function
 
