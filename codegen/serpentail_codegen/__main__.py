@@ -13,6 +13,7 @@ from typing import Any
 from serpentail_scene.digest import generator_digest
 from serpentail_scene.keys import KINDS
 from serpentail_scene.signatures.table import ALL
+from serpentail_scene.source import tables_of
 
 from .scene.parse import load_scene, parse_scene, scene_for, scene_to_dict
 from .scene.problems import Problem, SceneError
@@ -31,7 +32,8 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--tail", choices=KINDS, help="tail of a model without a scene file")
     p.add_argument("--segments", type=int, help="m")
     p.add_argument("--links", type=int, help="n, in each segment")
-    p.add_argument("--functions", help=f"comma-separated, of {', '.join(ALL)}; all: all of them")
+    names = f"comma-separated, of {', '.join(ALL)}; +NAME: besides the usual ones; all: all of them"
+    p.add_argument("--functions", help=names)
     p.add_argument("--real", help="double or float")
     p.add_argument("--emission", help="auto, straight, loops, lanes or segments")
     p.add_argument("--profile", help="fast, or reproducible: the same bits on every machine")
@@ -60,7 +62,7 @@ def scene_of(arguments: argparse.Namespace) -> Scene:
         chosen["baked"] = True
     if arguments.scene:
         own = load_scene(arguments.scene)
-        scene = parse_scene(scene_to_dict(own) | chosen, own.name)
+        scene = parse_scene(tables_of(arguments.scene) | chosen, own.name)
     else:
         size = (arguments.tail, arguments.segments, arguments.links)
         if None in size[:2]:

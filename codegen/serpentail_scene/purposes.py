@@ -42,12 +42,13 @@ def functions_of(tables: Mapping[str, Any]) -> Any:
         return possible(tables, ALL, polar=False)
     if not isinstance(chosen, list | tuple) or ("functions" in tables and not chosen):
         return chosen
-    own = [name for name in chosen if not _is_added(name)]
-    if own and len(own) < len(chosen):
-        return chosen  # of both sorts
+    added = [name[1:] for name in chosen if isinstance(name, str) and name.startswith(ADDED)]
+    own = chosen if not added else ()
+    if added and (len(added) < len(chosen) or not {*added} <= {*ALL}):
+        return chosen
     purposes = [name for name in _entries(tables.get("purpose")) if name in list(PURPOSES)]
-    names = own or [*_of(tables, purposes_of(tables)), *(name[1:] for name in chosen)]
-    return [*names, *(name for name in _of(tables, purposes) if name not in names)]
+    names = list(own or dict.fromkeys([*_of(tables, purposes_of(tables)), *added]))
+    return names + [name for name in _of(tables, purposes) if name not in names]
 
 
 def purposes_of(tables: Mapping[str, Any]) -> list[str]:
@@ -89,10 +90,6 @@ def _of(tables: Mapping[str, Any], purposes: Collection[str]) -> list[str]:
     laws = [law for table in acting for law in _entries(_keys(table).get("controller"))]
     names |= {"pfl"} if any(_keys(law).get("kind") == "pfl" for law in laws) else set()
     return possible(tables, names)
-
-
-def _is_added(name: object) -> bool:
-    return isinstance(name, str) and name.startswith(ADDED)
 
 
 def _entries(value: Any) -> list[Any]:

@@ -13,6 +13,7 @@ from serpentail.cli.cli import ROOMS, arguments_of
 from serpentail.model.model import Model
 from serpentail_codegen.functions.tail import Tail
 from serpentail_scene.parameters import PARAMETERS
+from serpentail_scene.purposes import PURPOSES
 from serpentail_scene.signatures.table import ALL, SIGNATURES
 from tests.docs.running import PAGES, ROOT, blocks
 from tests.support import zoo
@@ -175,9 +176,10 @@ def section(group: str) -> list[str]:
     for name in ALL:
         signature = SIGNATURES[name]
         if signature.group == group:
-            needs = f"; needs {signature.needs}" if signature.needs else ""
-            emitted = f"(emitted {signature.emitted}{needs})"
-            lines += [f"### `{name}`", "", f"{signature.doc} {emitted}", ""]
+            purposes = ", ".join(p for p, names in PURPOSES.items() if name in names)
+            needs = f"needs {signature.needs}" if signature.needs else ""
+            notes = "; ".join(filter(None, (purposes, needs)))
+            lines += [f"### `{name}`", "", signature.doc + (f" ({notes})" if notes else ""), ""]
             lines += [of_argument("in", each) for each in signature.inputs]
             lines += [of_argument("out", each) for each in signature.outputs]
             lines += [""] if signature.outputs else []

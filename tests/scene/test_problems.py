@@ -82,6 +82,9 @@ def test_unknown_names_come_with_a_suggestion(refuse_rows):
         (above + '["mass_matrx"]\n' + VALID, "functions[0]", "'mass_matrix'"),
         (above + '["energy", "aba"]\n' + VALID, "functions[1]", "'forward_dynamics'"),
         (above + '["energy", "momentum", "energy"]\n' + VALID, "functions[2]", "before"),
+        (above + '["energy", "+momentum"]\n' + VALID, "functions", "exactly these"),
+        (above + '["+energi"]\n' + VALID, "functions[0]", "'energy'"),
+        ('purpose = ["plann"]\n' + VALID, "purpose", "simulate, plan"),
     ]
     refuse_rows(rows)
 

@@ -14,18 +14,18 @@ from serpentail_codegen.scene.resolve import resolve_parameters
 from serpentail_codegen.scene.scene import Scene
 from serpentail_scene.parameters import PARAMETERS
 from serpentail_scene.signatures import table as functions
-from serpentail_scene.signatures.signature import ALWAYS, CALLED, GROUND, NAMED
-from serpentail_scene.signatures.table import ALL, DEFAULT, FIXED, SIGNATURES
+from serpentail_scene.signatures.table import ALL, FIXED, SIGNATURES
 from tests.support.rows import row
 from tests.support.scenes import VALID
 
 STANCE = VALID + 'contacts = ["torso", "feet"]\n'
+FLIGHT = ("forward_dynamics", "energy", "momentum", "tail_points", "center_of_mass", "rollout")
 SIZE = ["--tail", "articulated", "--segments", "1", "--links", "3"]
 
 
 def test_defaults_of_the_other_keys_and_scenes_of_options(read):
     scene = read(VALID)
-    assert scene == Scene("rat", "articulated", 2, 3, DEFAULT, resolve_parameters({}, 6))
+    assert scene == Scene("rat", "articulated", 2, 3, FLIGHT, resolve_parameters({}, 6))
     keys = (scene.coordinates, scene.baked, scene.real, scene.emission, scene.profile)
     assert keys == ("joint", False, "double", "auto", "fast")
     assert read('name = "kick_2"\n' + VALID).name == "kick_2"
@@ -87,19 +87,49 @@ def test_functions_come_in_their_order_and_all_that_fit(read):
     assert not set(functions.NEEDS) & set(read(VALID + every).functions)
     fixed = VALID + 'base = "fixed"\n'
     assert read(fixed + every).functions == tuple(name for name in ALL if name in FIXED)
-    assert set(read(fixed).functions) == set(DEFAULT) & set(FIXED)
-    polar = read('kind = "continuum"\nsegments = 1\ncoordinates = "polar"\n').functions
-    assert polar == tuple(name for name in DEFAULT if name not in functions.DERIVATIVES)
-    damped = read(VALID + "[parameters]\ntail_damping = 1e-3\n").functions
-    assert set(damped) == {*DEFAULT, "implicit"}
+    assert read(fixed).functions == FLIGHT
+
+
+MASS, SOLVER = "mass_matrix", "implicit"
+PLAN = {MASS, "pfl", "airborne_rates", "airborne_rates_derivatives", "airborne_rates_hessian"}
+FIT = {"inverse_dynamics", "forward_dynamics_derivatives"}
+FIT |= {"forward_dynamics_parameter_derivatives", *FLIGHT} - {"rollout"}
+STANDING = {*FLIGHT, SOLVER, "contact_points", "leg_points"}
+TRACKED = '[[simulate.controller]]\nkind = "pfl"\n'
+SERIES = 'phase = [{ name = "up" }, { name = "on", plan = { goal = "upright" } }]\n'
+NEEDED = [  # above the scene, below it, the functions
+    ("", "", FLIGHT),
+    ("", "[simulate]\nduration = 1\n", FLIGHT),
+    ("", "[parameters]\ntail_damping = 1e-3\n", {*FLIGHT, SOLVER}),
+    ("", TRACKED, {*FLIGHT, "pfl"}),
+    ("", "[plan]\nduration = 1\n", {*FLIGHT, *PLAN}),
+    ("", SERIES, {*FLIGHT, *PLAN}),
+    ("", "[identify]\ntorques = 3\n", FIT),
+    ("", "[identify]\na = 3\n[simulate]\na = 3\n", {*FIT, *FLIGHT}),
+    ('contacts = ["feet"]\n', "", STANDING),
+    ('contacts = ["tail"]\n', "", STANDING - {"leg_points"}),
+    ('base = "fixed"\n', "[plan]\na = 3\n", {*FLIGHT, MASS, "pfl"}),
+    ('purpose = ["mpc"]\n', "", {*FLIGHT, "airborne_rates", "airborne_rates_derivatives"}),
+    ('functions = ["energy"]\n', "[plan]\na = 3\n", {"energy"}),
+    ('functions = ["energy"]\npurpose = ["identify"]\n', "", FIT),
+    (f'functions = ["+{MASS}", "+energy"]\n', "", {*FLIGHT, MASS}),
+    (f'functions = ["+{MASS}"]\npurpose = ["plan"]\n', "", {*FLIGHT, *PLAN}),
+]
+
+
+def test_functions_follow_from_what_a_scene_is_for(read):
+    for above, below, names in NEEDED:
+        with row(above, below):
+            assert read(above + VALID + below).functions == tuple(n for n in ALL if n in names)
+    polar = read('purpose = ["plan", "derivatives"]\nkind = "continuum"\nsegments = 1\n').functions
+    curved = 'purpose = ["plan", "derivatives"]\nkind = "continuum"\nsegments = 1\ncoordinates = '
+    left = {*polar} - {*read(curved + '"polar"\n').functions}
+    assert left == {n for n in polar if SIGNATURES[n].group in ("derivative", "planning")}
 
 
 def test_contacts_bring_their_parameters_and_functions(read):
     scene = read(STANCE)
     assert scene.contacts == ("feet", "torso") and scene.friction == "cone"
-    assert scene.functions == tuple(
-        name for name in ALL if name in DEFAULT + functions.DEFAULT_ON_GROUND
-    )
     own = scene.parameters.keys() - read(VALID).parameters.keys()
     assert own == {p.name for p in PARAMETERS if p.needs}
     legs = [scene.parameters[f"L_{link}"] for link in ("h2d", "d2k", "k2a", "a2m", "m2t")]
@@ -121,8 +151,7 @@ def test_the_table_of_functions_knows_assemblies_shapes_and_derivatives():
     for name, function in CATALOGUE.items():
         signature = SIGNATURES[name]
         assert (function.inputs, function.outputs) == (signature.inputs, signature.outputs)
-    assert {s.emitted for s in SIGNATURES.values()} == {ALWAYS, GROUND, NAMED, CALLED}
-    assert set(ALL) == {name for name, s in SIGNATURES.items() if s.emitted != CALLED}
+    assert set(ALL) == {name for name, s in SIGNATURES.items() if not s.called}
     orders = [order for each in functions.EXACT_DERIVATIVES.values() for order in each]
     assert {part for order in orders for part in order} <= set(CATALOGUE)
 

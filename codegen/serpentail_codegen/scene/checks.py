@@ -195,17 +195,18 @@ def function_problems(wanted: Any) -> list[Problem]:
             '"all"'
         )
         return [Problem("functions", wanted, remedy)]
-    if any(str(name).startswith(ADDED) for name in wanted):
-        remedy = "names with and without +: + adds to what the scene is for, others name all"
-        return [Problem("functions", list(wanted), remedy)]
     problems = []
     for i, name in enumerate(wanted):
-        if name not in ALL:
-            problems.append(Problem(f"functions[{i}]", name, f"unknown; {suggest(name, ALL)}"))
+        bare = name.removeprefix(ADDED) if isinstance(name, str) else name
+        if bare not in ALL:
+            problems.append(Problem(f"functions[{i}]", name, f"unknown; {suggest(bare, ALL)}"))
         elif name in wanted[:i]:
             problems.append(
                 Problem(f"functions[{i}]", name, "listed before; remove one of the two")
             )
+    if not problems and any(name.startswith(ADDED) for name in wanted):
+        remedy = 'give all a "+", which adds to what the scene is for, or none, for exactly these'
+        problems.append(Problem("functions", list(wanted), remedy))
     return problems
 
 

@@ -64,7 +64,7 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
     rules = ONLY[kind]
     values = _with_defaults(table, name, rules)
     contacts = tuple(values["contacts"]) if CONTACTS.holds(values["contacts"]) else ()
-    values["functions"] = functions_of(table)
+    values["functions"] = functions_of({**table, "contacts": contacts})
     with suppress(ValueError):  # the rule for the key refuses a text
         values["bend_range"] = in_unit(values["bend_range"], "rad")
 

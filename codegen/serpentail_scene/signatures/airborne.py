@@ -1,7 +1,7 @@
 """Functions of a plan's nodes: airborne motion, with drift and omega eliminated."""
 
 from .arguments import ANGULAR, TAU, Argument
-from .signature import NAMED, PLANNING, Signature
+from .signature import PLANNING, Signature
 
 # fmt: off
 X = Argument("x", ("airborne_state",),
@@ -15,10 +15,10 @@ HESSIAN = Argument("hessian", ("airborne_arguments", "airborne_arguments"),
 SIGNATURES = (
     Signature("airborne_rates",
         "rates of an airborne state, from which translation and omega are eliminated",
-        (X, TAU, ANGULAR), (Y,), PLANNING, NAMED),
+        (X, TAU, ANGULAR), (Y,), PLANNING),
     Signature("airborne_rates_derivatives", "airborne_rates and its Jacobian",
-        (X, TAU, ANGULAR), (Y, J), PLANNING, NAMED),
+        (X, TAU, ANGULAR), (Y, J), PLANNING),
     Signature("airborne_rates_hessian",
         "airborne_rates, its Jacobian, and the Hessian of weights^T y",
-        (X, TAU, ANGULAR, WEIGHTS), (Y, J, HESSIAN), PLANNING, NAMED),
+        (X, TAU, ANGULAR, WEIGHTS), (Y, J, HESSIAN), PLANNING),
 )

@@ -5,7 +5,7 @@ documentation of functions follow from this table. Its order is that of the emit
 """
 
 from . import airborne, derivatives, simulation, values
-from .signature import ALWAYS, CALLED, DERIVATIVE, GROUND, PLANNING, VALUE
+from .signature import DERIVATIVE, PLANNING, VALUE
 
 SIGNATURES = {
     signature.name: signature
@@ -23,14 +23,7 @@ def in_group(group: str) -> tuple[str, ...]:
     return tuple(name for name, signature in SIGNATURES.items() if signature.group == group)
 
 
-def emitted(when: str) -> tuple[str, ...]:
-    """Return the names of the functions that are emitted under a condition."""
-    return tuple(name for name, signature in SIGNATURES.items() if signature.emitted == when)
-
-
-ALL = tuple(name for name in SIGNATURES if name not in emitted(CALLED))  # what a scene may name
-DEFAULT = emitted(ALWAYS)
-DEFAULT_ON_GROUND = emitted(GROUND)
+ALL = tuple(name for name, each in SIGNATURES.items() if not each.called)  # what a scene may name
 VALUES = in_group(VALUE)
 DERIVATIVES = in_group(DERIVATIVE)
 # of a tail on a fixed base
