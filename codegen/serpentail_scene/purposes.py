@@ -47,8 +47,8 @@ def functions_of(tables: Mapping[str, Any]) -> Any:
     if added and (len(added) < len(chosen) or not {*added} <= {*ALL}):
         return chosen
     purposes = [name for name in _entries(tables.get("purpose")) if name in list(PURPOSES)]
-    names = list(own or dict.fromkeys([*_of(tables, purposes_of(tables)), *added]))
-    return names + [name for name in _of(tables, purposes) if name not in names]
+    names = list(own or dict.fromkeys([*needed_for(tables, purposes_of(tables)), *added]))
+    return names + [name for name in needed_for(tables, purposes) if name not in names]
 
 
 def purposes_of(tables: Mapping[str, Any]) -> list[str]:
@@ -80,7 +80,7 @@ def together(tables: Mapping[str, Any], name: str) -> list[str]:
     return values if name in values else [name]
 
 
-def _of(tables: Mapping[str, Any], purposes: Collection[str]) -> list[str]:
+def needed_for(tables: Mapping[str, Any], purposes: Collection[str]) -> list[str]:
     """Return the functions that a scene has for purposes."""
     names = {name for purpose in purposes for name in PURPOSES[purpose]}
     # flights of a passive tail may be stiff, as the ground is

@@ -2,7 +2,6 @@
 
 import math
 import os
-import shutil
 import subprocess
 import sys
 import tomllib
@@ -16,41 +15,20 @@ from hypothesis import given
 from hypothesis import strategies as some
 
 import serpentail as st
-from serpentail.building import generator
 from serpentail.building.build import NEEDED, with_contacts
 from serpentail.building.options import ParameterOptions, SceneKeys
 from serpentail.building.scene_text import scene_text
 from serpentail.cli import cli
-from serpentail_codegen.scene.parse import load_scene, parse_scene
+from serpentail_codegen.scene.parse import parse_scene
 from serpentail_scene.keys import KEYS
 from serpentail_scene.parameters import PARAMETERS, PASSIVE
 from serpentail_scene.signatures.table import NEEDS
 from tests.support import zoo
-from tests.support.models import folder_of
 from tests.support.scenes import SCENES
 
 from ..support.rows import row
 
 TINY = {"tail": "articulated", "segments": 1, "links": 1, "functions": ["energy"]}
-
-
-@pytest.fixture
-def cache(tmp_path, monkeypatch):
-    monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path / "cache"))
-    return tmp_path / "cache"
-
-
-@pytest.fixture
-def generations(cache, monkeypatch):
-    """Return a list that grows by each run of the generator, which makes each text once a day."""
-    runs = []
-
-    def generate(scene, output, given):
-        runs.append(scene)
-        return shutil.copytree(folder_of(load_scene(scene)), output / scene.stem)
-
-    monkeypatch.setattr(generator, "generate", generate)
-    return runs
 
 
 def made(scene=None, **options):

@@ -207,13 +207,13 @@ def test_models_that_lack_functions_are_refused():
     plan = st.plan(model, **given)
     path = ((lambda point: point.tip, 0, 1),)
     for body, error, words, changes in (
-        (zoo.model("bare"), st.ModelError, "'inverse_dynamics'", {}),
+        (zoo.model("bare"), st.ModelError, "'mass_matrix'", {}),
         (zoo.model("fixed"), st.ModelError, "fixed", {}),
         (model, st.PlanningError, "'tip'", {"path": path}),
     ):
         with row(words), pytest.raises(error, match=words):
             st.plan(body, **given | changes)
-    with pytest.raises(st.PlanningError, match="lacks airborne_rates, airborne_rates_derivatives"):
+    with pytest.raises(st.ModelError, match="without 'airborne_rates', 'airborne_rates_deriv"):
         st.Mpc(model, plan)
 
 

@@ -34,13 +34,11 @@ def model_of(place: str) -> "Model":
 
 def verify(arguments: argparse.Namespace) -> VerbOutcome:
     """Return which laws a model obeys, and whether it obeys all of them."""
-    from serpentail_scene.purposes import PURPOSES, possible
-
     from ..verification.report import as_text as laws_text
     from ..verification.report import laws, summary
 
     model = model_of(arguments.model)
-    model.has(*possible(model.manifest["scene"], PURPOSES["evaluate"]))  # most laws are about these
+    model.serve("evaluate")  # most laws are about these
     checks = laws(model)
     return VerbOutcome(
         summary(model, checks), laws_text(model, checks), all(c.passed for c in checks)

@@ -150,11 +150,11 @@ def check_model(model: Any, estimate: Any) -> None:
     if not isinstance(model, Model):
         raise refusal("model", model, "a Model, as serpentail.load returns", IdentificationError)
     refuse_unlike(model, "identify")
-    wanted = list(FUNCTIONS)
+    model.serve("identify")
+    model.need(*FUNCTIONS)
     names = list(estimate) if isinstance(estimate, Mapping | Sequence) else []
     if any(not str(name).startswith("marker:") for name in names):
-        wanted.append("forward_dynamics_parameter_derivatives")
-    model.need(*wanted)
+        model.need("forward_dynamics_parameter_derivatives")
 
 
 def refuse_unlike(model: Model, who: str) -> None:

@@ -60,7 +60,8 @@ class CasadiFunctions:
             for p in self._model.manifest["parameters"]
             if p["in_struct"]
         }
-        function = self._module.function(self._symbolic(name), values)
+        known = self._symbolic(name)  # before the module, which it may replace
+        function = self._module.function(known, values)
         setattr(self, name, function)
         return function
 
@@ -133,7 +134,8 @@ class CasadiFunctions:
         ModelError
             The scene left the function or the target "casadi" out, or the function has no SX form.
         """
-        return self._module.function(self._symbolic(name))
+        known = self._symbolic(name)
+        return self._module.function(known)
 
     def external(self, name: str, derivatives: int = 0, folded: bool = False) -> casadi.Function:
         """Return the compiled C as a CasADi function whose last input is the parameter vector.

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from serpentail_scene.layout import Layout
-from serpentail_scene.purposes import possible
+from serpentail_scene.purposes import needed_for, possible
 
 from ..basics.checks import finite_array
 from ..basics.errors import ModelError, StateError
@@ -258,6 +258,11 @@ class ModelMethods(ModelFunctions):
         """
         if not {*names} <= {*self.generated}:
             grown(cast("Model", self), names)
+
+    def serve(self, purpose: str) -> None:
+        """Add all that a purpose of scenes takes to a built model; to a loaded one, nothing."""
+        if self.grow is not None:
+            self.need(*needed_for(self.manifest["scene"], [purpose]))
 
     def has(self, *names: str) -> bool:
         """Tell if the model has functions, after those that can be were added."""

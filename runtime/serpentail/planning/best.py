@@ -20,8 +20,7 @@ from .softening import SOFTENING
 from .torso import goes_through_torso, off_torso
 
 NEEDED = (  # functions of the model
-    *("mass_matrix", "inverse_dynamics", "forward_dynamics"),
-    *("rollout", "energy", "momentum"),
+    *("mass_matrix", "forward_dynamics", "rollout", "energy", "momentum"),
 )
 # of a search that keeps the tail off the torso: it begins near its end, or does not lead there
 AROUND_ROUNDS, AROUND_OPTIONS = 2, {"fatrop.max_iter": 100}
@@ -35,6 +34,7 @@ def best_plan(
 ) -> Plan:
     """Search round by round, and return the best plan."""
     begun, easier = read_clocks(), None
+    model.serve("plan")
     model.need(*NEEDED)
     refuse_impossible(model, problem)
     refuse_violated(model, problem)

@@ -9,7 +9,7 @@ import pytest
 
 import serpentail as st
 from serpentail.bridges.exporting.export import SUFFIXES
-from serpentail.building.examples import example_paths, tables_of_scene
+from serpentail.building.examples import example_paths
 from tests.support.rows import row
 
 from .test_chains import mujoco, pin, unbalanced
@@ -49,16 +49,11 @@ REMEDIES = {  # words of a refusal -> the model and the kind that they lead to
     'export an "fmu"': lambda model, _: (model, "fmu"),
     'export an "mjcf"': lambda model, _: (model, "mjcf"),
     "with tail_stiffness = 0": lambda model, kind: (model.with_parameters(tail_stiffness=0), kind),
-    "add it to `functions`": lambda model, kind: (with_rollout(model.name), kind),
     'kind = "articulated" and some links': lambda model, kind: (
         st.build(tail="articulated", segments=model.segments, links=2),
         kind,
     ),
 }
-
-
-def with_rollout(name):
-    return st.build(name, functions=[*tables_of_scene(name)[0]["functions"], "rollout"])
 
 
 def check(model, kind, folder, opened):

@@ -7,8 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from serpentail_scene.purposes import PURPOSES, possible
-
 from ... import __version__
 from ...basics.checks import Refusals, did_you_mean, numbers_in, shown
 from ...basics.errors import IdentificationError, PlanningError, SimulationError, SweepError
@@ -159,8 +157,8 @@ def _of_model(model: Model, axes: Axes, job: Job) -> Subject:
     job = replace(
         job, keys=others, parameters=parameters, profile=model.profile, parent=str(Path.cwd())
     )
-    if isinstance(job.run, str) and model.grow is not None:
-        model.need(*possible(model.manifest["scene"], PURPOSES[job.run]))
+    if isinstance(job.run, str):
+        model.serve(job.run)  # workers add no functions
     bundle = Bundle.of(model.checked)
     return Subject(job, units, lambda _: bundle)
 
@@ -183,7 +181,7 @@ def _of_scene(scene: Any, axes: Axes, job: Job) -> Subject:
         refused.tell()
         job = replace(job, table=table)
         asked = tables.get("purpose", [])
-        if isinstance(asked, list) and job.run not in asked:  # workers add no functions
+        if isinstance(asked, list) and job.run not in asked:
             tables = {**tables, "purpose": [*asked, job.run]}
     if job.run == "identify":
         if DATA not in {*axes.names, *job.settings}:

@@ -1,0 +1,28 @@
+"""A cache of a test's own, and a generator that counts."""
+
+import shutil
+
+import pytest
+
+from serpentail.building import generator
+from serpentail_codegen.scene.parse import load_scene
+from tests.support.models import folder_of
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+@pytest.fixture
+def generations(cache, monkeypatch):
+    """Return a list that grows by each run of the generator, which makes each text once a day."""
+    runs = []
+
+    def generate(scene, output, given):
+        runs.append(scene)
+        return shutil.copytree(folder_of(load_scene(scene)), output / scene.stem)
+
+    monkeypatch.setattr(generator, "generate", generate)
+    return runs
