@@ -71,7 +71,7 @@ def main() -> None:
     """Learn, then try the policy on starts that it has not seen."""
     import numpy as np
 
-    rat = st.build("kangaroo_rat_m1_n3", functions=["forward_dynamics", "rollout"])
+    rat = st.build("kangaroo_rat_m1_n3")
     worlds = st.environments(rat, "righting", RATS)
     policy, _ = learn(worlds)
     for words, tried in (("without torque", 0 * policy), ("as learned", policy)):

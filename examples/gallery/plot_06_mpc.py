@@ -18,10 +18,7 @@ import numpy as np
 
 import serpentail as st
 
-functions = "forward_dynamics mass_matrix bias_force inverse_dynamics energy momentum"
-functions += " tail_points rollout pfl airborne_rates airborne_rates_derivatives"
-functions += " airborne_rates_hessian"
-believed = st.build("righting_m1_n3", functions=functions.split())
+believed = st.build("righting_m1_n3")
 body = believed.with_parameters(
     tail_length=0.85 * believed.parameters["tail_length"],
     torso_inertia=[1.15 * each for each in believed.parameters["torso_inertia"]],

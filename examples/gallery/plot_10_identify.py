@@ -19,10 +19,7 @@ import numpy as np
 
 import serpentail as st
 
-functions = "mass_matrix bias_force inverse_dynamics forward_dynamics tail_points energy"
-functions += " momentum rollout forward_dynamics_derivatives"
-functions += " forward_dynamics_parameter_derivatives"
-model = st.build("identify_tail", functions=functions.split())
+model = st.build("identify_tail", purpose=["simulate"])  # besides [identify]
 truth = {"tail_mass": 3.51e-3, "tail_length": 0.19466}
 truth |= {"tail_stiffness": 2e-3, "tail_damping": 5e-5}
 torso = {"nose": (0, 50, 10), "left": (-25, -20, 20), "right": (25, -20, 20), "back": (0, 0, 30)}

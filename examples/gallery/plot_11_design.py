@@ -13,10 +13,7 @@ import numpy as np
 
 import serpentail as st
 
-functions = "mass_matrix bias_force inverse_dynamics forward_dynamics tail_points energy"
-functions += " momentum rollout forward_dynamics_derivatives"
-functions += " forward_dynamics_parameter_derivatives"
-rat = st.build("identify_tail", functions=functions.split())
+rat = st.build("identify_tail", purpose=["simulate"])  # besides [identify]
 wanted = ["torso_mass", "torso_inertia", "tail_mass", "tail_stiffness[same]"]
 wanted += ["tail_damping[same]"]
 torso = {"nose": (0, 50, 10), "left": (-25, -20, 20), "right": (25, -20, 20), "back": (0, 0, 30)}

@@ -15,9 +15,7 @@ import numpy as np
 
 import serpentail as st
 
-functions = "forward_dynamics_derivatives forward_dynamics_vjp inverse_dynamics_hessian"
-functions += " forward_dynamics mass_matrix energy momentum rollout tail_points"
-rat = st.build("kangaroo_rat_m1_n3", functions=functions.split())
+rat = st.build("kangaroo_rat_m1_n3", purpose=["simulate", "derivatives"])
 light = rat.with_parameters(tail_mass=0.8 * rat.parameters["tail_mass"])
 x_dot = light.casadi.external("x_dot", derivatives=2, folded=True)  # compiled C, exact Hessian
 

@@ -15,7 +15,7 @@ import serpentail as st
 
 POLICIES, EACH, BEST, ROUNDS = 32, 32, 8, 25
 SCALE = np.array([1, 1, 1, 20, 20, 20, 1, 3, 1, 1, 50, 50, 1])  # of the observations
-rat = st.build("kangaroo_rat_m1_n3", functions=["forward_dynamics", "rollout"])
+rat = st.build("kangaroo_rat_m1_n3")
 worlds = st.environments(rat, "righting", POLICIES * EACH, step=2e-3, substeps=5)
 
 

@@ -13,7 +13,6 @@ import numpy as np
 import serpentail as st
 
 BEND, SPIN = 1.5, [15, 5, 0]  # rad, rad/s
-functions = ["forward_dynamics", "rollout", "tail_points", "energy", "momentum"]
 
 
 def flight(model, links=1):
@@ -23,9 +22,9 @@ def flight(model, links=1):
     return st.simulate(model, q, [0, 0, 1.5, *SPIN, 0, 0], **settings)
 
 
-smooth = flight(st.build(tail="continuum", segments=1, functions=functions))
+smooth = flight(st.build(tail="continuum", segments=1))
 counts = [2, 4, 8, 16]
-tail = {"tail": "articulated", "segments": 1, "functions": functions}
+tail = {"tail": "articulated", "segments": 1}
 linked = [flight(st.build(**tail, links=n), n) for n in counts]
 
 

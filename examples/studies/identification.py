@@ -32,11 +32,7 @@ def scene(segments: int, links: int | None):
     kind = {"tail": "articulated", "links": links} if links else {"tail": "continuum"}
     model = st.build(
         segments=segments,
-        functions=[
-            *("mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics"),
-            *("energy", "momentum", "tail_points", "forward_dynamics_derivatives"),
-            "forward_dynamics_parameter_derivatives",
-        ],
+        purpose=["identify"],
         tail_stiffness=2e-3,
         tail_damping=5e-5,
         tail_rest=0.0,

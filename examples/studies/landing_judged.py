@@ -14,11 +14,7 @@ def model_of(options: dict) -> st.Model:
     """Return a model of this tail with all groups of contacts, and exact derivatives for its
     plans.
     """
-    functions = st.scenario("kick_and_land").model.generated
-    # these come with other functions
-    inner = ("contact_rates", "implicit_factor", "implicit_solve")
-    wanted = [*(name for name in functions if name not in inner), "implicit"]
-    return st.build(**options, contacts=["feet", "tail", "torso"], functions=wanted)
+    return st.build(**options, contacts=["feet", "tail", "torso"], purpose=["plan"])
 
 
 def judged(model: st.Model, run: st.SequenceRun) -> dict:

@@ -60,7 +60,8 @@ def build(
         ``contacts`` leaves out a group of the file, such as ``contacts=[]`` for flights, so are
         the file's parameters and functions of that group. Common keys
         are ``tail`` ("articulated", "continuum" or "mixed"), ``segments`` (m, or one table for
-        each segment), ``links`` (n), ``functions`` (names, or "all"), ``contacts``, ``samples``,
+        each segment), ``links`` (n), ``purpose`` (such as ["plan"]), ``functions`` (names, names
+        with "+" to add them, or "all"), ``contacts``, ``samples``,
         ``friction``, ``coordinates``, ``bend_range`` (rad), ``real``, ``emission``, ``profile``,
         ``baked``, ``base``, ``targets`` and ``name``. Parameters such as ``torso_mass=0.06`` need
         no new code.
@@ -86,7 +87,8 @@ def build(
     -----
     The generator runs in its own process for some seconds. Its results are cached under a hash
     of the scene and of the generator, so a second call takes milliseconds. Several processes may
-    build at once: each model is made by one of them.
+    build at once: each model is made by one of them. A function that was not generated is added
+    when it is first asked for.
 
     Examples
     --------

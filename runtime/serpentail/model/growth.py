@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable, Sequence
+from ctypes import CDLL
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -9,6 +10,7 @@ from serpentail_scene.purposes import together
 from serpentail_scene.signatures.table import ALL
 
 from ..compiling.threads import after_fork
+from .compiled_functions import CompiledFunctions, generated_functions
 from .library import BatchLibrary, open_library
 from .manifest import CheckedFolder
 
@@ -34,4 +36,20 @@ def grown(model: "Model", names: Sequence[str]) -> None:
         checked = model.grow([name for name in ALL if name in {*scene["functions"], *more}])
         library = None if model.library is None else open_library(checked, model.profile)
         batches = BatchLibrary(checked, model.profile, model.batch_library.threads)
-        model.take(checked, library, batches)
+        take_over(model, checked, library, batches)
+
+
+def take_over(
+    model: "Model", checked: CheckedFolder, library: CDLL | None, batch_library: BatchLibrary
+) -> None:
+    """Let a model have this code, at once: no thread sees parts of the code before."""
+    vars(model).update(
+        checked=checked,
+        folder=checked.folder,
+        manifest=checked.manifest,
+        library=library,
+        batch_library=batch_library,
+        kernels=CompiledFunctions(model, checked, library, batch_library),
+        generated=generated_functions(checked.manifest),
+    )
+    vars(model).pop("stepping", None)  # it is made anew

@@ -1,5 +1,7 @@
 """Methods of a model that are more than one compiled function."""
 
+from ctypes import CDLL
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -15,7 +17,8 @@ from .functions import Array, ModelFunctions
 from .growth import Grow, grown
 from .kernel import Kernel
 from .lazy import lazy_property
-from .memory import Out, filled
+from .library import BatchLibrary
+from .manifest import CheckedFolder
 from .state_space import jacobians, q_dot, split
 
 if TYPE_CHECKING:
@@ -27,11 +30,16 @@ class ModelMethods(ModelFunctions):
     """All methods that evaluate a model."""
 
     name: str
-    manifest: dict[str, Any]
     layout: Layout
     fixed: bool
-    generated: tuple[str, ...]  # names of all functions, also of those that only C calls
     grow: Grow | None
+    # the code, of which growth makes another one
+    checked: CheckedFolder
+    folder: Path
+    manifest: dict[str, Any]
+    library: CDLL | None
+    batch_library: BatchLibrary
+    generated: tuple[str, ...]  # names of all functions, also of those that only C calls
 
     # names of the methods in Pinocchio; aba is below
     crba = ModelFunctions.mass_matrix

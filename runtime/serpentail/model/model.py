@@ -16,8 +16,7 @@ from serpentail_scene.layout import Layout
 from ..basics.errors import SerpentailError
 from ..basics.extras import needed
 from ..compiling.cache import cache_folder
-from .compiled_functions import CompiledFunctions, generated_functions
-from .growth import Grow
+from .growth import Grow, take_over
 from .lazy import lazy_property
 from .library import BatchLibrary
 from .manifest import CheckedFolder, links_of, restored, snapshot
@@ -138,14 +137,6 @@ class Model(ModelMethods):
     (8,)
     """
 
-    checked: CheckedFolder
-    folder: Path
-    manifest: dict[str, Any]
-    library: ctypes.CDLL | None
-    batch_library: BatchLibrary
-    kernels: CompiledFunctions
-    generated: tuple[str, ...]
-
     def __init__(
         self,
         checked: CheckedFolder,
@@ -178,22 +169,7 @@ class Model(ModelMethods):
         # its compiled functions
         self.parameter_vector = np.array(flat(manifest, parameters), real_type(manifest))
         self.parameter_vector.setflags(write=False)  # with_parameters makes another model
-        self.take(checked, library, batch_library or BatchLibrary(checked, profile))
-
-    def take(
-        self, checked: CheckedFolder, library: ctypes.CDLL | None, batch_library: BatchLibrary
-    ) -> None:
-        """Take over generated code, at once: no thread sees parts of the code before."""
-        vars(self).update(
-            checked=checked,
-            folder=checked.folder,
-            manifest=checked.manifest,
-            library=library,
-            batch_library=batch_library,
-            kernels=CompiledFunctions(self, checked, library, batch_library),
-            generated=generated_functions(checked.manifest),
-        )
-        vars(self).pop("stepping", None)  # it is made anew
+        take_over(self, checked, library, batch_library or BatchLibrary(checked, profile))
 
     def __repr__(self) -> str:
         return f"<serpentail.Model {self.name}: {self.tail_words()}, nv = {self.nv}>"

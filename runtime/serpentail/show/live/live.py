@@ -87,7 +87,7 @@ def live(model: Model, *, host: str = "127.0.0.1", port: int = 8080) -> "Live":
     Parameters
     ----------
     model : Model
-        The model; it needs "tail_points".
+        The model; a loaded one needs "tail_points".
     host : str, default "127.0.0.1"
         Address to serve at; "0.0.0.0" lets other machines see the page.
     port : int, default 8080

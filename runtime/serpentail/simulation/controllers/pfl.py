@@ -30,7 +30,7 @@ class Pfl:
     Parameters
     ----------
     model : Model
-        The model; it needs the function "pfl", or "inverse_dynamics" and "mass_matrix".
+        The model; a loaded one needs the function "pfl", or "inverse_dynamics" and "mass_matrix".
     reference : Reference, Plan, Trajectory or (array_like, array_like)
         What the tail follows. The last is a pair of times (K,) (s) and tail coordinates (K, 2m)
         (rad). All except a Reference are interpolated by a cubic spline. After its end the last
