@@ -66,6 +66,7 @@ def timed_function(
     acceleration stay in the context, behind the workspace, which begins at a cache line. compiler:
     one of the peers'; by default that of users, with flags.
     """
+    model.need(function)
     entry, work = model.manifest["functions"][function], model.manifest["work"][function]
     work = -(-(work + 1) // 8) * 8
     names = [argument["name"] for argument in entry["inputs"]]
