@@ -8,19 +8,20 @@ from functools import lru_cache
 from typing import Any
 
 ONE, KILO = Fraction(1), Fraction(1000)
+POUND, INCH = Fraction("0.45359237"), Fraction("0.0254")
 CENTI, MILLI, MICRO = (Fraction(1, n) for n in (100, 1000, 10**6))
 DEGREE = Fraction(math.pi) / 180  # of the double pi, so that 30 deg are math.pi / 6
 # The unit of a field, powers without "^" -> what it measures, and what else may be written there:
 # how much of the field's unit each unit is.
 MEASURES: dict[str, tuple[str, dict[str, Fraction]]] = {
     "kg/m3": ("a density", {"kg/m3": ONE, "g/cm3": KILO}),
-    "kg": ("a mass", {"kg": ONE, "g": MILLI, "mg": MICRO}),
-    "m": ("a length", {"m": ONE, "cm": CENTI, "mm": MILLI, "um": MICRO}),
+    "kg": ("a mass", {"kg": ONE, "g": MILLI, "mg": MICRO, "lb": POUND, "oz": POUND / 16}),
+    "m": ("a length", {"m": ONE, "cm": CENTI, "mm": MILLI, "um": MICRO, "in": INCH}),
     "s": ("a time", {"s": ONE, "ms": MILLI, "us": MICRO}),
     "rad": ("an angle", {"rad": ONE, "deg": DEGREE}),
     "deg": ("an angle", {"deg": ONE, "rad": 1 / DEGREE}),
     "m/s": ("a speed", {"m/s": ONE, "cm/s": CENTI, "mm/s": MILLI, "km/h": KILO / 3600}),
-    "rad/s": ("a rate of turning", {"rad/s": ONE, "deg/s": DEGREE}),
+    "rad/s": ("a rate of turning", {"rad/s": ONE, "deg/s": DEGREE, "rpm": 6 * DEGREE}),
     "m/s2": ("an acceleration", {"m/s2": ONE, "cm/s2": CENTI, "mm/s2": MILLI}),
     "kg m2": (
         "a moment of inertia",
@@ -44,14 +45,14 @@ MEASURES: dict[str, tuple[str, dict[str, Fraction]]] = {
     ),
     "N/m": ("a stiffness", {"N/m": ONE, "kN/m": KILO, "N/mm": KILO}),
     "N/m1.5": ("a stiffness of contact", {"N/m1.5": ONE, "kN/m1.5": KILO}),
-    "1/s": ("a gain per time", {"1/s": ONE}),
+    "1/s": ("a gain per time or a rate", {"1/s": ONE, "Hz": ONE, "kHz": KILO}),
     "1/s2": ("a gain per time squared", {"1/s2": ONE}),
 }
 BASE = {"kg": (1, 0, 0), "m": (0, 1, 0), "s": (0, 0, 1), "N": (1, 1, -2)}  # angles have none
 DEEPEST = 4  # arrays in arrays that are looked into
 NUMBER = r"[+-]?(?:[0-9]{1,40}(?:\.[0-9]{0,40})?|\.[0-9]{1,40})(?:[eE][+-]?[0-9]{1,3})?"
 TEXT = re.compile(rf"\s*({NUMBER}(?:\s*,\s*{NUMBER})*)(?:\s*([^\W\d_].*)|\s+(1/.*))", re.DOTALL)
-SPELLINGS = {"^": "", "*": " ", "·": " ", "²": "2", "µ": "u", "μ": "u"}
+SPELLINGS = {"^": "", "Nm": "N m", "*": " ", "·": " ", "²": "2", "µ": "u", "μ": "u"}
 
 
 def in_unit(value: Any, unit: str | Sequence[str], depth: int = DEEPEST) -> Any:

@@ -43,6 +43,33 @@ def quaternion_rate(quaternion: Entries, omega: Entries) -> list[Any]:
     return [entry / 2 for entry in product(quaternion, [0, omega[0], omega[1], omega[2]])]
 
 
+def turned(quaternion: Array, turn: Array) -> Array:
+    """Return unit quaternions (..., 4) after turns (..., 3), rad, about body axes.
+
+    quaternion: of any norm but 0.
+    """
+    angle = np.linalg.norm(turn, axis=-1, keepdims=True)
+    step = np.concatenate([np.cos(angle / 2), turn / 2 * np.sinc(angle / TURN)], axis=-1)
+    largest = np.abs(quaternion).max(axis=-1, keepdims=True)  # whose square may be no number
+    entries = (np.moveaxis(each, -1, 0) for each in (quaternion / largest, step))
+    after = np.stack(product(*entries), axis=-1)
+    return after / np.linalg.norm(after, axis=-1, keepdims=True)
+
+
+def turn_between(a: Array, b: Array) -> Array:
+    """Return the shortest turns (..., 3), rad, about body axes that take attitudes a to b.
+
+    a, b: quaternions (..., 4) of any norm but 0.
+    """
+    a, b = (each / np.abs(each).max(axis=-1, keepdims=True) for each in (a, b))
+    entries = product(np.moveaxis(a * (1, -1, -1, -1), -1, 0), np.moveaxis(b, -1, 0))
+    between = np.stack(entries, axis=-1)
+    between = np.where(between[..., :1] < 0, -between, between)
+    size = np.linalg.norm(between[..., 1:], axis=-1, keepdims=True)
+    angle = 2 * np.arctan2(size, between[..., :1])
+    return angle * between[..., 1:] / np.where(size > 0, size, 1)
+
+
 def from_angles(angles: Array) -> Array:
     """Return quaternions (..., 4) of pitch, roll and yaw (..., 3), rad."""
     c, s = np.cos(angles / 2), np.sin(angles / 2)

@@ -66,8 +66,11 @@ def real_array(
     try:
         array = np.asarray(value)
     except Exception as reason:  # whatever the __array__ of a foreign type raises
+        told = (
+            "" if type(value).__module__ != "casadi.casadi" else ": take model.casadi for symbols"
+        )
         raise error(
-            f"{field}: type {type(value).__name__}: needs real numbers ({reason})"
+            f"{field}: type {type(value).__name__}: needs real numbers{told} ({reason})"
         ) from reason
     if np.ma.is_masked(value):
         raise error(
@@ -82,9 +85,11 @@ def real_array(
         return np.asarray(array, dtype, order="C")
 
 
-def finite_array(field: str, value: object, error: Error = StateError) -> NDArray[np.float64]:
-    """Return finite real numbers of any shape as a contiguous array."""
-    array = real_array(field, value, error)
+def finite_array(
+    field: str, value: object, error: Error = StateError, unit: str = ""
+) -> NDArray[np.float64]:
+    """Return finite real numbers of any shape as a contiguous array; texts are in the unit."""
+    array = real_array(field, measured(field, value, unit, error) if unit else value, error)
     refuse_not_finite(field, array, error)
     return array
 
@@ -103,13 +108,18 @@ def number(
     value: object,
     error: Error,
     *,
+    unit: str = "",
     above: float = -np.inf,
     least: float = -np.inf,
     most: float = np.inf,
 ) -> float:
-    """Return a finite number above one bound, not below another and not beyond the last."""
+    """Return a finite number above one bound, not below another and not beyond the last.
+
+    unit: that a text such as "20 ms" is converted to; none: texts are refused.
+    """
     if type(value) is float and above < value < np.inf and least <= value <= most:
         return value
+    value = measured(field, value, unit, error) if unit else value
     numbers, rule = numbers_in(value), NumberRule("", "", above, least, most)
     if numbers is None or numbers.shape != () or not satisfying(numbers, rule):
         raise refusal(field, value, f"a {_words('number', rule)}{_no_text(value)}", error)
@@ -134,12 +144,12 @@ def numbers(
     size: int,
     error: Error,
     *,
+    unit: str = "",
     least: float = -np.inf,
     most: float = np.inf,
 ) -> NDArray[np.float64]:
-    """Return finite numbers (size,) within bounds; a single one is repeated."""
-    if type(value) is float and least <= value <= most and abs(value) < np.inf:
-        return np.full(size, value)
+    """Return finite numbers (size,) within bounds, texts as ``number``; one alone is repeated."""
+    value = measured(field, value, unit, error) if unit else value
     numbers, rule = numbers_in(value), NumberRule("", least=least, most=most)
     shapes = ((), (size,))
     if numbers is None or numbers.shape not in shapes or not satisfying(numbers, rule).all():

@@ -105,8 +105,8 @@ def fisher_information(
         As of ``identify``.
     """
     check_model(model, estimate)
-    noise = number("noise", noise, IdentificationError, above=0)
-    rate = number("rate", rate, IdentificationError, above=0)
+    noise = number("noise", noise, IdentificationError, unit="m", above=0)
+    rate = number("rate", rate, IdentificationError, unit="1/s", above=0)
     if not isinstance(motion, Trajectory) or motion.q.shape[1] != model.nq or len(motion.t) < 2:
         raise refusal("motion", motion, "a Trajectory of this model", IdentificationError)
     placed = placements(model, markers)

@@ -202,7 +202,7 @@ def _noises_of(noise: Any, tracks: list[MarkerTracks]) -> list[np.ndarray]:
             f"noise: no value for {lacking[0]!r}: give one for each marker (m)"
         )
     row = [
-        number(f"noise.{name}", values[name], IdentificationError, above=0, most=1.0)
+        number(f"noise.{name}", values[name], IdentificationError, unit="m", above=0, most=1.0)
         for name in names
     ]
     return [np.broadcast_to(np.array(row), each.seen.shape) for each in tracks]

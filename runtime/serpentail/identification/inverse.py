@@ -102,7 +102,7 @@ def joint_torques(
     Torques contain second derivatives: their noise grows with the cutoff, and faster motion is
     lost.
     """
-    cutoff = number("cutoff", cutoff, IdentificationError, above=0)
+    cutoff = number("cutoff", cutoff, IdentificationError, unit="1/s", above=0)
     refuse_unlike(model, "joint_torques")
     placed = placements(model, markers)
     if not isinstance(tracks, MarkerTracks):

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from serpentail_scene.layout import OMEGA, PER_SEGMENT, QUATERNION, TAIL_Q, TAIL_V
 
 from ..basics.attitude import REST, Entries, from_angles, product, rotation_matrix
-from ..basics.checks import finite_array, number, numbers, refusal
+from ..basics.checks import finite_array, measured, number, numbers, refusal
 from ..basics.errors import IdentificationError
 from ..model.model import Model
 from ..model.polar import polar_to_bend
@@ -134,6 +134,7 @@ def _placed(name: str, marker: Any, ends: np.ndarray) -> tuple[int, float, np.nd
 
 def _three(field: str, value: Any) -> np.ndarray:
     """Return three numbers in m."""
+    value = measured(field, value, "m", IdentificationError)
     if np.shape(value) != (3,):
         raise refusal(field, value, "3 finite numbers (m)", IdentificationError)
     return numbers(field, value, 3, IdentificationError)

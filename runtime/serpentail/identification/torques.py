@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..basics.checks import finite_array, measured, number, refusal
+from ..basics.checks import finite_array, number, refusal
 from ..basics.errors import IdentificationError
 from ..motion.trajectory import Trajectory
 
@@ -43,7 +43,7 @@ def checked_prior(prior: TorquePrior) -> TorquePrior:
     error, values = IdentificationError, []
     for name, value, unit in (("std", prior.std, "N m"), ("time", prior.time, "s")):
         field = f"torques.{name}"
-        values.append(number(field, measured(field, value, unit, error), error, above=0))
+        values.append(number(field, value, error, unit=unit, above=0))
     return TorquePrior(*values)
 
 

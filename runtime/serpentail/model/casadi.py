@@ -22,6 +22,20 @@ if TYPE_CHECKING:
 INLINED = {"always_inline": True}
 
 
+class StateRate(casadi.Function):
+    """x_dot of x, u and p; without p, of the model's own parameters."""
+
+    def __init__(self, function: casadi.Function, parameters: casadi.DM):
+        super().__init__(function)
+        self.parameters = parameters
+
+    def __call__(self, *inputs: Any, **named: Any) -> Any:
+        """Evaluate, or make an expression."""
+        if named:
+            return super().__call__(**{"p": self.parameters} | named)
+        return super().__call__(*inputs, *[self.parameters] * (len(inputs) == 2))
+
+
 class CasadiFunctions:
     """A model's functions for CasADi; each attribute is a ``casadi.Function`` with its parameters.
 
@@ -66,13 +80,15 @@ class CasadiFunctions:
         return function
 
     @lazy_property
-    def x_dot(self) -> casadi.Function:
+    def x_dot(self) -> StateRate:
         """Time derivative of the state x = (q, v), as SX operations.
 
-        Inputs: x (nq + nv), u (2m) torques (N m), p parameters such as ``parameter_vector``. See
-        ``Model.x_dot``. ``external("x_dot")`` is the same function of the compiled C.
+        Inputs: x (nq + nv), u (2m) torques (N m), p parameters such as ``parameter_vector``; a
+        call without p takes the model's. See ``Model.x_dot``. ``external("x_dot")`` is the same
+        function of the compiled C.
         """
-        return self._x_dot(self.symbolic("forward_dynamics"), casadi.SX)
+        function = self._x_dot(self.symbolic("forward_dynamics"), casadi.SX)
+        return StateRate(function, self.parameter_vector)
 
     def _x_dot(self, forward_dynamics: casadi.Function, kind: Any) -> casadi.Function:
         """Return x_dot of a function of q, v, tau and parameters; SX or MX."""

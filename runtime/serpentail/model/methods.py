@@ -17,8 +17,7 @@ from .functions import Array, ModelFunctions
 from .growth import Grow, grown
 from .kernel import Kernel
 from .lazy import lazy_property
-from .library import BatchLibrary
-from .manifest import CheckedFolder
+from .state import parted
 from .state_space import jacobians, q_dot, split
 
 if TYPE_CHECKING:
@@ -161,18 +160,19 @@ class ModelMethods(ModelFunctions):
         return filled("x_dot_derivatives: out", out, found)
 
     def step(
-        self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, h: float, **settings: Any
+        self, q: Any, v: ArrayLike, tau: Any = None, h: float | str | None = None, **settings: Any
     ) -> tuple[Array, ...]:
         """Advance one state, or k states at once, under constant torques.
 
         Parameters
         ----------
         q, v : array_like, shapes (nq,) and (nv,), or (k, nq) and (k, nv)
-            States at the start.
+            States at the start. In their place one argument may be a ``State`` or a pair (q, v):
+            ``model.step(state, tau, h)``.
         tau : array_like, shape (2m,) or (k, 2m)
             Torques (N m), constant during the call; of all runs or of each.
-        h : float
-            Length of a step (s).
+        h : float or str
+            Length of a step (s), or text such as "1 ms".
         steps : int, default 1
             Number of steps in this call, at most 10,000.
         out : sequence of ndarray, optional
@@ -217,6 +217,8 @@ class ModelMethods(ModelFunctions):
         """
         from .stepping.step import step
 
+        if h is None:  # step(state, tau, h)
+            ((q, v), _), tau, h = parted(cast("Model", self), q), v, tau
         return step(cast("Model", self), (q, v, tau), h, settings)
 
     @lazy_property

@@ -31,6 +31,7 @@ from .parameters import (
     resolve,
     warn_of_parameters,
 )
+from .states import ModelStates
 
 if TYPE_CHECKING:
     from .casadi import CasadiFunctions
@@ -50,7 +51,7 @@ def _unpickled(
     return model_from(restored(manifest_hash, folder), parameters, grow, profile, *options)
 
 
-class Model(ModelMethods):
+class Model(ModelMethods, ModelStates):
     """Equations of motion of a body with a tail, compiled: H v_dot + C = [0; tau] + J^T f (Eq. 1).
 
     ``load`` and ``build`` make models. All quantities are in SI units and radians. The world's
@@ -76,8 +77,10 @@ class Model(ModelMethods):
         How many joints share the coordinates of each segment; 1 for an arc.
     fixed : bool
         Whether the base is fixed, so that only the tail moves.
-    nq, nv : int
-        Lengths of ``q`` and ``v``: 7 + 2m and 6 + 2m; on a fixed base both are 2m.
+    nq, nv, nu : int
+        Lengths of ``q``, ``v`` and ``tau``: 7 + 2m, 6 + 2m and 2m; on a fixed base all are 2m.
+    coordinates, velocities, torques : list of str
+        Names of their numbers, such as "z", "vz", "alpha_1", "alpha_1_dot" and "tau_alpha_1".
     contacts : dict
         Number of points that can touch the ground, for each group: "feet", "tail", "torso".
     parameters : mapping

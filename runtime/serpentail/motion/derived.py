@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 T = TypeVar("T")
 
 LATER = "later"  # attribute of a motion that holds the function deriving its fields
-AGAIN = "again"  # that of a run: the function that makes it again, less exactly
+AGAIN = "again"  # that of a run: what makes it again
 # the name of a field -> this field and related ones, by name
 Later = Callable[[str], dict[str, Any]]
 

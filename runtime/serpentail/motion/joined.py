@@ -1,11 +1,12 @@
 """Joins motions that follow each other to one."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from ..basics.attitude import Array
 from .trajectory import ARRAYS, Trajectory
 
 COUNTS = ("steps", "rejected", "evaluations", "factorisations", "unfelt", "seconds", "cpu_seconds")
@@ -31,12 +32,29 @@ def joined(parts: Sequence[Trajectory]) -> Trajectory:
     return replace(parts[0], **arrays, info=_info([part.info for part in parts]), contact=contact)
 
 
-def joined_again(repeats: Sequence[Any], coarse: int) -> Trajectory:
-    """Return motions made again by their functions, each from the end of the one before, as one."""
-    parts: list[Trajectory] = []
-    for again in repeats:
-        parts.append(again(coarse, *parts[-1:]))
-    return joined(parts)
+@dataclass(frozen=True, eq=False)
+class JoinedAgain:
+    """What makes each of some joined motions again, when it ended (s), and the sizes of q and v."""
+
+    repeats: Sequence[Any]
+    ends: Sequence[float]
+    sizes: tuple[int, int]
+
+    def coarser(self, coarse: int) -> Trajectory:
+        """Return the motions made again, each from the end of the one before, as one."""
+        parts: list[Trajectory] = []
+        for again in self.repeats:
+            parts.append(again.coarser(coarse, *parts[-1:]))
+        return joined(parts)
+
+    def at(self, times: Array) -> tuple[Array, Array]:
+        """Return q (n, nq) and v (n, nv) at times (n,); where two motions meet, of the earlier."""
+        whose = np.searchsorted(self.ends[:-1], times)
+        q, v = (np.empty((len(times), size)) for size in self.sizes)
+        for k in set(whose.tolist()):
+            of_part = whose == k
+            q[of_part], v[of_part] = self.repeats[k].at(times[of_part])
+        return q, v
 
 
 def _end_to_end(arrays: Sequence[np.ndarray]) -> np.ndarray:

@@ -1,6 +1,7 @@
 """Interpolates motions between their samples."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,6 +66,12 @@ def hermite_q(rows: Interpolation, q: Array, v: Array, layout: Layout) -> Array:
     result = rows.hermite(positions, rates)
     result[:, QUATERNION] /= np.linalg.norm(result[:, QUATERNION], axis=1, keepdims=True)
     return result
+
+
+def states_between(motion: Any, times: Array) -> tuple[Array, Array]:
+    """Configurations and velocities of a trajectory at times inside its span."""
+    q = hermite_q(Interpolation.at(times, motion.t), motion.q, motion.v, motion.layout)
+    return q, (monotone if motion.contact else smooth)(motion.t, motion.v, times)
 
 
 def smooth(t: Array, values: Array, times: Array) -> Array:

@@ -116,7 +116,7 @@ def _made_again(motion: Trajectory) -> list[Trajectory] | str:
     motions: list[Trajectory] = []
     for coarse in range(COARSE):
         try:
-            motions.append(again(coarse))
+            motions.append(again.coarser(coarse))
         except SimulationError as error:
             if not motions:
                 return f"errors: no estimate: made less exactly, the run fails: {error}"

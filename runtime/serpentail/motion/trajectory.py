@@ -17,17 +17,18 @@ from ..basics.attitude import Array, pose_of
 from ..basics.checks import needed
 from ..model.model import Model
 from . import archive
+from .asked import Asked
 from .contact import Contact
 from .derived import Derived, Later, made, settled
 from .methods import Exports, Showable
 from .plausibility import doubts, warnings_of
-from .resample import Interpolation, hermite_q, inside, monotone, smooth
+from .resample import Interpolation, inside, monotone, states_between
 from .text import short_text
 from .validation import check_time, check_unit, json_text, layout_of, real, shapes
 
 
 @dataclass(frozen=True, eq=False)
-class Trajectory(Exports, Showable):
+class Trajectory(Asked, Exports, Showable):
     """A sampled motion: states, torques, energies and momenta at K times.
 
     ``simulate`` and ``plan`` make trajectories; the constructor checks arrays of other origin.
@@ -259,8 +260,7 @@ class Trajectory(Exports, Showable):
         cubics: dict[str, Any] = {
             name: monotone(self.t, getattr(self, name), times) for name in MONOTONE
         }
-        cubics["v"] = (monotone if self.contact else smooth)(self.t, self.v, times)
-        q = hermite_q(rows, self.q, self.v, self.layout)
+        q, cubics["v"] = states_between(self, times)
         contact = self.contact.mapped(rows.linear) if self.contact else None
         return dataclasses.replace(
             self, t=times, q=q, tau=rows.linear(self.tau), contact=contact, **cubics

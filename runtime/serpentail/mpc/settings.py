@@ -48,20 +48,22 @@ def checked_settings(model: Model, plan: Plan, given: dict[str, Any]) -> MpcSett
     _refuse_path(plan, given["ignore_path"])
     bounds = given["bounds"]
     bounds = plan.problem.bounds if bounds is None else checked_bounds(model, bounds)
-    rate = _number("rate", given["rate"], above=0)
+    rate = _number("rate", given["rate"], "1/s", above=0)
     if rate * plan.duration > MOST_TICKS:
         needs = f"at most {MOST_TICKS / plan.duration:.3g} Hz: {MOST_TICKS} ticks"
         raise refusal("Mpc: rate", rate, needs, PlanningError)
-    delay = _number("delay", given["delay"], least=0)
+    delay = _number("delay", given["delay"], "s", least=0)
     if delay > 1 / rate:
         needs = f"at most the time between ticks, {1 / rate:.3g} s: or take a lower rate"
         raise refusal("Mpc: delay", delay, needs, PlanningError)
-    horizon = np.inf if given["horizon"] is None else _number("horizon", given["horizon"], above=0)
-    rest = 1 / rate if given["rest"] is None else _number("rest", given["rest"], least=0)
+    horizon = np.inf
+    if given["horizon"] is not None:
+        horizon = _number("horizon", given["horizon"], "s", above=0)
+    rest = 1 / rate if given["rest"] is None else _number("rest", given["rest"], "s", least=0)
     if rest + delay >= plan.duration:
         needs = f"to be less than the plan's {plan.duration:.4g} s, together with the delay"
         raise refusal("Mpc: rest", rest, needs, PlanningError)
-    step = _number("step", given["step"], above=0)
+    step = _number("step", given["step"], "s", above=0)
     intervals = _count("intervals", given["intervals"])
     if max(min(horizon, plan.duration) / intervals, delay) / step > MOST_STEPS:
         needs = f"at most {MOST_STEPS} steps in an interval: make it longer"
@@ -89,8 +91,8 @@ def _refuse_path(plan: Plan, ignored: Any) -> None:
         )
 
 
-def _number(name: str, value: Any, **bounds: float) -> float:
-    return float(number(f"Mpc: {name}", value, PlanningError, **bounds))
+def _number(name: str, value: Any, unit: str, **bounds: float) -> float:
+    return float(number(f"Mpc: {name}", value, PlanningError, unit=unit, **bounds))
 
 
 def _count(name: str, value: Any) -> int:

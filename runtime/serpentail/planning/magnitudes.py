@@ -8,7 +8,7 @@ import numpy as np
 
 from serpentail_scene.layout import PER_SEGMENT
 
-from ..basics.checks import measured, number, numbers, shown
+from ..basics.checks import number, numbers, shown
 from ..basics.errors import PlanningError, UnusualSize
 from ..basics.plausible_values import warn_of_unusual
 from ..model.model import Model
@@ -34,8 +34,7 @@ def checked_duration(model: Model, duration: Any) -> tuple[float, float]:
         raise PlanningError(
             f"duration: value {shown(duration)}: needs one number, or (least, most), in s"
         )
-    pair = [measured("duration", value, "s", PlanningError) for value in pair]
-    least, most = (number("duration", value, PlanningError, above=0) for value in pair)
+    least, most = (number("duration", value, PlanningError, unit="s", above=0) for value in pair)
     if most < least:
         raise PlanningError(f"duration: value {shown(duration)}: needs least <= most, in s")
     height = model.parameters["gravity"] * most * most / 2  # which may overflow
@@ -79,8 +78,7 @@ def _bound(name: str, value: Any, tail: int) -> np.ndarray | None:
     """Return a bound of every tail coordinate; None for no bound."""
     if value is None:
         return None
-    plain = measured(f"bounds.{name}", value, UNITS[name], PlanningError)
-    magnitudes = numbers(f"bounds.{name}", plain, tail, PlanningError, most=HUGE)
+    magnitudes = numbers(f"bounds.{name}", value, tail, PlanningError, unit=UNITS[name], most=HUGE)
     if not (magnitudes > 0).all():
         raise PlanningError(f"bounds.{name}: value {shown(value)}: needs magnitudes above 0")
     return magnitudes

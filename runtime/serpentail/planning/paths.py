@@ -36,7 +36,7 @@ def checked_path(path: Any) -> tuple[PathConstraint, ...]:
 
 def checked_clearance(value: Any) -> float | None:
     """Return a clearance (m), or None."""
-    return None if value is None else number("clearance", value, PlanningError, least=0)
+    return None if value is None else number("clearance", value, PlanningError, unit="m", least=0)
 
 
 def clear_of_ground(

@@ -14,6 +14,7 @@ from ..basics.errors import PlanningError
 from ..basics.short_repr import brief
 from ..model.model import Model
 from ..model.passive import behind_stops
+from ..model.state import State
 from ..simulation.controllers.schedules import Legs
 from .design import Design, checked_design
 from .free_start import Range, checked_free_start, moved_inside, within_bounds
@@ -121,8 +122,9 @@ def _unit_quaternion(field: str, quaternion: np.ndarray) -> np.ndarray:
 
 
 def _start(model: Model, start: Any) -> tuple[np.ndarray, np.ndarray]:
+    start = tuple(start) if isinstance(start, State) else start
     if not isinstance(start, tuple | list) or len(start) != 2:
-        raise PlanningError(f"start: value {shown(start)}: needs (q0, v0), two arrays")
+        raise PlanningError(f"start: value {shown(start)}: needs (q0, v0), two arrays, or a state")
     q0, v0 = _vector("start[0]", start[0], model.nq), _vector("start[1]", start[1], model.nv)
     q0[QUATERNION] = _unit_quaternion("start[0][3:7]", q0[QUATERNION])
     return q0, v0
@@ -219,7 +221,7 @@ def _legs(legs: Any) -> Legs | None:
 
 def _work(name: str) -> Callable[[Any], float]:
     """Return the check of a damping."""
-    return partial(number, name, error=PlanningError, least=0, most=HUGE)
+    return partial(number, name, error=PlanningError, unit="N m s", least=0, most=HUGE)
 
 
 SETTINGS: dict[str, Callable[[Any], Any]] = {  # of the problem, and their checks

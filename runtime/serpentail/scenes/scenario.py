@@ -1,6 +1,6 @@
 """``Scenario``: a motion to simulate, as a scene describes it."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, overload
 
 import numpy as np
@@ -17,6 +17,9 @@ from ..simulation.controllers.controller import Controller
 from ..simulation.controllers.schedules import Legs
 from ..simulation.rollouts import Rollouts
 from ..simulation.simulate import simulate
+from .simulate_keys import NUMBERS
+
+OF_PHASES = ("method", *NUMBERS)  # settings of all phases
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +67,8 @@ class Scenario:
         ----------
         **changes
             Arguments of ``serpentail.simulate`` that replace the scene's. With parameters of many
-            runs the result is Rollouts. A scene with phases allows no changes here.
+            runs the result is Rollouts. A scene with phases allows changes of the method and its
+            settings, such as ``output_step="0.1 ms"``; others need ``changes`` of ``scenario``.
 
         Returns
         -------
@@ -74,15 +78,16 @@ class Scenario:
         Raises
         ------
         SimulationError
-            The scene has phases and changes are given, or as of ``serpentail.simulate``.
+            The scene has phases, which have what is changed, or as of ``serpentail.simulate``.
         StateError, ModelError, PlanningError
             As of ``serpentail.simulate`` and ``Sequence.simulate``.
         """
         if self.phases:
             for name in changes:
-                remedy = "change the scene's values, see ``scenario``"
-                raise SimulationError(f"{name}: this scene has phases: {remedy}")
-            return self.sequence().trajectory
+                if name not in OF_PHASES:
+                    remedy = 'give st.scenario changes such as {"phase.0.duration": 0.5}'
+                    raise SimulationError(f"{name}: this scene has phases: {remedy}")
+            return replace(self, settings=self.settings | changes).sequence().trajectory
         arguments = {"controller": self.controller, "t_span": self.duration} | self.settings
         if self.legs is not None:
             arguments["legs"] = self.legs

@@ -6,13 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from serpentail_scene.layout import OMEGA, VELOCITY
-
-from ..basics.attitude import from_angles
 from ..basics.checks import (
     Refusals,
     did_you_mean,
-    finite_array,
     number,
     one_of,
     refusal,
@@ -20,15 +16,16 @@ from ..basics.checks import (
 )
 from ..basics.errors import SimulationError
 from ..model.model import Model
-from ..simulation.controllers.schedules import Reference, shared_among_links
+from ..model.state import State, state_of
+from ..simulation.controllers.schedules import Reference
 from ..simulation.methods import SETTINGS
-from ..simulation.settle import check_settling, settle
+from ..simulation.settle import check_settling, refuse_moving, settle
 from .controllers import controller_of, legs_of, reference_of
 from .file import model_of, read_scene, size_of, subtable, values_of
 from .overrides import changed
 from .phases import phases_of, refuse_beside_phases
 from .scenario import Scenario
-from .simulate_keys import ANGLES, NUMBERS, SIMULATE
+from .simulate_keys import NUMBERS, SIMULATE
 
 
 def scenario(
@@ -44,7 +41,8 @@ def scenario(
         Generated folder of its model. Default: the model is built, or taken from the cache.
     changes : mapping, optional
         New values by name: of the model's parameters; of keys of [simulate], such as "duration",
-        "start.pitch" or "legs.moves.0.rate"; of phases, such as "phase.0.duration".
+        "start.pitch", "simulate.output_step" or "legs.moves.0.rate"; of phases, such as
+        "phase.0.duration".
 
     Returns
     -------
@@ -64,12 +62,15 @@ def scenario(
     >>> kick = st.scenario("kick", changes={"duration": 0.5})  # doctest: +SKIP
     >>> print(kick.summary(kick.simulate()))  # doctest: +SKIP
     """
+    if isinstance(folder, Mapping):
+        raise refusal("folder", folder, "a path: give changes={...} by name", SimulationError)
     scene, path = read_scene(path, SimulationError)
     table = subtable(scene, "simulate", path, SimulationError)
 
     # a change is of a key below [simulate], of a phase, or of a parameter
     parts: dict[str, dict[str, Any]] = {"simulate": {}, "phase": {}, "parameters": {}}
-    for name, value in (changes or {}).items():
+    for given, value in (changes or {}).items():
+        name = given.removeprefix("simulate.")
         first = name.split(".")[0]
         part = "simulate" if first in SIMULATE.keys else "parameters"
         parts["phase" if first == "phase" else part][name] = value
@@ -131,9 +132,10 @@ def scenario_of(model: Model, table: Mapping, parent: Path, phases: Any = ()) ->
         # actuation while a start settles
         acting = {name: value for name, value in settings.items() if name != "output_step"}
         acting |= {"controller": controller} | ({} if legs is None else {"legs": legs})
-        q0, v0, settings["bristles0"] = settle(model, state[0], **acting | dict(start["settle"]))
-        state = q0, v0
-    return Scenario(model, *state, duration, controller, legs, settings, checked_phases)
+        q0, v0, settings["bristles0"] = settle(model, state, **acting | dict(start["settle"]))
+    else:
+        q0, v0 = (array.copy() for array in state)
+    return Scenario(model, q0, v0, duration, controller, legs, settings, checked_phases)
 
 
 def _settings(table: Mapping[str, Any], refused: Refusals) -> dict[str, Any]:
@@ -151,49 +153,16 @@ def _positive(field: str, value: Any) -> float:
     return number(field, value, SimulationError, above=0)
 
 
-def start_of(model: Model, table: Mapping, reference: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return q0 and v0 of a table [simulate.start], before the model settles.
+def start_of(model: Model, table: Mapping, reference: Any) -> State:
+    """Return the state of a table [simulate.start], before the model settles.
 
     The tail has the given bends, else those of the reference at t = 0, else none.
     """
-    tail, curve = np.zeros(model.layout.nt), getattr(reference, "curve", None)
-    if "bends" in table:
-        bends = finite_array("simulate.start.bends", table["bends"], SimulationError)
-        tail = shared_among_links(model, bends[None])[0]
-    elif curve is not None:
-        tail = curve.at(0.0)[0]
-    if model.fixed:
-        of_torso = [f"simulate.start.{name}" for name in table if name != "bends"]
-        if of_torso:
-            raise SimulationError(
-                f"{of_torso[0]}: this scene has a fixed base, whose start has `bends` alone: "
-                'remove it, or set base = "free"'
-            )
-        return tail, np.zeros(model.nv)
-
-    # R = Rz(yaw) Rx(pitch) Ry(roll)
-    height, *angles = (
-        number(f"simulate.start.{name}", table.get(name, 0.0), SimulationError)
-        for name in ("height", *ANGLES)
-    )
-    q = np.concatenate([[0, 0, height], from_angles(np.array(angles)), tail])
-    v = np.zeros(model.nv)
-    for name, part in (("velocity", VELOCITY), ("rate", OMEGA)):
-        if name in table:
-            v[part] = _three(f"simulate.start.{name}", table[name])
+    curve = getattr(reference, "curve", None)
+    tail = None if curve is None else curve.at(0.0)[0]
+    words = {name: value for name, value in table.items() if name != "settle"}
+    state = state_of(model, words, "simulate.start", SimulationError, tail)
     if "settle" in table:
         check_settling(model, **table["settle"])
-        if v.any():
-            raise SimulationError(
-                "simulate.start.settle: a start that settles has no velocity and no rate: remove "
-                "them"
-            )
-    return q, v
-
-
-def _three(field: str, value: Any) -> np.ndarray:
-    """Return three numbers."""
-    array = finite_array(field, value, SimulationError)
-    if array.shape != (3,):
-        raise refusal(field, value, "three numbers", SimulationError)
-    return array
+        refuse_moving("simulate.start.settle", state)
+    return state

@@ -2,6 +2,7 @@
 
 from serpentail_scene.keys import Key, one_word
 
+from ..model.state import START as WORDS
 from ..simulation.controllers.schedules import BLENDS, MOVE
 from ..simulation.methods import SETTINGS
 
@@ -10,20 +11,12 @@ RATE, PURE, FLAG = Key("rad/s"), Key("1"), Key(form={"type": "boolean"})
 TIMES, BENDS = Key("s", depth=1), Key("rad", depth=3)
 DAMPING = Key("N m s", depth=1)
 WHOLE = Key(form={"type": "integer", "minimum": 1})
-ANGLES = ("pitch", "roll", "yaw")
 # settings of all methods, each once
 NUMBERS = (*dict.fromkeys(name for names in SETTINGS.values() for name in names), "output_step")
 SETTING = {name: SECONDS if name.endswith("step") else PURE for name in NUMBERS}
 
-START = {
-    "height": METRES,
-    **dict.fromkeys(ANGLES, ANGLE),
-    "bends": BENDS,
-    "velocity": Key("m/s", depth=1),
-    "rate": Key("rad/s", depth=1),
-    "settle": Key(keys={"rounds": WHOLE, "duration": SECONDS}),
-}
-MOVES = dict.fromkeys(MOVE, ANGLE) | {"at": SECONDS, "duration": SECONDS, "rate": RATE}
+START = WORDS | {"settle": Key(keys={"rounds": WHOLE, "duration": SECONDS})}
+MOVES = {name: Key(unit) for name, unit in MOVE.items()}
 LEGS = {
     "gamma": Key("rad", depth=2),
     "delta": Key("rad", depth=2),

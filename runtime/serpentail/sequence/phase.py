@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..basics.checks import number, one_of, refusal
+from ..basics.checks import measured, number, one_of, refusal
 from ..basics.errors import SimulationError
 from ..basics.short_repr import brief
 from ..model.model import Model
@@ -54,8 +54,11 @@ class Tracking:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        for name in ("kp", "kd", "early"):
-            number(f"Tracking: {name}", getattr(self, name), SimulationError, least=0)
+        for name, unit in (("kp", "1/s2"), ("kd", "1/s"), ("early", "s")):
+            value = number(
+                f"Tracking: {name}", getattr(self, name), SimulationError, unit=unit, least=0
+            )
+            object.__setattr__(self, name, value)
         if not isinstance(self.mpc, Mapping | None):
             needs = "a mapping of st.Mpc's settings, or None"
             raise refusal("Tracking: mpc", self.mpc, needs, SimulationError)
@@ -116,9 +119,11 @@ class Phase:
         if not isinstance(self.name, str) or not self.name.strip():
             raise refusal("Phase: name", self.name, "a word", SimulationError)
         where = f"phase {self.name!r}"
-        number(f"{where}: duration", self.duration, SimulationError, above=0)
+        duration = number(f"{where}: duration", self.duration, SimulationError, unit="s", above=0)
+        object.__setattr__(self, "duration", duration)
         object.__setattr__(self, "until", _until(where, self.until))
-        number(f"{where}: clearance", self.clearance, SimulationError, least=0)
+        clear = number(f"{where}: clearance", self.clearance, SimulationError, unit="m", least=0)
+        object.__setattr__(self, "clearance", clear)
         if self.clearance and self.until != AIRBORNE:
             remedy = f"it belongs to until = {AIRBORNE!r}: add that, or leave it out"
             raise SimulationError(f"{where}: clearance: value {self.clearance}: {remedy}")
@@ -158,9 +163,8 @@ def _moves(where: str, moves: Any, planned: bool) -> tuple[Mapping[str, float], 
     """Return moves whose keys are known; of their numbers ``Legs.moves`` takes care."""
     if isinstance(moves, str | Mapping) or not isinstance(moves, Iterable):
         raise refusal(f"{where}: moves", moves, "an array of tables", SimulationError)
-    listed = tuple(moves)
-    keys = (*MOVE, BEFORE) if planned else MOVE
-    for k, move in enumerate(listed):
+    keys, listed = MOVE | ({BEFORE: "s"} if planned else {}), []
+    for k, move in enumerate(moves):
         if not isinstance(move, Mapping):
             raise refusal(f"{where}: moves[{k}]", move, "a table", SimulationError)
         for key in move:
@@ -168,7 +172,13 @@ def _moves(where: str, moves: Any, planned: bool) -> tuple[Mapping[str, float], 
         if ("at" in move) == (BEFORE in move):
             needs = f"at or {BEFORE}, not both" if planned else "at"
             raise refusal(f"{where}: moves[{k}]", dict(move), needs, SimulationError)
-    return listed
+        listed.append(
+            {
+                key: measured(f"{where}: moves[{k}].{key}", value, keys[key], SimulationError)
+                for key, value in move.items()
+            }
+        )
+    return tuple(listed)
 
 
 def _plans(where: str, plan: Any) -> tuple[Mapping[str, Any], ...]:

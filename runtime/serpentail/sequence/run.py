@@ -2,12 +2,11 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 from ..basics.short_repr import brief
 from ..motion.derived import AGAIN
-from ..motion.joined import joined, joined_again
+from ..motion.joined import JoinedAgain, joined
 from ..motion.trajectory import Trajectory
 from ..planning.result.plan import Plan
 from .phase import Phase
@@ -78,7 +77,9 @@ def whole(parts: list[Trajectory], runs: list[PhaseRun], phases: Iterable[Phase]
     motion = replace(motion, info=motion.info | outcomes)
     repeats = [vars(part).get(AGAIN) for part in parts]
     if all(repeats):
-        vars(motion)[AGAIN] = partial(joined_again, repeats)
+        vars(motion)[AGAIN] = JoinedAgain(
+            repeats, [run.end for run in runs], (motion.q.shape[1], motion.v.shape[1])
+        )
     return motion
 
 

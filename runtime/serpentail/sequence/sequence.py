@@ -13,6 +13,7 @@ from ..basics.checks import number, refusal
 from ..basics.errors import PlanningError, SimulationError
 from ..basics.short_repr import brief
 from ..model.model import Model
+from ..model.state import State, parted
 from ..motion.trajectory import Trajectory
 from ..simulation.controllers.controller import Controller, Phases, parts_of
 from ..simulation.controllers.schedules import Legs
@@ -88,7 +89,8 @@ class Sequence:
         object.__setattr__(self, "phases", phases)
         for name, angle in (("gamma", self.gamma), ("delta", self.delta)):
             if "feet" in self.model.contacts:
-                number(f"Sequence: {name}", angle, SimulationError)
+                plain = number(f"Sequence: {name}", angle, SimulationError, unit="rad")
+                object.__setattr__(self, name, plain)
             elif angle is not None:
                 raise SimulationError(
                     f"Sequence: {name}: {self.model.name} has no legs: leave it out"
@@ -97,7 +99,10 @@ class Sequence:
             _check_phase(self.model, phase)
 
     def simulate(
-        self, q0: ArrayLike, v0: ArrayLike, bristles0: ArrayLike | None = None
+        self,
+        q0: ArrayLike | State,
+        v0: ArrayLike | None = None,
+        bristles0: ArrayLike | None = None,
     ) -> SequenceRun:
         """Make the motion from a start.
 
@@ -106,10 +111,8 @@ class Sequence:
 
         Parameters
         ----------
-        q0 : array_like, shape (nq,)
-            Configuration.
-        v0 : array_like, shape (nv,)
-            Velocity.
+        q0, v0 : array_like, shapes (nq,) and (nv,)
+            State at the start; or one argument, as of ``simulate``.
         bristles0 : array_like, shape (points, 2), optional
             As of ``simulate``.
 
@@ -126,7 +129,8 @@ class Sequence:
         StateError, ModelError, ExtraMissing
             As of ``simulate`` and ``plan``.
         """
-        start = PhaseStart(0.0, np.asarray(q0, float), np.asarray(v0, float), bristles0)
+        q, v = (np.asarray(part, float) for part in parted(self.model, q0, v0)[0])
+        start = PhaseStart(0.0, q, v, bristles0)
         parts: list[Trajectory] = []
         runs: list[PhaseRun] = []
         moves: list[dict[str, float]] = []

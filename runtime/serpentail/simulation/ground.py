@@ -164,7 +164,7 @@ def _bristles(groups: dict[str, int], start: Start, bristles: ArrayLike | None) 
     shape = (sum(groups.values()), 2)
     if bristles is None:
         return np.zeros((start.runs, *shape))
-    stretch = finite_array("bristles0", bristles, SimulationError)
+    stretch = finite_array("bristles0", bristles, SimulationError, "m")
     if stretch.shape != shape and not (start.many and stretch.shape == (start.runs, *shape)):
         raise SimulationError(f"bristles0 has shape {stretch.shape}: give {shape}, in m")
     return np.array(np.broadcast_to(stretch, (start.runs, *shape)), order="C")

@@ -72,7 +72,10 @@ def checked_method(
         raise SimulationError(
             f"{name} has no setting {', '.join(map(repr, unknown))}; it has {has}"
         )
-    checked = {key: number(key, value, SimulationError, above=0) for key, value in settings.items()}
+    checked = {
+        key: number(key, value, SimulationError, unit="s" if key.endswith("step") else "", above=0)
+        for key, value in settings.items()
+    }
     if "rtol" in checked:
         least = MIN_ROUNDINGS * np.finfo(np.float32 if single and name not in SCIPY else float).eps
         if checked["rtol"] < least:

@@ -30,7 +30,12 @@ from .records import Records
 from .runs.single import RunSet
 from .start import EPS, MOST_STEPS, Start, refuse_endless
 
-DURATIONS = ("duration", "t_end", "tf", "span", "T", "time")  # what others call t_span
+# what others call settings of ours, and what these are
+T_SPAN = dict.fromkeys(("duration", "t_end", "tf", "span", "T", "time"), "the duration is t_span=")
+ELSEWHERE = T_SPAN | {
+    "dt": "samples are output_step= apart, steps of rk4 and implicit_euler are step= long",
+    "t_eval": "samples are output_step= apart; motion.at(times) gives the states at any times",
+}
 
 
 def prepared(
@@ -109,8 +114,9 @@ def refuse_misplaced(model: Model, settings: dict[str, Any]) -> None:
         if key in model.parameters:
             given = f"model.with_parameters({key}={shown(value)})"
             raise SimulationError(f"{key}: is a parameter of the model: simulate {given}")
-        if key in DURATIONS:
-            raise SimulationError(f"{key}: is no setting: the duration is t_span={shown(value)}")
+        if key in ELSEWHERE:
+            given = shown(value) if key in T_SPAN else ""
+            raise SimulationError(f"{key}: is no setting: {ELSEWHERE[key]}{given}")
 
 
 def refuse_vanishing(start: Start, name: str, step: float) -> None:

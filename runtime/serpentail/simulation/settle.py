@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from ..basics.checks import number, refusal
 from ..basics.errors import SimulationError, StateError
 from ..model.model import Model
+from ..model.state import State
 from ..motion.trajectory import Trajectory
 from .controllers.controller import Controller
 from .simulate import simulate
@@ -17,12 +18,12 @@ from .simulate import simulate
 
 def settle(
     model: Model,
-    q0: ArrayLike,
+    q0: ArrayLike | State,
     *,
     rounds: int = 1,
-    duration: float = 1.5,
+    duration: float | str = 1.5,
     controller: Controller = None,
-    at: float = 0.0,
+    at: float | str = 0.0,
     **settings: Any,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Simulate a model on the ground until it is at rest; return that state.
@@ -31,16 +32,16 @@ def settle(
     ----------
     model : Model
         A model with contacts.
-    q0 : array_like, shape (nq,)
+    q0 : array_like, shape (nq,), or State
         Configuration at the start, without velocity.
     rounds : int, default 1
         Number of runs. All velocities are set to zero after each run, so many short runs damp
         the motion faster.
-    duration : float, default 1.5
+    duration : float or str, default 1.5
         Duration of a run (s).
     controller : controller or callable, optional
         As of ``simulate``.
-    at : float, default 0
+    at : float or str, default 0
         Time (s) at which the later motion begins. Controller and legs act as before this time,
         where schedules hold their first values.
     **settings
@@ -65,11 +66,15 @@ def settle(
         The base is fixed, or the scene left a function out.
     """
     model.refuse_fixed("settle")
+    if isinstance(q0, State):
+        refuse_moving("q0", q0)
+        q0 = q0.q
     if np.ndim(q0) != 1:
         raise StateError(
             f"q0 has shape {np.shape(q0)}, not ({model.nq},): settle one start state after another"
         )
-    check_settling(model, rounds, duration)
+    duration = check_settling(model, rounds, duration)
+    at = number("at", at, SimulationError, unit="s")
     q, v = np.asarray(q0), np.zeros(model.nv)
     bristles = settings.pop("bristles0", None)
     span: dict[str, Any] = {"output_step": duration, "t_span": (at - duration, at)}
@@ -80,12 +85,21 @@ def settle(
     return q, v, bristles
 
 
-def check_settling(model: Model, rounds: object = 1, duration: object = 1.5) -> None:
-    """SimulationError if a model cannot settle, or a number is wrong."""
-    number("duration", duration, SimulationError, above=0)
+def check_settling(model: Model, rounds: object = 1, duration: object = 1.5) -> float:
+    """Return the duration (s); SimulationError if a model cannot settle, or a number is wrong."""
+    seconds = number("duration", duration, SimulationError, unit="s", above=0)
     if isinstance(rounds, bool) or not isinstance(rounds, int) or rounds < 1:
         raise refusal("rounds", rounds, "a whole number from 1", SimulationError)
     if not model.contacts:
         raise SimulationError(
             f"{model.name} has no contacts, so it cannot settle: add `contacts` to its scene"
+        )
+    return seconds
+
+
+def refuse_moving(field: str, start: State) -> None:
+    """SimulationError for a start that settles and has a velocity."""
+    if start.v.any():
+        raise SimulationError(
+            f"{field}: a start that settles has no velocity, no spin and no bend_rate: remove them"
         )

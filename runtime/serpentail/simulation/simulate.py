@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,33 +11,29 @@ from numpy.typing import ArrayLike
 
 from ..basics.errors import SimulationError
 from ..basics.plausible_values import warn_of_degrees
-from ..basics.progress import Stage
 from ..compiling.threads import checked_threads
 from ..model.model import Model
+from ..model.state import SPAN, State, parted
 from ..motion.derived import AGAIN
 from ..motion.trajectory import Trajectory
-from .callback import Watch, Watched, checked_watch
-from .controllers.actuation import RunActuations
+from .again import RunAgain
+from .callback import checked_watch
 from .controllers.controller import Controller, remembers
 from .energies import trajectory_or_error
-from .ground import GroundSettings
-from .methods import SCIPY, IntegrationMethod
 from .prepare import prepared
-from .records import Records
 from .rollouts import Rollouts
 from .runs.batch import run_batch
-from .runs.outcomes import Samples
-from .runs.single import CompiledRun, RunSet
+from .runs.go import integrate
 from .start import Start
 
 
 def simulate(
     model: Model,
-    q0: ArrayLike,
-    v0: ArrayLike,
+    q0: ArrayLike | State,
+    v0: ArrayLike | None = None,
+    t_span: Any = SPAN,
     *,
     controller: Controller = None,
-    t_span: ArrayLike = (0.0, 1.0),
     method: str = "auto",
     **settings: Any,
 ) -> Trajectory | Rollouts:
@@ -53,15 +48,17 @@ def simulate(
         The model; its scene needs the functions "rollout", "energy" and "momentum".
     q0, v0 : array_like, shapes (nq,) and (nv,)
         State at the start; the quaternion is normalised. With a leading axis, (k, nq) or
-        (k, nv), they are k starts; see Notes.
+        (k, nv), they are k starts; see Notes. In their place one argument may be a ``State``, a
+        pair (q, v), or the nq + nv numbers of both: ``simulate(model, state, "0.4 s")``.
+    t_span : float, str or a pair of these, default (0, 1)
+        Start and end (s), or the end alone. This and all settings with a unit may be texts, such
+        as "0.4 s" or "20 ms".
     controller : controller or callable, optional
         Torques of the tail: ``Damping``, ``TorqueTable``, ``TorqueCurve``, ``Pfl``, ``Gains``,
         ``Mpc``, ``NativeTorque``, ``Sampled``, ``Phases`` of these, or a function
         ``(t, q, v) -> tau`` with t (s) and tau (2m,) (N m). It must depend on (t, q, v) alone: it
         is called several times a step, also at earlier times. ``Sampled`` is for functions with a
         memory. Default: no torque.
-    t_span : float or (float, float), default (0, 1)
-        Start and end (s), or the end alone.
     method : str, default "auto"
         "tsit5" or "ros34pw2": adaptive, in C; "switching": the first in flight, the second while
         a point touches the ground; "dp8": adaptive, of order 8, in C, without contacts; "rk4" or
@@ -155,8 +152,11 @@ def simulate(
     >>> law = st.Damping(1e-4)
     >>> motion = st.simulate(model, q0, v0, controller=law, t_span=0.4)  # doctest: +SKIP
     """
-    model.need("rollout", "energy", "momentum")
-    start = Start.checked(model, (q0, v0), t_span, settings.pop("output_step", None))
+    missing = [name for name in ("rollout", "energy", "momentum") if name not in model.generated]
+    if missing:
+        raise model.without(*missing)
+    state, t_span = parted(model, q0, v0, t_span)
+    start = Start.checked(model, state, t_span, settings.pop("output_step", None))
     watch = checked_watch(settings.pop("watch", None), start.many)
     threads = _threads(model, start, settings.pop("threads", None))
     runs = prepared(model, start, controller, method, settings)
@@ -168,34 +168,8 @@ def simulate(
     info = samples.info | runs.method.info | spent(clocks)
     motion = trajectory_or_error(model, replace(samples, info=info), runs.ground)
     if not remembers(controller):
-        vars(motion)[AGAIN] = partial(_again, start, runs.ground, controller, runs.method)
+        vars(motion)[AGAIN] = RunAgain(start, runs.ground, controller, runs.method)
     return motion
-
-
-def _again(
-    start: Start,
-    ground: GroundSettings,
-    controller: Controller,
-    method: IntegrationMethod,
-    coarse: int,
-    last: Trajectory | None = None,
-) -> Trajectory:
-    """Return a run made again, less exactly; of a sequence from the end of the last part.
-
-    SimulationError if it fails, or the last part ends too late.
-    """
-    model = start.model
-    if last is not None:
-        start = replace(start, q0=last.q[-1:], v0=last.v[-1:], start=float(last.t[-1]))
-        if last.contact is not None:
-            ground = replace(ground, bristles=last.contact.bristles[-1:])
-        if start.start >= start.end:
-            raise SimulationError(f"at t = {start.start:.6g} s a phase ends after the next one")
-    actuations = RunActuations(Records(model), controller, start, ground.leg_curve)
-    method = method.coarser(coarse, start.interval)
-    parameters = model.parameters_of_runs(None, 1)
-    samples = integrate(RunSet(actuations, start, ground, parameters, method))
-    return trajectory_or_error(model, replace(samples, info=samples.info | method.info), ground)
 
 
 def _doubt(start: Start) -> None:
@@ -244,27 +218,3 @@ def end_state(
     if samples.failure is not None:
         raise samples.failure
     return samples.q[-1], samples.v[-1]
-
-
-def integrate(runs: RunSet, watch: Watch | None = None) -> Samples:
-    """Return the samples of a single run; a function may watch them."""
-    run = CompiledRun(runs)
-    watched = None if watch is None else Watched(watch, runs.model, runs.ground)
-    with Stage("simulate", runs.model.name) as stage:
-        if runs.method.name in SCIPY:
-            from .runs.scipy_methods import integrate_by_scipy
-
-            samples = integrate_by_scipy(run, watched)
-        else:
-            samples = run.samples(run.go(look=partial(_look, run, stage, watched)))
-    if watched is not None:
-        watched.end(samples)
-    return samples
-
-
-def _look(run: CompiledRun, stage: Stage, watched: Watched | None) -> None:
-    """Report the progress of a run in C, and its new samples."""
-    done = run.record.done
-    stage.tell(done / len(run.runs.start.times))
-    if watched is not None:
-        watched.look(done, lambda first: run.runs.part(run.k, first, done))

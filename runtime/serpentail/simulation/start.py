@@ -2,7 +2,7 @@
 
 import math
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -50,9 +50,8 @@ class Start:
         q0, v0, many = checked_starts(model, state)
         # the grid of output times, the end among them
         start, end = checked_span(t_span)
-        if output_step is None:
-            output_step = (end - start) / (INTERVALS_OF_MANY if many else INTERVALS)
-        step = number("output_step", output_step, SimulationError, above=0)
+        output_step = (end - start) / 200 if output_step is None else output_step
+        step = number("output_step", output_step, SimulationError, unit="s", above=0)
         if len(q0) * (end - start) > MOST_SAMPLES * step:
             remedy = f"give {len(q0) * (end - start) / MOST_SAMPLES:.2g} s or more"
             whose = f" of {len(q0)} runs" if many else ""
@@ -85,12 +84,18 @@ class Start:
         times[-1] = self.end
         return times
 
+    def sampled_at(self, times: np.ndarray) -> "Start":
+        """Return the start of the same runs, with outputs at other times; first and last are."""
+        other = replace(self, intervals=len(times) - 1)
+        vars(other)["times"] = times
+        return other
+
 
 def checked_span(t_span: ArrayLike) -> tuple[float, float]:
     """Return start and end (s); SimulationError if they are wrong."""
     if type(t_span) is float and 0 < t_span < math.inf:
         return 0.0, t_span
-    span = finite_array("t_span", t_span, SimulationError)
+    span = finite_array("t_span", t_span, SimulationError, "s")
     if span.shape not in ((), (2,)):
         raise refusal("t_span", t_span, "(start, end) in s, or the end", SimulationError)
     start, end = span.tolist() if span.ndim else (0.0, float(span))

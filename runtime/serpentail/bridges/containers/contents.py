@@ -12,22 +12,15 @@ from serpentail_scene.layout import Layout
 
 from ...basics.attitude import Array
 from ...model.model import Model
+from ...model.names import Names
 from ...motion.contact import Contact
 from ...motion.trajectory import Trajectory
 from ...simulation.rollouts import Rollouts
 
 NAME = re.compile("[A-Za-z_][A-Za-z0-9_]*")
-# units by the names of numbers
-TORSO_Q = dict.fromkeys(("x", "y", "z"), "m") | dict.fromkeys(("qw", "qx", "qy", "qz"), "1")
-TORSO_V = dict.fromkeys(("vx", "vy", "vz"), "m/s")
-TORSO_V |= dict.fromkeys(("omega_x", "omega_y", "omega_z"), "rad/s")
 AXES = ("x", "y", "z")
 LEGS = ("gamma_right", "delta_right", "gamma_left", "delta_left")
 FOOT = ("right_A", "right_M", "right_T", "left_A", "left_M", "left_T")
-# coordinates of a segment by its kind; of a motion without model by bend
-TAILS = {"articulated": ("alpha", "beta"), "continuum": ("a", "b")}
-POLAR = ("phi", "theta")
-WITHOUT_MODEL = ("pitch", "yaw")
 # dimensions, unit and meaning of the arrays of motions; None: each number has its own unit
 ARRAYS: dict[str, tuple[tuple[str, ...], str | None, str]] = {
     "q": (("coordinate",), None, "configuration"),
@@ -89,20 +82,15 @@ def contents(motion: Trajectory | Rollouts) -> Contents:
     # names of the numbers
     layout = Layout.of_width(motion.q.shape[-1])
     assert layout is not None
-    tail = joints(layout.segments, model)
-    torso_q, torso_v = ({}, {}) if layout.fixed else (TORSO_Q, TORSO_V)
-    labels["coordinate"] = [*torso_q, *tail]
-    labels["rate"] = [*torso_v, *(f"{name}_dot" for name in tail)]
-    labels |= {"axis": AXES} | ({"joint": tail} if tail else {})
+    names = Names.of(layout, model)
+    labels |= {"coordinate": [*names.q], "rate": [*names.v], "axis": AXES}
+    labels |= {"joint": [*names.tail]} if names.tail else {}
     groups = {} if contact is None else contact.groups
     if contact is not None:
         labels |= {"point": points(groups), "plane": AXES[:2]}
         labels |= {} if contact.legs is None else {"leg": LEGS}
 
-    own_units = {
-        "q": [*torso_q.values(), *["rad"] * len(tail)],
-        "v": [*torso_v.values(), *["rad/s"] * len(tail)],
-    }
+    own_units = {"q": [*names.q.values()], "v": [*names.v.values()]}
     quantities = {}
     for name, (dims, unit, words) in ARRAYS.items():
         if set(dims) <= labels.keys():
@@ -113,15 +101,6 @@ def contents(motion: Trajectory | Rollouts) -> Contents:
         quantities |= _of_runs(motion)
     each_group = [name for name, count in groups.items() for _ in range(count)]
     return Contents(leading, labels, each_group, quantities, facts(motion.info))
-
-
-def joints(segments: int, model: Model | None) -> list[str]:
-    """Return the names (2m,) of the tail coordinates, such as alpha_1, beta_1."""
-    pairs = [WITHOUT_MODEL] * segments
-    if model is not None:
-        polar = model.manifest["scene"]["coordinates"] == "polar"
-        pairs = [POLAR if polar else TAILS[kind] for kind in model.kinds]
-    return [f"{name}_{i + 1}" for i, pair in enumerate(pairs) for name in pair]
 
 
 def points(groups: Mapping[str, int]) -> list[str]:

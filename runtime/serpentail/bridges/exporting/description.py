@@ -123,13 +123,13 @@ def _states(model: Model) -> Iterator[FmuVariable]:
     for k, part in enumerate("wxyz", 4):
         meaning = f"attitude of the torso, {part} of a quaternion of any norm but 0"
         yield FmuVariable(f"q[{k}]", meaning, "1", 1.0 if part == "w" else 0.0)
-    for k, name in enumerate(_coordinates(model), 8):
+    for k, name in enumerate(model.names.tail, 8):
         yield FmuVariable(f"q[{k}]", name, "rad", 0.0)
     for k, axis in enumerate(AXES, 1):
         yield FmuVariable(f"v[{k}]", f"velocity of B, {axis} of the world", "m/s", 0.0)
     for k, axis in enumerate(AXES, 4):
         yield FmuVariable(f"v[{k}]", f"angular velocity, {axis} of the torso", "rad/s", 0.0)
-    for k, name in enumerate(_coordinates(model), 7):
+    for k, name in enumerate(model.names.tail, 7):
         yield FmuVariable(f"v[{k}]", f"rate of {name}", "rad/s", 0.0)
     for k in range(2 * sum(model.contacts.values())):
         meaning = (
@@ -150,19 +150,12 @@ def legs(model: Model) -> int:
 
 def _inputs(model: Model) -> Iterator[FmuVariable]:
     """Yield the torques, and the angles and rates of the legs."""
-    for k, name in enumerate(_coordinates(model), 1):
+    for k, name in enumerate(model.names.tail, 1):
         yield FmuVariable(f"tau[{k}]", f"torque on {name}", "N m", 0.0)
     for k in range(legs(model)):
         angle = f"{('gamma', 'delta')[k % 2]} of the {('right', 'left')[k % 4 // 2]} leg"
         meaning, unit = (angle, "rad") if k < 4 else (f"rate of {angle}", "rad/s")
         yield FmuVariable(f"legs[{k + 1}]", meaning, unit, 0.0)
-
-
-def _coordinates(model: Model) -> Iterator[str]:
-    """Yield the names of the tail coordinates."""
-    for segment, kind in enumerate(model.kinds, 1):
-        pair = ("alpha", "beta") if kind == "articulated" else ("a", "b")
-        yield from (f"{name}_{segment}" for name in pair)
 
 
 def _parameters(model: Model) -> Iterator[FmuVariable]:

@@ -46,6 +46,8 @@ def environment(model: Model, task: str, **settings: Any) -> "Environment":
         Largest angular velocity at the start (rad/s), of the tasks in the air.
     height : float
         Height of B at the start (m), of the tasks in the air. Default: 0.3 and 0.4.
+    start : State, optional
+        State in which every episode begins, in place of drawn ones.
 
     Returns
     -------

@@ -9,9 +9,10 @@ import numpy as np
 from serpentail_scene.layout import OMEGA, QUATERNION
 
 from ...basics.attitude import from_angles
-from ...basics.checks import measured, number, numbers_in, whole_number
-from ...basics.errors import ModelError, SimulationError
+from ...basics.checks import number, numbers_in, refusal, whole_number
+from ...basics.errors import ModelError, SimulationError, StateError
 from ...model.model import Model
+from ...model.state import parted
 
 Array = np.ndarray
 MOST_SUBSTEPS = 1000
@@ -43,7 +44,10 @@ class LearningTask:
                 f"{self.name}: {model.name} has contacts {has}: needs {needs}: build it with "
                 f"contacts={list(self.contacts)}, or change `contacts` of the scene"
             )
-        settings: dict[str, Any] = {"angle": float(np.pi / np.max(model.joints_each))}
+        settings: dict[str, Any] = {
+            "angle": float(np.pi / np.max(model.joints_each)),
+            "start": None,
+        }
         settings |= self.settings
         unknown = [name for name in given if name not in settings]
         if unknown:
@@ -52,23 +56,35 @@ class LearningTask:
                 f"{', '.join(settings)}"
             )
         for name, value in given.items():
-            unit = UNITS.get(name)
-            settings[name] = measured(name, value, unit, SimulationError) if unit else value
+            settings[name] = value
         for name in ("torque", "step", "duration", "angle"):
-            settings[name] = number(name, settings[name], SimulationError, above=0)
+            settings[name] = number(
+                name, settings[name], SimulationError, unit=UNITS[name], above=0
+            )
         for name, most in (("tilt", np.pi), ("spin", np.inf), ("height", np.inf)):
             if name in settings:
                 settings[name] = _up_to(name, settings[name], most)
+        if settings["start"] is not None:
+            parts = [np.shape(part) for part in parted(model, settings["start"])[0]]
+            if parts != [(model.nq,), (model.nv,)]:
+                raise refusal("start", settings["start"], "a state of this model", StateError)
         settings["substeps"] = whole_number(
             "substeps", settings["substeps"], SimulationError, least=1, most=MOST_SUBSTEPS
         )
         return settings
 
+    def starts(self, model: Model, settings: dict[str, Any], draws: Array) -> tuple[Array, Array]:
+        """Return states (k, nq), (k, nv) as drawn, or all at the start that was given."""
+        if settings["start"] is None:
+            return self.start(model, settings, draws)
+        (q, v), _ = parted(model, settings["start"])
+        return np.tile(q, (len(draws), 1)), np.tile(v, (len(draws), 1))
+
 
 def _up_to(name: str, value: Any, most: float) -> float:
     """Return a setting from 0 to the largest one; of an angle, the error names radians."""
     try:
-        return number(name, value, SimulationError, least=0, most=most)
+        return number(name, value, SimulationError, unit=UNITS[name], least=0, most=most)
     except SimulationError as error:
         angle = numbers_in(value)
         if UNITS[name] != "rad" or angle is None or angle.shape != ():

@@ -10,6 +10,7 @@ from typing import Any
 from ...basics.checks import none_of, number, one_of, refusal, shown
 from ...basics.errors import SweepError
 from ...model.model import Model
+from ...model.state import State
 from .axis import Grid, Spread, plain
 from .driver import Driver
 from .job import RUNS, STARTS, Job
@@ -62,7 +63,7 @@ def sweep(  # noqa: PLR0913 - the public face names all that it takes
         Seed of these points.
     settings : mapping, optional
         Further arguments of ``simulate``, ``plan`` or ``identify``. With a model they include
-        "q0" and "v0", or "data" (files of marker tracks) and "markers".
+        "q0" and "v0", or a ``State`` as "q0", or "data" (files of marker tracks) and "markers".
     outputs : sequence of str, optional
         Outputs of "simulate": "end_s", "q_end", "v_end", "kinetic_end_J", "potential_end_J"
         (together the default), or names of ``summary``. The outputs of "plan" and "identify" are
@@ -111,7 +112,7 @@ def sweep(  # noqa: PLR0913 - the public face names all that it takes
     rows = posed(
         model, over, run, store, points=points, seed=seed, settings=settings, outputs=outputs, of=of
     )
-    limit = None if limit is None else number("limit", limit, SweepError, above=0)
+    limit = None if limit is None else number("limit", limit, SweepError, unit="s", above=0)
     name = model.name if isinstance(model, Model) else Path(model or _function_name(run)).stem
     job = rows.posed.job.pickled()
     script = _script(job)
@@ -157,6 +158,8 @@ def _settings(settings: Any, run: Any) -> dict[str, Any]:
     for name in WITHOUT:
         if name in checked:
             raise SweepError(f"settings: {name}: is set by the sweep: leave it out")
+    if isinstance(checked.get("q0"), State):
+        checked |= dict(zip(STARTS, checked["q0"], strict=True))
     for name in STARTS:
         if name in checked:
             checked[name] = plain(f"settings: {name}", checked[name])

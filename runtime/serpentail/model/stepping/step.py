@@ -89,6 +89,8 @@ class StepSettings:
     @classmethod
     def named(cls, given: Mapping[str, Any]) -> StepSettings:
         """Return settings by their names; SimulationError for an unknown name."""
+        if "dt" in given:
+            raise SimulationError("step: dt: is no setting: the length of a step is h=")
         for name in given:
             if line := none_of("step: setting", name, list(cls.__dataclass_fields__)):
                 raise SimulationError(line)
@@ -103,9 +105,8 @@ def step(
 ) -> tuple[np.ndarray, ...]:
     """Return the states after the steps: see ``Model.step``."""
     asked = StepSettings.named(settings)
-    method = _method(model, asked.method)
-    stepping = model.stepping
-    length = number("step: h", h, SimulationError, above=0)
+    method, stepping = _method(model, asked.method), model.stepping
+    length = number("step: h", h, SimulationError, unit="s", above=0)
     steps = whole_number("step: steps", asked.steps, SimulationError, least=1, most=MOST_STEPS)
     threads = model.batch_library.threads
     if asked.threads is not None:

@@ -92,11 +92,13 @@ class Gains:
     ):
         self.plan, self.model = plan, _able(plan, model)
         most = MOST_TICKS / plan.duration
-        self.rate = number("Gains: rate", rate, PlanningError, above=0, most=most)
+        self.rate = number("Gains: rate", rate, PlanningError, unit="1/s", above=0, most=most)
         knots = whole_number("Gains: knots", knots, PlanningError, least=1, most=1000)
         self.within = within
         if within is not None:
-            self.within = number("Gains: within", within, PlanningError, above=0, most=180)
+            self.within = number(
+                "Gains: within", within, PlanningError, unit="deg", above=0, most=180
+            )
         self.flights = whole_number("Gains: flights", flights, PlanningError, least=1, most=10_000)
         self.seed = whole_number("Gains: seed", seed, PlanningError, least=0, most=2**63 - 1)
         made = tables_of(self.model, plan, 1 / self.rate, knots)

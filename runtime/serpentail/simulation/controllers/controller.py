@@ -73,7 +73,7 @@ class TorqueTable:
 
     def parts(self, nt: int) -> Parts:
         """Return its parts for 2m tail coordinates."""
-        nodes = checked_nodes("TorqueTable", "torques", (self.times, self.torques), nt)
+        nodes = checked_nodes("TorqueTable", "torques", (self.times, self.torques), nt, "N m")
         return Parts(_damping(self.damping, nt), linear(*nodes))
 
 
@@ -134,7 +134,7 @@ class Phases:
             needs = "pairs (time, controller)"
             raise refusal("Phases", self.phases, needs, SimulationError) from None
         begins = [begin for begin, _ in pairs]
-        times = finite_array("Phases: times", begins or 0.0, SimulationError)
+        times = finite_array("Phases: times", begins or 0.0, SimulationError, "s")
         if times.ndim != 1 or (np.diff(times) <= 0).any():
             needs = "one or more increasing times, in s"
             raise refusal("Phases: times", begins, needs, SimulationError)
@@ -217,4 +217,4 @@ def parts_of(controller: Controller, nt: int) -> Parts:
 
 def _damping(damping: float | tuple[float, ...], nt: int) -> np.ndarray:
     """Return joint damping (2m,), N m s."""
-    return numbers("damping", damping, nt, SimulationError, least=0)
+    return numbers("damping", damping, nt, SimulationError, unit="N m s", least=0)

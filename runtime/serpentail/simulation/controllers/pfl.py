@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from serpentail_scene.layout import TORSO_V
 
-from ...basics.checks import measured, number, numbers, refusal
+from ...basics.checks import number, numbers, refusal
 from ...basics.errors import SimulationError
 from ...model.model import Model
 from .parts import Parts
@@ -69,10 +69,11 @@ class Pfl:
     ):
         self.model = model
         needed = NEEDED[:1] if model.fixed else NEEDED
-        if not model.has("pfl"):
-            model.need(*needed)
-        self.kp = number("Pfl: kp", kp, SimulationError, least=0)
-        self.kd = number("Pfl: kd", kd, SimulationError, least=0)
+        missing = [name for name in needed if name not in model.generated]
+        if missing and "pfl" not in model.generated:
+            raise model.without(*missing)
+        self.kp = number("Pfl: kp", kp, SimulationError, unit="1/s2", least=0)
+        self.kd = number("Pfl: kd", kd, SimulationError, unit="1/s", least=0)
         self.curve = _curve(reference, model.layout.nt)
         self.feedforward = bool(feedforward)
         self.torque = None if torque is None else _limit(torque, model.layout.nt)
@@ -131,8 +132,7 @@ class Pfl:
 
 def _limit(torque: Any, size: int) -> np.ndarray:
     """Return the largest torques (2m,)."""
-    plain = measured("Pfl: torque", torque, "N m", SimulationError)
-    limit = numbers("Pfl: torque", plain, size, SimulationError)
+    limit = numbers("Pfl: torque", torque, size, SimulationError, unit="N m")
     if not (limit > 0).all():
         raise refusal("Pfl: torque", torque, "torques above 0, in N m", SimulationError)
     return limit

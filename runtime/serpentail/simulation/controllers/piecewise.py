@@ -122,11 +122,14 @@ def _horner(coefficients: np.ndarray, x: np.ndarray | float) -> np.ndarray:
 
 
 def checked_nodes(
-    what: str, name: str, nodes: tuple[ArrayLike, ArrayLike], width: int
+    what: str, name: str, nodes: tuple[ArrayLike, ArrayLike], width: int, unit: str = "rad"
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return increasing times (K,) and values (K, width); SimulationError names what is wrong."""
-    times = finite_array(f"{what}: times", nodes[0], SimulationError)
-    values = finite_array(f"{what}: {name}", nodes[1], SimulationError)
+    """Return increasing times (K,) and values (K, width); SimulationError names what is wrong.
+
+    unit: that texts among the values are converted to.
+    """
+    times = finite_array(f"{what}: times", nodes[0], SimulationError, "s")
+    values = finite_array(f"{what}: {name}", nodes[1], SimulationError, unit)
     if times.ndim != 1 or len(times) == 0 or values.shape != (len(times), width):
         shapes = f"times {times.shape} and {name} {values.shape}, not (K,) and (K, {width})"
         raise SimulationError(f"{what}: {shapes}")

@@ -63,8 +63,8 @@ class Sampled:
             needs = "a function (t, q, v) -> tau"
             raise refusal("Sampled: function", self.function, needs, SimulationError)
         checked = {
-            "rate": number("Sampled: rate", self.rate, SimulationError, above=0),
-            "delay": number("Sampled: delay", self.delay, SimulationError, least=0),
+            "rate": number("Sampled: rate", self.rate, SimulationError, unit="1/s", above=0),
+            "delay": number("Sampled: delay", self.delay, SimulationError, unit="s", least=0),
         }
         for name, value in checked.items():
             object.__setattr__(self, name, value)

@@ -15,6 +15,7 @@ from ...basics.errors import SimulationError
 from ...basics.plausible_values import warn_of_degrees
 from ...basics.short_repr import brief
 from ...model.model import Model
+from ...model.state import shared_among_links
 from .piecewise import Piecewise, blends, checked_nodes, linear, spline
 
 BLENDS = {"linear": linear, "quintic": blends, "spline": spline}
@@ -61,7 +62,7 @@ class Reference:
     def __post_init__(self) -> None:
         """Check the nodes."""
         one_of("Reference: blend", self.blend, BLENDS, SimulationError)
-        angles = finite_array("Reference: angles", self.angles, SimulationError)
+        angles = finite_array("Reference: angles", self.angles, SimulationError, "rad")
         width = angles.shape[1] if angles.ndim == 2 else 0
         nodes = checked_nodes("Reference", "angles", (self.times, angles), width)
         if len(nodes[0]) < 2:
@@ -100,22 +101,16 @@ class Reference:
         UnusualSize
             A bend is beyond a whole turn: degrees, most likely.
         """
-        checked = finite_array("bends", bends, SimulationError)
+        checked = finite_array("bends", bends, SimulationError, "rad")
         if model.manifest["scene"]["coordinates"] != "polar":
             warn_of_degrees("bends", checked, calls=2)
-        return cls(times, shared_among_links(model, checked), blend)
-
-
-def shared_among_links(model: Model, bends: np.ndarray) -> np.ndarray:
-    """Return tail coordinates (K, 2m) of bends of the segments, (K, m, 2) or (K, m), rad."""
-    m = model.segments
-    if bends.shape[1:] not in ((m,), (m, 2)):
-        raise SimulationError(
-            f"bends has shape {bends.shape}: give (times, {m}) or (times, {m}, 2): pitch, or pitch "
-            "and yaw, of each segment"
-        )
-    both = bends if bends.ndim == 3 else np.stack([bends, 0 * bends], axis=-1)
-    return both.reshape(len(bends), model.layout.nt) / np.repeat(model.joints_each, 2)
+        m = model.segments
+        if checked.shape[1:] not in ((m,), (m, 2)):
+            raise SimulationError(
+                f"bends has shape {checked.shape}: give (times, {m}) or (times, {m}, 2): pitch, or "
+                "pitch and yaw, of each segment"
+            )
+        return cls(times, shared_among_links(model, checked.reshape(len(checked), m, -1)), blend)
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +155,7 @@ class Legs:
 
     def __post_init__(self) -> None:
         """Check the nodes."""
-        times = np.atleast_1d(finite_array("Legs: times", self.times, SimulationError))
+        times = np.atleast_1d(finite_array("Legs: times", self.times, SimulationError, "s"))
         gamma, delta = (_both_legs(name, getattr(self, name), times) for name in ("gamma", "delta"))
         nodes = checked_nodes(
             "Legs", "angles", (times, np.stack([gamma, delta], axis=-1).reshape(len(times), 4)), 4
@@ -208,14 +203,15 @@ class Legs:
         SimulationError
             An argument is wrong.
         """
-        angles = finite_array("Legs.ramp: delta", delta, SimulationError)
+        angles = finite_array("Legs.ramp: delta", delta, SimulationError, "rad")
         if angles.shape != (2,) or angles[0] == angles[1]:
             raise refusal("Legs.ramp: delta", delta, "two angles that differ", SimulationError)
-        if number("Legs.ramp: rate", rate, SimulationError) == 0:
+        speed = number("Legs.ramp: rate", rate, SimulationError, unit="rad/s")
+        if speed == 0:
             raise refusal("Legs.ramp: rate", rate, "a number that is not 0", SimulationError)
-        number("Legs.ramp: gamma", gamma, SimulationError)
-        move = {"at": number("Legs.ramp: at", at, SimulationError), "delta": angles[1]}
-        return cls.moves(gamma, angles[0], [move | {"rate": math.fabs(rate)}])
+        gamma = number("Legs.ramp: gamma", gamma, SimulationError, unit="rad")
+        move = {"at": number("Legs.ramp: at", at, SimulationError, unit="s"), "delta": angles[1]}
+        return cls.moves(gamma, angles[0], [move | {"rate": math.fabs(speed)}])
 
     @classmethod
     def moves(cls, gamma: float, delta: float, moves: Iterable[Mapping[str, float]]) -> Self:
@@ -241,7 +237,8 @@ class Legs:
         """
         if isinstance(moves, str | Mapping) or not isinstance(moves, Iterable):
             raise refusal("legs.moves", moves, "an array of tables", SimulationError)
-        nodes: list[Node] = [(-math.inf, (gamma, delta))]
+        first = finite_array("legs", [gamma, delta], SimulationError, "rad").tolist()
+        nodes: list[Node] = [(-math.inf, (first[0], first[1]))]
         for index, move in enumerate(moves):
             nodes += _move(f"legs.moves[{index}]", move, nodes[-1])
         times, angles = zip(*(nodes[1:] or [(0.0, nodes[0][1])]), strict=True)
@@ -250,7 +247,7 @@ class Legs:
 
 def _both_legs(name: str, value: ArrayLike, times: np.ndarray) -> np.ndarray:
     """Return angles (K, 2)."""
-    angles = finite_array(f"Legs: {name}", value, SimulationError)
+    angles = finite_array(f"Legs: {name}", value, SimulationError, "rad")
     if angles.shape not in ((), (len(times),), (len(times), 2)):
         shapes = f"not a number, ({len(times)},) or ({len(times)}, 2)"
         raise SimulationError(f"Legs: {name} has shape {angles.shape}, {shapes}")
@@ -260,16 +257,19 @@ def _both_legs(name: str, value: ArrayLike, times: np.ndarray) -> np.ndarray:
 
 
 Node = tuple[float, tuple[float, float]]  # time (s), gamma and delta (rad)
-MOVE = ("at", "gamma", "delta", "duration", "rate")
+MOVE = {"at": "s", "gamma": "rad", "delta": "rad", "duration": "s", "rate": "rad/s"}  # units
 
 
 def _checked_move(field: str, move: object) -> Mapping[str, float]:
     """Return a move whose keys and numbers are complete; SimulationError otherwise."""
     if not isinstance(move, Mapping):
         raise refusal(field, move, f"a table of {', '.join(MOVE)}", SimulationError)
-    for name, value in move.items():
+    for name in move:
         one_of(f"{field}: key", name, MOVE, SimulationError)
-        number(f"{field}.{name}", value, SimulationError)
+    move = {
+        name: number(f"{field}.{name}", value, SimulationError, unit=MOVE[name])
+        for name, value in move.items()
+    }
     goes = "gamma" in move or "delta" in move
     if "at" not in move or not goes or ("rate" in move) == ("duration" in move):
         needs = "at, gamma or delta, and one of rate, duration"

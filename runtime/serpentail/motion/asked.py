@@ -1,0 +1,93 @@
+"""What a motion is asked for: its states at any time, numbers by name, and its summary."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..basics.attitude import Array
+from ..basics.checks import measured
+from ..model.model import Model
+from ..model.names import Names
+from ..model.state import State, named
+from .derived import AGAIN
+from .resample import inside, states_between
+from .validation import layout_of, real
+
+if TYPE_CHECKING:
+    from .summary import Summary
+
+
+class Asked:
+    """Answers of a trajectory. ``len(motion)`` is its number of samples."""
+
+    t: Array
+    q: Array
+    v: Array
+    contact: Any
+    model: Model | None
+
+    @property
+    def names(self) -> Names:
+        """Name and unit of each number of q, v and tau."""
+        return Names.of(layout_of(self.q), self.model)
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __getitem__(self, name: str) -> Array:
+        """Return the samples (K,) of a number of q, v or tau, such as ``motion["alpha_1"]``.
+
+        The names are those of ``Model.coordinates``, ``velocities`` and ``torques``. KeyError
+        suggests the nearest one.
+        """
+        return named(self, self.names, name, self.names.all())
+
+    @property
+    def end(self) -> State:
+        """The state at the last sample."""
+        return State(self.q[-1], self.v[-1], self.names)
+
+    def at(self, t: ArrayLike | str) -> State:
+        """Return the state at any time, or the states at many.
+
+        Parameters
+        ----------
+        t : float, str or array_like, shape (n,)
+            Times (s) within those of the motion, in any order.
+
+        Returns
+        -------
+        State
+            The state; of n times q (n, nq) and v (n, nv).
+
+        Raises
+        ------
+        ValueError
+            A time is outside; the message names the first one.
+
+        Notes
+        -----
+        What ``simulate`` or a sequence made is made again, with samples at these times: they come
+        from the same steps, by the polynomial of the method, and steps of a fixed length are cut
+        there. This takes as long as the motion did: ask for many times at once. Motions of
+        another origin (read, planned, of ``Rollouts``, or controlled by ``Sampled``) are
+        interpolated as by ``resample``.
+        """
+        given = real("t", measured("t", t, "s", ValueError))
+        times = inside(np.atleast_1d(given), self.t)
+        again = vars(self).get(AGAIN)
+        q, v = again.at(times) if again is not None else states_between(self, times)
+        return State(q, v, self.names) if given.ndim else State(q[0], v[0], self.names)
+
+    def summary(self, errors: bool = False) -> "Summary":
+        """Return the numbers of the motion by name, such as apex, landing, forces and work.
+
+        Arguments, result and errors are those of ``serpentail.summary``. ValueError is raised if
+        the motion has no model.
+        """
+        from .summary import summary
+
+        if self.model is None:
+            raise ValueError("summary: this motion has no model: use st.summary(model, motion)")
+        return summary(self.model, self, errors)  # type: ignore[arg-type]
