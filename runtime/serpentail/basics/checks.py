@@ -66,9 +66,8 @@ def real_array(
     try:
         array = np.asarray(value)
     except Exception as reason:  # whatever the __array__ of a foreign type raises
-        told = (
-            "" if type(value).__module__ != "casadi.casadi" else ": take model.casadi for symbols"
-        )
+        symbols = type(value).__module__ == "casadi.casadi"
+        told = ", or for symbols model.casadi" if symbols else ""
         raise error(
             f"{field}: type {type(value).__name__}: needs real numbers{told} ({reason})"
         ) from reason

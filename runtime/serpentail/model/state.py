@@ -166,6 +166,8 @@ def _numbers(model: Model, field: str, word: str, value: Any, error: type[Except
         return number(field, value, error, unit=unit)
     array = finite_array(field, value, error, unit=unit)
     if word in OF_TAIL:
+        if model.manifest["scene"]["coordinates"] == "polar":
+            raise error(f"{field}: is no polar coordinate: leave it out, and set q")
         m = model.segments
         if array.shape not in ((), (m,), (2 * m,), (m, 2)):
             needs = f"pitch and yaw of each segment, {2 * m} numbers; {m} pitches; or one pitch"
