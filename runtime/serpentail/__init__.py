@@ -7,6 +7,7 @@ __version__ = "0.2.0"
 _HOME = {
     "load": "model.load",
     "Model": "model.model",
+    "State": "model.state",
     "build": "building.build",
     "examples": "building.examples",
     **dict.fromkeys(["progress", "Progress"], "basics.progress"),

@@ -1,9 +1,12 @@
 """What springs, damping and stops of a tail ask for and store, from a model's parameters."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from .model import Model
 
 # tail coordinates (rad) that no motion reaches: stops there have no effect
 OUT_OF_REACH = 1e6
@@ -37,19 +40,20 @@ def stored_energy(values: Mapping[str, Any], angles: Any) -> Any:
     return energy.sum(axis=-1)
 
 
-def behind_stops(values: Mapping[str, Any], angles: Any) -> str:
+def behind_stops(model: "Model", angles: Any) -> str:
     """Return which tail coordinate of (k, 2m) is the furthest beyond a stop, by more than its
     width.
 
     The text is empty if there is none.
     """
+    values = model.parameters
     for (name, _), (way, _) in zip(ENDS, _ways(values, angles), strict=False):
         run, coordinate = np.unravel_index(way.argmax(), way.shape)
         if way[run, coordinate] > 1:
             stop = np.broadcast_to(_of(values, name), np.shape(angles))[run, coordinate]
             width = np.broadcast_to(_of(values, "tail_stop_width"), np.shape(angles))
             return (
-                f"tail coordinate {coordinate} is {angles[run, coordinate]:.6g} rad, behind "
+                f"{model.names.tail[coordinate]} is {angles[run, coordinate]:.6g} rad, behind "
                 f"{name} {stop:.6g} by more than tail_stop_width {width[run, coordinate]:.6g}"
             )
     return ""

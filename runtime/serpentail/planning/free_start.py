@@ -41,7 +41,7 @@ def checked_free_start(model: Model, value: Any) -> dict[str, Range]:
             raise PlanningError(unknown)
         ranges[name] = _range(name, pair, model.layout.nt if name.startswith("tail") else 3)
     for angles in ranges.get("tail", ()):
-        behind = behind_stops(model.parameters, angles[None])
+        behind = behind_stops(model, angles[None])
         if behind:
             raise PlanningError(
                 f"free_start.tail: {behind}: give one between the stops, or move them"

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from serpentail_scene.layout import QUATERNION, TAIL_Q, TAIL_V
+from serpentail_scene.layout import QUATERNION, TAIL_Q
 
 from ..basics.checks import Refusals, number, numbers_in, one_of, refusal, refuse_not_finite, shown
 from ..basics.errors import PlanningError
@@ -77,8 +77,8 @@ def checked_problem(
     if usual and start is not None and bounds is not None and goal is not None:
         bounds = _as_far_as(bounds, start[0][TAIL_Q], goal.tail, (free or {}).get("tail"))
     if start is not None and bounds is not None:
-        attempt("bounds.angle", _start_inside, start[0][TAIL_Q], bounds.angle, "angle", "rad")
-        attempt("bounds.rate", _start_inside, start[1][TAIL_V], bounds.rate, "rate", "rad/s")
+        attempt("bounds.angle", _start_inside, model, start[0], bounds.angle, "angle")
+        attempt("bounds.rate", _start_inside, model, start[1], bounds.rate, "rate")
     if start is not None:
         attempt("start", _between_stops, "start", model, start[0][TAIL_Q])
     if goal is not None and goal.tail is not None:
@@ -178,19 +178,22 @@ def _as_far_as(
     return replace(bounds, angle=np.max(np.abs([bounds.angle, *asked]), axis=0))
 
 
-def _start_inside(values: np.ndarray, bound: np.ndarray | None, name: str, unit: str) -> None:
+def _start_inside(model: Model, state: np.ndarray, bound: np.ndarray | None, name: str) -> None:
     if bound is None:
         return
+    values = state[-len(bound) :]
     k = int(np.argmax(np.abs(values) - bound))
     if abs(values[k]) > bound[k] + START_SLACK:
+        units = model.names.q if name == "angle" else model.names.v
+        entry, unit = [*units.items()][k - len(bound)]
         raise PlanningError(
-            f"bounds.{name}: the start's tail coordinate {k} has {values[k]:.6g} {unit}, beyond "
+            f"bounds.{name}: the start has {entry} = {values[k]:.6g} {unit}, beyond "
             f"{bound[k]:.6g}: widen the bound, or start inside it"
         )
 
 
 def _between_stops(name: str, model: Model, angles: np.ndarray) -> None:
-    behind = behind_stops(model.parameters, angles[None])
+    behind = behind_stops(model, angles[None])
     if behind:
         raise PlanningError(f"{name}: {behind}: give one between the stops, or move them")
 

@@ -125,7 +125,7 @@ class Energies:
             Between(allowance(info, eps), self._all),
         )
         warnings = warnings_of(books, info, eps)
-        behind = behind_stops(self.model.parameters, samples.q[:, self.model.layout.tail_q])
+        behind = behind_stops(self.model, samples.q[:, self.model.layout.tail_q])
         if behind:
             warnings.append(f"{behind}: make the stop stiffer, or its width larger")
         return info | books.info() | {"warnings": warnings}
