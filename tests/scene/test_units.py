@@ -29,8 +29,9 @@ SHIFTS = [
     *(("mN m/s", "N m/s", -3), ("kN/m", "N/m", 3), ("N/mm", "N/m", 3), ("kN/m^1.5", "N/m^1.5", 3)),
     *(("1/s", "1/s", 0), ("1/s2", "1/s^2", 0), ("deg", "deg", 0), ("rad", "rad", 0)),
     *(("rad/s", "rad/s", 0), ("kg cm2", "kg m^2", -4), ("N cm", "N m", -2)),
-    ("N cm/rad", "N m/rad", -2),
+    *(("N cm/rad", "N m/rad", -2), ("mNm", "N m", -3), ("Hz", "1/s", 0), ("kHz", "1/s", 3)),
 ]
+IMPERIAL = [("lb", "kg", "0.45359237"), ("16 oz", "kg", "0.45359237"), ("in", "m", "0.0254")]
 ANGLES = [("deg", "rad", 1), ("deg/s", "rad/s", 1), ("rad", "deg", -1), ("N m/deg", "N m/rad", -1)]
 NUMBERS = some.decimals(-(10**9), 10**9, places=9) | some.floats(
     -1e200, 1e200, allow_subnormal=False
@@ -122,3 +123,11 @@ def test_the_pattern_of_a_unit_is_what_its_texts_match():
                 assert not re.match(pattern(unit), f"1, 2 {name}")
                 assert not re.match(pattern(unit), "1")
                 in_unit([f"-1.5e-3 {name}", f" .5, 2 {name} "], unit)
+
+
+def test_units_of_other_systems_are_those_of_their_definitions():
+    for written, unit, expected in IMPERIAL:
+        with row(written):
+            count, name = written.split() if " " in written else ("1", written)
+            assert in_unit(f"{count} {name}", unit) == float(expected)
+    assert in_unit("60 rpm", "rad/s") == 2 * math.pi

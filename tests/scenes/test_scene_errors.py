@@ -50,7 +50,7 @@ LINES = [
     ("height", "velocity = [0, 0, 1]\nsettle = {}", "simulate.start.settle: .*velocity"),
     ("height", "rate = [0, 0, 1]\nsettle = {}", "simulate.start.settle: .*rate"),
     ("height", "height = 0.1\nsettle = { rounds = 0 }", "rounds: value 0"),
-    ("height", "height = 0.1\nbends = [0.1, 0.2]", r"bends has shape \(1, 2\)"),
+    ("height", "height = 0.1\nbends = [0.1, 0.2, 0.3]", r"bends: value .*needs pitch and yaw"),
     ("gamma", "", "simulate.legs: value .*gamma, delta"),
     ("delta", moves("1"), "legs.moves: value 1: .*tables"),
     ("delta", moves('"at"'), "legs.moves: value 'at': .*tables"),

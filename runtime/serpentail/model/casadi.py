@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 INLINED = {"always_inline": True}
 
 
-class StateRate(casadi.Function):
+class RateOfState(casadi.Function):
     """x_dot of x, u and p; without p, of the model's own parameters."""
 
     def __init__(self, function: casadi.Function, parameters: casadi.DM):
@@ -80,7 +80,7 @@ class CasadiFunctions:
         return function
 
     @lazy_property
-    def x_dot(self) -> StateRate:
+    def x_dot(self) -> RateOfState:
         """Time derivative of the state x = (q, v), as SX operations.
 
         Inputs: x (nq + nv), u (2m) torques (N m), p parameters such as ``parameter_vector``; a
@@ -88,7 +88,7 @@ class CasadiFunctions:
         function of the compiled C.
         """
         function = self._x_dot(self.symbolic("forward_dynamics"), casadi.SX)
-        return StateRate(function, self.parameter_vector)
+        return RateOfState(function, self.parameter_vector)
 
     def _x_dot(self, forward_dynamics: casadi.Function, kind: Any) -> casadi.Function:
         """Return x_dot of a function of q, v, tau and parameters; SX or MX."""

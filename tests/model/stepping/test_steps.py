@@ -196,7 +196,7 @@ ERRORS = dict.fromkeys(("h", "steps", "threads", "method", "stepz"), st.Simulati
 ERRORS |= {"parameters": st.ModelError}  # all others: StateError
 REFUSED = [
     *(("h", value, f"h: value {value}") for value in (0.0, -1e-3, np.nan, np.inf)),
-    ("h", "1 ms", "h: value '1 ms'"),
+    ("h", "1 m", "h: value '1 m': a length where a time"),
     *(("steps", value, f"steps: value {value}") for value in (0, 2.0, True, 10_001)),
     ("threads", 0, "threads: value 0"),
     ("method", "rk5", "method: value 'rk5': did you mean 'rk4'?"),
