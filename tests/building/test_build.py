@@ -95,7 +95,7 @@ def test_what_cannot_be_built_is_refused_by_name(cache, monkeypatch):
 
 def test_wrong_parameters_are_refused_before_anything_is_derived(cache):
     """In less than a second of processor time; the shortest derivation takes several."""
-    wrong, before = ("3 oz", -1, "3 kg cm2", "3 N cm", "3 N cm/rad"), os.times()
+    wrong, before = ("3 st", -1, "3 kg cm2", "3 N cm", "3 N cm/rad"), os.times()
     for value in wrong:
         words = f"tail_mass: value {value!r}: "
         with row(value), pytest.raises(st.ModelError, match=words) as caught:

@@ -48,7 +48,7 @@ PROBLEM = {
     "goal.tail: entry 0 is 0.9": {"goal": Goal(tail=(0.9, None)), "bounds": Bounds(angle=0.8)},
     "goal.tail_rate: entry 1 is -9": {"goal": Goal(tail_rate=(0, -9)), "bounds": Bounds(rate=8.0)},
     "bounds.torque: value '20 mm'": {"bounds": Bounds(torque="20 mm")},
-    "bounds.angle: .*coordinate 1 .* 0.001": {"bounds": Bounds(angle=1e-3)},
+    "bounds.angle: .*beta_1 .* 0.001": {"bounds": Bounds(angle=1e-3)},
     "bounds.rate: .*coordinate 0 has 5 rad/s, beyond 1": {
         "start": (start(rat())[0], 5 * np.eye(8)[6]),
         "bounds": Bounds(rate=1.0),
@@ -85,7 +85,7 @@ FREE = {
     "free_start: part: value 'tails': .*'tail'": {"tails": (0, 1)},
     "free_start.position: value .0, 0, 0, 0.": {"position": ((0, 0, 0, 0), 1)},
     "free_start.torso_rate: value inf": {"torso_rate": (0, INF)},
-    "bounds.angle: the start's tail coordinate 0": {"tail": (1.2, 1.3)},
+    "bounds.angle: the start has alpha_1 =": {"tail": (1.2, 1.3)},
 }
 SMALL, LARGE = (1e-5, 1e-5, 1e-5), (1e-5, 1e-5, 3e-5)
 DESIGN_VALUES = {"tail_length": 0.1, "tail_mass": (0.2, 0.1), "torso_mass": (0.2, 0.2)}
@@ -100,10 +100,10 @@ DESIGNS = {
     "link_radius and link_inertia": {"link_radius": (1, 2), "link_inertia": (SMALL, [2e-5] * 3)},
 }
 STOPS = {
-    r"start: tail coordinate 0 is 1\.": {"start": ([*np.eye(7)[3], 1.5, 0, 0, 0], np.zeros(10))},
-    r"goal\.tail: tail coordinate 1 is -1\.2": {"goal": Goal(tail=[0.0, -1.2, 0, 0])},
+    r"start: alpha_1 is 1\.": {"start": ([*np.eye(7)[3], 1.5, 0, 0, 0], np.zeros(10))},
+    r"goal\.tail: beta_1 is -1\.2": {"goal": Goal(tail=[0.0, -1.2, 0, 0])},
     "duration: value -1": {"goal": Goal(tail=[0.0, None, 0, 0]), "duration": -1},
-    "free_start.tail: tail coordinate 1": {"free_start": {"tail": (-1.5, 0.1)}},
+    "free_start.tail: beta_1": {"free_start": {"tail": (-1.5, 0.1)}},
     "design.tail_stop_lower": {"design": {"tail_stop_lower": (-1.0, -0.5)}},
 }
 
