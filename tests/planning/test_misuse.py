@@ -49,7 +49,7 @@ PROBLEM = {
     "goal.tail_rate: entry 1 is -9": {"goal": Goal(tail_rate=(0, -9)), "bounds": Bounds(rate=8.0)},
     "bounds.torque: value '20 mm'": {"bounds": Bounds(torque="20 mm")},
     "bounds.angle: .*beta_1 .* 0.001": {"bounds": Bounds(angle=1e-3)},
-    "bounds.rate: .*coordinate 0 has 5 rad/s, beyond 1": {
+    "bounds.rate: .*alpha_1_dot = 5 rad/s, beyond 1": {
         "start": (start(rat())[0], 5 * np.eye(8)[6]),
         "bounds": Bounds(rate=1.0),
     },
