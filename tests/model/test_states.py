@@ -115,7 +115,7 @@ def test_wrong_shapes_on_the_manifold_are_named():
         ((q, q, 1), r"v has shape \(11,\)"),
         ((0 * q, v, 1), "zero quaternion"),
         ((q, v, "1 m"), "dt: .*a length where a time"),
-        (([q] * 2, [v] * 3, 1), r"\(2, 11\) and \(3, 10\)"),
+        (([q] * 2, [v] * 3, 1), r"rows differ: .*2.*3"),
     ):
         with row(told), pytest.raises(st.StateError, match=told):
             model.integrate(*arguments)

@@ -85,10 +85,9 @@ class State:
 def named(whole: Any, names: Names, name: object, known: tuple[str, ...]) -> Any:
     """Return the numbers (...) of q, v or tau that have a name; KeyError with the nearest name."""
     place = names.place(name) if isinstance(name, str) and name in known else None
-    if isinstance(name, str) and place is None and name in vars(whole):
-        raise KeyError(f"name: value {name!r}: it is an attribute: take .{name}")
     if place is None:
-        raise KeyError(none_of("name", name, known))
+        own = f"name: value {name!r}: it is an attribute: take .{name}"
+        raise KeyError(own if name in vars(whole) else none_of("name", name, known))
     return getattr(whole, place[0])[..., place[1]]
 
 
@@ -140,10 +139,8 @@ def state_of(
         if same != name:
             raise error(f"{where}.{name}: beside {same}, which says the same: give one of them")
         if model.fixed and word not in OF_TAIL:
-            raise error(
-                f"{where}.{name}: this scene has a fixed base, whose state has `bend` and "
-                '`bend_rate` alone: remove it, or set base = "free"'
-            )
+            own = "this scene has a fixed base, whose state has `bend` and `bend_rate` alone"
+            raise error(f'{where}.{name}: {own}: remove it, or set base = "free"')
         given[word] = _numbers(model, f"{where}.{name}", word, value, error)
 
     q, v = np.zeros(model.nq), np.zeros(model.nv)

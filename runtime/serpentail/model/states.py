@@ -100,39 +100,26 @@ class ModelStates:
         return state_of(cast("Model", self), words)
 
     def neutral(self) -> State:
-        """Return the state at rest, upright and straight, with B at the origin.
-
-        Returns
-        -------
-        State
-            The state.
-        """
+        """Return the state at rest, upright and straight, with B at the origin."""
         return self.state()
 
-    def integrate(self, q: ArrayLike, v: ArrayLike, dt: ArrayLike) -> Array:
-        """Move a configuration with a constant velocity for a time.
+    def integrate(self, q: ArrayLike, v: ArrayLike, dt: ArrayLike | str) -> Array:
+        """Return configurations (..., nq), quaternions of norm 1, after a time at some velocities.
 
         Parameters
         ----------
         q, v : array_like, shapes (..., nq) and (..., nv)
-            Configurations and velocities; the angular velocity is constant in body axes.
+            Configurations, and velocities, whose angular part is constant in body axes.
         dt : float, str or array_like, shape (...)
             Time (s).
-
-        Returns
-        -------
-        ndarray, shape (..., nq)
-            Configurations, whose quaternions have norm 1.
 
         Raises
         ------
         StateError
-            A shape or a value is wrong.
+            A shape or a value is wrong, also of ``difference``.
         """
-        q, v = self._on_manifold("q", q, self.layout.nq), self._on_manifold("v", v, self.layout.nv)
-        moves = v * finite_array("dt", dt, unit="s")[..., None]
-        q, moves = _alike(q, moves)
-        after = q.copy()
+        q, v, dt = self._alike(q=q, v=v, dt=finite_array("dt", dt, unit="s")[..., None])
+        after, moves = q.copy(), v * dt
         after[..., self.layout.tail_q] += moves[..., self.layout.tail_v]
         if not self.layout.fixed:
             after[..., POSITION] += moves[..., VELOCITY]
@@ -140,30 +127,12 @@ class ModelStates:
         return after
 
     def difference(self, q: ArrayLike, q2: ArrayLike) -> Array:
-        """Compute the velocity that leads from one configuration to another in 1 s.
+        """Return the velocities (..., nv) that lead from configurations to others in 1 s.
 
         It is the inverse of ``integrate``: ``difference(q, integrate(q, v, dt))`` is ``v dt``, if
-        that turns the torso by less than half a turn.
-
-        Parameters
-        ----------
-        q, q2 : array_like, shape (..., nq)
-            Configurations.
-
-        Returns
-        -------
-        ndarray, shape (..., nv)
-            Differences of position (m, world), the shortest turn (rad, body axes), and differences
-            of the tail coordinates (rad).
-
-        Raises
-        ------
-        StateError
-            A shape or a value is wrong.
+        that turns the torso by less than half a turn; the turn is the shortest.
         """
-        first, last = _alike(
-            *(self._on_manifold(name, x, self.layout.nq) for name, x in (("q", q), ("q2", q2)))
-        )
+        first, last = self._alike(q=q, q2=q2)
         moves = np.zeros((*first.shape[:-1], self.layout.nv))
         moves[..., self.layout.tail_v] = (last - first)[..., self.layout.tail_q]
         if not self.layout.fixed:
@@ -171,28 +140,19 @@ class ModelStates:
             moves[..., OMEGA] = turn_between(first[..., QUATERNION], last[..., QUATERNION])
         return moves
 
-    def _on_manifold(self, name: str, value: ArrayLike, size: int) -> Array:
-        """Return finite numbers (..., size), no quaternion zero; StateError otherwise."""
-        array = finite_array(name, value)
-        if array.shape[-1:] != (size,):
-            raise StateError(
-                f"{name} has shape {array.shape}: needs {size} numbers, or rows of them"
-            )
-        if (
-            size == self.layout.nq
-            and not self.layout.fixed
-            and not array[..., QUATERNION].any(-1).all()
-        ):
-            raise StateError(f"{name}[3:7] is the zero quaternion: upright is (1, 0, 0, 0)")
-        return array
-
-
-def _alike(a: Array, b: Array) -> tuple[Array, Array]:
-    """Return arrays (..., n) and (..., k) of one batch shape."""
-    try:
-        batch = np.broadcast_shapes(a.shape[:-1], b.shape[:-1])
-    except ValueError:
-        raise StateError(
-            f"shapes {a.shape} and {b.shape} differ: give as many rows of both"
-        ) from None
-    return np.broadcast_to(a, (*batch, a.shape[-1])), np.broadcast_to(b, (*batch, b.shape[-1]))
+    def _alike(self, **values: ArrayLike) -> tuple[Array, ...]:
+        """Return finite arrays (..., size) of one batch shape, no quaternion zero."""
+        arrays = {name: finite_array(name, value) for name, value in values.items()}
+        for name, array in arrays.items():
+            size = {"v": self.layout.nv, "dt": 1}.get(name, self.layout.nq)
+            if array.shape[-1:] != (size,):
+                raise StateError(f"{name} has shape {array.shape}: needs {size} numbers, or rows")
+            rotates = name[0] == "q" and not self.layout.fixed
+            if rotates and not array[..., QUATERNION].any(-1).all():
+                raise StateError(f"{name}[3:7] is the zero quaternion: upright is (1, 0, 0, 0)")
+        shapes = {name: array.shape[:-1] for name, array in arrays.items()}
+        try:
+            batch = np.broadcast_shapes(*shapes.values())
+        except ValueError:
+            raise StateError(f"numbers of rows differ: {shapes}: give as many of each") from None
+        return tuple(np.broadcast_to(x, (*batch, x.shape[-1])) for x in arrays.values())

@@ -65,20 +65,13 @@ class LearningTask:
             if name in settings:
                 settings[name] = _up_to(name, settings[name], most)
         if settings["start"] is not None:
-            parts = [np.shape(part) for part in parted(model, settings["start"])[0]]
-            if parts != [(model.nq,), (model.nv,)]:
-                raise refusal("start", settings["start"], "a state of this model", StateError)
+            settings["start"], _ = parted(model, settings["start"])
+            if [np.shape(part) for part in settings["start"]] != [(model.nq,), (model.nv,)]:
+                raise refusal("start", given["start"], "a state of this model", StateError)
         settings["substeps"] = whole_number(
             "substeps", settings["substeps"], SimulationError, least=1, most=MOST_SUBSTEPS
         )
         return settings
-
-    def starts(self, model: Model, settings: dict[str, Any], draws: Array) -> tuple[Array, Array]:
-        """Return states (k, nq), (k, nv) as drawn, or all at the start that was given."""
-        if settings["start"] is None:
-            return self.start(model, settings, draws)
-        (q, v), _ = parted(model, settings["start"])
-        return np.tile(q, (len(draws), 1)), np.tile(v, (len(draws), 1))
 
 
 def _up_to(name: str, value: Any, most: float) -> float:

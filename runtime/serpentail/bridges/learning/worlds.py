@@ -27,7 +27,7 @@ class Worlds:
 
     def __init__(self, model: Model, task: LearningTask, count: int, settings: dict[str, Any]):
         self.model, self.task, self.settings = model, task, settings
-        self.q, self.v = task.starts(model, settings, np.zeros((count, DRAWS)))
+        self.q, self.v = task.start(model, settings, np.zeros((count, DRAWS)))
         self.q = self.q.astype(model.parameter_vector.dtype)
         self.v = self.v.astype(self.q.dtype)
         self.parts = [self.q, self.v]
@@ -50,7 +50,7 @@ class Worlds:
 
     def restart(self, which: Array, draws: Array) -> None:
         """Begin new episodes; draws (len(which), DRAWS) are from [0, 1)."""
-        q, v = self.task.starts(self.model, self.settings, draws)
+        q, v = self.settings["start"] or self.task.start(self.model, self.settings, draws)
         for part, start in zip(self.parts, (q, v, 0.0), strict=False):
             part[which] = start
         self.actions[which] = 0
