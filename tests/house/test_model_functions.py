@@ -70,10 +70,11 @@ def method(signature: Signature) -> str:
     """Return the text of one method."""
     names = [argument.name for argument in signature.inputs]
     typed = [f"{name}: ArrayLike" for name in names]
-    call = f'self.kernels["{signature.name}"].at({tuple_of(names)}, out)'
+    call = f'self.kernels["{signature.name}"]({", ".join(names)}, out=out)'
     if LEGS in signature.inputs:
         typed[-1] += " | None = None"
-        call = f'self.kernels.with_legs("{signature.name}", legs, {tuple_of(names[:-1])}, out)'
+        given = ", ".join(names[:-1])
+        call = f'self.kernels.with_legs("{signature.name}", legs, {given}, out=out)'
     typed += ["*", "out: Out = None"]
     results = ", ".join(["Array"] * len(signature.outputs))
     result = f"tuple[{results}]" if len(signature.outputs) > 1 else results
@@ -101,11 +102,6 @@ def definition(name: str, typed: list[str], result: str) -> list[str]:
         return [f"    def {name}(", f"        {arguments}", f"    ) -> {result}:"]
     each = [f"        {argument}," for argument in ("self", *typed)]
     return [f"    def {name}(", *each, f"    ) -> {result}:"]
-
-
-def tuple_of(names: list[str]) -> str:
-    """Return names as a tuple of Python."""
-    return f"({', '.join(names)}{',' * (len(names) == 1)})"
 
 
 def article(doc: str) -> str:

@@ -171,7 +171,7 @@ def test_what_is_given_must_fit_the_contacts():
     with pytest.raises(st.ModelError, match="contact_points"):
         air.contact_points(UPRIGHT, v)
     with pytest.raises(st.StateError, match=r"no feet.*contacts"):  # all on the ground have feet
-        air.kernels.with_legs("energy", legs, (UPRIGHT, v), None)
+        air.kernels.with_legs("energy", legs, UPRIGHT, v, out=None)
     for name, value in (("mu", -0.1), ("K_n", 0.0), ("D_f", 0.0), ("K_f", -1), ("L_m2t", -1)):
         with row(name), pytest.raises(st.ModelError, match=f"{name}.*{value}"):
             ground.with_parameters(**{name: value})

@@ -97,8 +97,9 @@ def test_tracking_is_exact_and_errors_decay():
 
 def test_many_runs_the_choice_of_a_method_and_settling():
     starts, gravity = START[0] * np.linspace(0.5, 1, 10)[:, None], {"gravity": [5.0] * 10}
-    runs = st.simulate(chain(), starts, np.zeros(4), t_span=0.05, parameters=gravity)
-    one = st.simulate(chain().with_parameters(gravity=5.0), starts[3], np.zeros(4), t_span=0.05)
+    how = {"t_span": 0.05, "output_step": 1e-3}
+    runs = st.simulate(chain(), starts, np.zeros(4), parameters=gravity, **how)
+    one = st.simulate(chain().with_parameters(gravity=5.0), starts[3], np.zeros(4), **how)
     np.testing.assert_array_equal(runs.q[3], one.q)
     assert not any(runs.warnings) and np.all(runs.audit.momentum == 0)
     for damping, reason in ((0, "fixed base"), (1e-5, "fixed base, damping")):

@@ -258,7 +258,8 @@ def test_wrong_parameters_are_named_with_their_run():
     q, v = starts(baked, 4)
     with pytest.raises(st.ModelError, match="baked"):
         st.simulate(baked, q, v, parameters={"tail_mass": [0.1] * 4})
-    same(st.simulate(baked, q, v, t_span=0.01, parameters={}), alone(baked, q, v, t_span=0.01))
+    how = {"t_span": 0.01, "output_step": 1e-3}
+    same(st.simulate(baked, q, v, parameters={}, **how), alone(baked, q, v, **how))
 
 
 @pytest.mark.filterwarnings("ignore::serpentail.basics.errors.UnusualSize")

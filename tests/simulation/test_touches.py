@@ -151,7 +151,7 @@ def test_a_touch_that_a_tolerance_misses_is_named(count):
 def test_auto_flies_by_tsit5_and_touches_by_ros34pw2():
     """Far above the ground it takes the steps of tsit5; alone as among many."""
     model, (q, v, _) = animal(), shallow(60)
-    how = {"rtol": 1e-4, **FREE}
+    how = {"rtol": 1e-4, "output_step": 0.01, **FREE}
     free, by_tsit5 = (
         flown(model, q[0] + np.eye(11)[2], v[0], method=m, **how) for m in ("auto", "tsit5")
     )

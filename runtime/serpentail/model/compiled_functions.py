@@ -48,18 +48,16 @@ class CompiledFunctions(dict[str, Kernel]):
         model.need(name)
         return model.kernels[name]
 
-    def with_legs(
-        self, name: str, legs: ArrayLike | None, arrays: tuple[ArrayLike, ...], out: Out
-    ) -> Any:
+    def with_legs(self, name: str, legs: ArrayLike | None, *arrays: ArrayLike, out: Out) -> Any:
         """Call a function that takes legs last if the model has feet."""
         kernel, model = self[name], self.manifest["prefix"]
         feet = any(entry["group"] == "feet" for entry in self.manifest["contacts"])
         if feet and legs is None:
             raise StateError(f"{model} has feet: give legs, 4 angles (rad) and 4 rates (rad/s)")
         if legs is None:
-            return kernel.at(arrays, out)
+            return kernel(*arrays, out=out)
         if feet:
-            return kernel.at((*arrays, legs), out)
+            return kernel(*arrays, legs, out=out)
         raise StateError(
             f'{model} has no feet, but legs were given: leave them out, or add "feet" to `contacts`'
         )

@@ -40,7 +40,7 @@ class ModelFunctions:
         H : ndarray, shape (nv, nv)
             Inertia matrix, symmetric and positive definite (kg, kg m, kg m^2).
         """
-        return self.kernels["mass_matrix"].at((q,), out)
+        return self.kernels["mass_matrix"](q, out=out)
 
     def bias_force(self, q: ArrayLike, v: ArrayLike, *, out: Out = None) -> Array:
         """Compute the bias force C(q, v), Eq. 3: centrifugal and Coriolis terms, gravity, the
@@ -56,7 +56,7 @@ class ModelFunctions:
             Generalised force: at B (N, world), moment (N m, body), torques of the tail coordinates
             (N m).
         """
-        return self.kernels["bias_force"].at((q, v), out)
+        return self.kernels["bias_force"](q, v, out=out)
 
     def inverse_dynamics(
         self, q: ArrayLike, v: ArrayLike, v_dot: ArrayLike, *, out: Out = None
@@ -75,7 +75,7 @@ class ModelFunctions:
             Generalised force: at B (N, world), moment (N m, body), torques of the tail coordinates
             (N m).
         """
-        return self.kernels["inverse_dynamics"].at((q, v, v_dot), out)
+        return self.kernels["inverse_dynamics"](q, v, v_dot, out=out)
 
     def energy(self, q: ArrayLike, v: ArrayLike, *, out: Out = None) -> tuple[Array, Array]:
         """Compute the kinetic and potential energy of torso and tail.
@@ -91,7 +91,7 @@ class ModelFunctions:
         potential : float
             Potential energy, zero at the height of the world's origin (J).
         """
-        return self.kernels["energy"].at((q, v), out)
+        return self.kernels["energy"](q, v, out=out)
 
     def momentum(self, q: ArrayLike, v: ArrayLike, *, out: Out = None) -> tuple[Array, Array]:
         """Compute the linear and angular momentum of torso and tail.
@@ -107,7 +107,7 @@ class ModelFunctions:
         angular : ndarray, shape (3,)
             Angular momentum about the centre of mass (kg m^2/s, world).
         """
-        return self.kernels["momentum"].at((q, v), out)
+        return self.kernels["momentum"](q, v, out=out)
 
     def tail_points(self, q: ArrayLike, *, out: Out = None) -> Array:
         """Compute the positions of the tail points, Eqs. 13 to 15.
@@ -121,7 +121,7 @@ class ModelFunctions:
         points : ndarray, shape (N + 1, 3)
             Positions of the joints, then of the tip (m, world).
         """
-        return self.kernels["tail_points"].at((q,), out)
+        return self.kernels["tail_points"](q, out=out)
 
     def tail_point_jacobians(self, q: ArrayLike, *, out: Out = None) -> Array:
         """Compute the Jacobians of the tail points, Eqs. A5 to A8.
@@ -135,7 +135,7 @@ class ModelFunctions:
         J : ndarray, shape (N + 1, 3, nv)
             Jacobians of the tail points: velocity of a point (m/s, world) = J v.
         """
-        return self.kernels["tail_point_jacobians"].at((q,), out)
+        return self.kernels["tail_point_jacobians"](q, out=out)
 
     def center_of_mass(
         self, q: ArrayLike, v: ArrayLike, *, out: Out = None
@@ -155,7 +155,7 @@ class ModelFunctions:
         J : ndarray, shape (3, nv)
             Jacobian of the centre of mass, world.
         """
-        return self.kernels["center_of_mass"].at((q, v), out)
+        return self.kernels["center_of_mass"](q, v, out=out)
 
     def mass_matrix_world(self, q: ArrayLike, *, out: Out = None) -> Array:
         """Compute the inertia matrix H for the velocity (p_dot, omega in world axes, q_t_dot).
@@ -169,7 +169,7 @@ class ModelFunctions:
         H : ndarray, shape (nv, nv)
             Inertia matrix, symmetric and positive definite (kg, kg m, kg m^2).
         """
-        return self.kernels["mass_matrix_world"].at((q,), out)
+        return self.kernels["mass_matrix_world"](q, out=out)
 
     def bias_force_world(self, q: ArrayLike, v: ArrayLike, *, out: Out = None) -> Array:
         """Compute the bias force C for the velocity (p_dot, omega in world axes, q_t_dot).
@@ -184,7 +184,7 @@ class ModelFunctions:
             Generalised force: at B (N, world), moment (N m, body), torques of the tail coordinates
             (N m).
         """
-        return self.kernels["bias_force_world"].at((q, v), out)
+        return self.kernels["bias_force_world"](q, v, out=out)
 
     def inverse_dynamics_derivatives(
         self, q: ArrayLike, v: ArrayLike, v_dot: ArrayLike, *, out: Out = None
@@ -205,7 +205,7 @@ class ModelFunctions:
         dv : ndarray, shape (nv, nv)
             d(force)/d(v).
         """
-        return self.kernels["inverse_dynamics_derivatives"].at((q, v, v_dot), out)
+        return self.kernels["inverse_dynamics_derivatives"](q, v, v_dot, out=out)
 
     def forward_dynamics_derivatives(
         self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, *, out: Out = None
@@ -227,7 +227,7 @@ class ModelFunctions:
         dtau : ndarray, shape (nv, 2m)
             d(v_dot)/d(tau).
         """
-        return self.kernels["forward_dynamics_derivatives"].at((q, v, tau), out)
+        return self.kernels["forward_dynamics_derivatives"](q, v, tau, out=out)
 
     def inverse_dynamics_parameter_derivatives(
         self, q: ArrayLike, v: ArrayLike, v_dot: ArrayLike, *, out: Out = None
@@ -245,7 +245,7 @@ class ModelFunctions:
         dparameters : ndarray, shape (nv, parameters)
             Derivative with respect to the values of the parameter struct, in their order.
         """
-        return self.kernels["inverse_dynamics_parameter_derivatives"].at((q, v, v_dot), out)
+        return self.kernels["inverse_dynamics_parameter_derivatives"](q, v, v_dot, out=out)
 
     def forward_dynamics_parameter_derivatives(
         self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, *, out: Out = None
@@ -263,7 +263,7 @@ class ModelFunctions:
         dparameters : ndarray, shape (nv, parameters)
             Derivative with respect to the values of the parameter struct, in their order.
         """
-        return self.kernels["forward_dynamics_parameter_derivatives"].at((q, v, tau), out)
+        return self.kernels["forward_dynamics_parameter_derivatives"](q, v, tau, out=out)
 
     def inverse_dynamics_vjp(
         self,
@@ -293,7 +293,7 @@ class ModelFunctions:
         dv_dot : ndarray, shape (nv,)
             Gradient with respect to v_dot, H lambda.
         """
-        return self.kernels["inverse_dynamics_vjp"].at((q, v, v_dot, multiplier), out)
+        return self.kernels["inverse_dynamics_vjp"](q, v, v_dot, multiplier, out=out)
 
     def forward_dynamics_jvp(
         self,
@@ -325,7 +325,7 @@ class ModelFunctions:
         dv_dot : ndarray, shape (nv,)
             Derivative of v_dot along the direction.
         """
-        return self.kernels["forward_dynamics_jvp"].at((q, v, tau, dq, dv, dtau), out)
+        return self.kernels["forward_dynamics_jvp"](q, v, tau, dq, dv, dtau, out=out)
 
     def forward_dynamics_vjp(
         self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, multiplier: ArrayLike, *, out: Out = None
@@ -349,7 +349,7 @@ class ModelFunctions:
         dtau : ndarray, shape (2m,)
             lambda^T d(v_dot)/d(tau).
         """
-        return self.kernels["forward_dynamics_vjp"].at((q, v, tau, multiplier), out)
+        return self.kernels["forward_dynamics_vjp"](q, v, tau, multiplier, out=out)
 
     def inverse_dynamics_hessian(
         self,
@@ -382,7 +382,7 @@ class ModelFunctions:
         aq : ndarray, shape (nv, nv)
             With respect to v_dot (row) and q (column): d(H lambda)/d(q).
         """
-        return self.kernels["inverse_dynamics_hessian"].at((q, v, v_dot, multiplier), out)
+        return self.kernels["inverse_dynamics_hessian"](q, v, v_dot, multiplier, out=out)
 
     def energy_derivatives(
         self, q: ArrayLike, v: ArrayLike, *, out: Out = None
@@ -402,7 +402,7 @@ class ModelFunctions:
         potential_dq : ndarray, shape (nv,)
             Gradient of the potential energy with respect to q, in its tangent space.
         """
-        return self.kernels["energy_derivatives"].at((q, v), out)
+        return self.kernels["energy_derivatives"](q, v, out=out)
 
     def momentum_derivatives(
         self, q: ArrayLike, v: ArrayLike, *, out: Out = None
@@ -424,7 +424,7 @@ class ModelFunctions:
         angular_dv : ndarray, shape (3, nv)
             Jacobian of the angular momentum with respect to v.
         """
-        return self.kernels["momentum_derivatives"].at((q, v), out)
+        return self.kernels["momentum_derivatives"](q, v, out=out)
 
     def contact_points(
         self, q: ArrayLike, v: ArrayLike, legs: ArrayLike | None = None, *, out: Out = None
@@ -446,7 +446,7 @@ class ModelFunctions:
         velocities : ndarray, shape (K, 3)
             Their velocities (m/s, world).
         """
-        return self.kernels.with_legs("contact_points", legs, (q, v), out)
+        return self.kernels.with_legs("contact_points", legs, q, v, out=out)
 
     def leg_points(self, q: ArrayLike, angles: ArrayLike, *, out: Out = None) -> Array:
         """Compute the positions of the joints of both legs, from the hips to the toes, Eqs. 5 to 9.
@@ -462,7 +462,7 @@ class ModelFunctions:
         joints : ndarray, shape (2, 6, 3)
             Positions of hip, D, knee, A, M and T of the right leg, then of the left (m, world).
         """
-        return self.kernels["leg_points"].at((q, angles), out)
+        return self.kernels["leg_points"](q, angles, out=out)
 
     def contact_dynamics(
         self,
@@ -497,7 +497,7 @@ class ModelFunctions:
         forces : ndarray, shape (K, 3)
             Forces of the ground on the points (N, world).
         """
-        return self.kernels.with_legs("contact_dynamics", legs, (q, v, tau, bristles), out)
+        return self.kernels.with_legs("contact_dynamics", legs, q, v, tau, bristles, out=out)
 
     def pfl(
         self, q: ArrayLike, v: ArrayLike, accelerations: ArrayLike, *, out: Out = None
@@ -516,7 +516,7 @@ class ModelFunctions:
         tau : ndarray, shape (2m,)
             Torques conjugate to the tail coordinates (N m).
         """
-        return self.kernels["pfl"].at((q, v, accelerations), out)
+        return self.kernels["pfl"](q, v, accelerations, out=out)
 
     def airborne_rates(
         self, x: ArrayLike, tau: ArrayLike, angular: ArrayLike, *, out: Out = None
@@ -538,7 +538,7 @@ class ModelFunctions:
         y : ndarray, shape (7 + 4m,)
             Rates of x, then omega (rad/s, body), which follows from the angular momentum.
         """
-        return self.kernels["airborne_rates"].at((x, tau, angular), out)
+        return self.kernels["airborne_rates"](x, tau, angular, out=out)
 
     def airborne_rates_derivatives(
         self, x: ArrayLike, tau: ArrayLike, angular: ArrayLike, *, out: Out = None
@@ -562,7 +562,7 @@ class ModelFunctions:
         J : ndarray, shape (7 + 4m, 4 + 6m)
             d(y)/d(x, tau).
         """
-        return self.kernels["airborne_rates_derivatives"].at((x, tau, angular), out)
+        return self.kernels["airborne_rates_derivatives"](x, tau, angular, out=out)
 
     def airborne_rates_hessian(
         self,
@@ -596,4 +596,4 @@ class ModelFunctions:
         hessian : ndarray, shape (4 + 6m, 4 + 6m)
             Second derivatives of weights^T y with respect to (x, tau), both triangles.
         """
-        return self.kernels["airborne_rates_hessian"].at((x, tau, angular, weights), out)
+        return self.kernels["airborne_rates_hessian"](x, tau, angular, weights, out=out)

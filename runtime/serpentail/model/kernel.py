@@ -120,10 +120,6 @@ class Kernel:
         self.fast: Call | None = None  # made at the first call
 
     def __call__(self, *arrays: ArrayLike, out: Out = None) -> Any:
-        """Return ``at(arrays, out)``."""
-        return self.at(arrays, out)
-
-    def at(self, arrays: Sequence[ArrayLike], out: Out = None) -> Any:
         """Return the output, or a tuple of outputs; StateError names an argument that is wrong.
 
         out: an array, or a sequence of arrays, which receive the outputs and are returned.

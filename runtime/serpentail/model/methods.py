@@ -71,8 +71,8 @@ class ModelMethods(ModelFunctions):
             Acceleration: time derivative of v (m/s^2, rad/s^2).
         """
         if f_ext is None:
-            return self.kernels["forward_dynamics"].at((q, v, tau), out)
-        return self.kernels["forward_dynamics_external"].at((q, v, tau, f_ext), out)
+            return self.kernels["forward_dynamics"](q, v, tau, out=out)
+        return self.kernels["forward_dynamics_external"](q, v, tau, f_ext, out=out)
 
     aba = forward_dynamics
 

@@ -196,11 +196,12 @@ def test_many_runs_show_the_first_that_began(tmp_path):
 
     q = np.tile([0, 0, 0.5, 1, 0, 0, 0, 0.1, 0, 0, 0], (6, 1))
     q[1, 2] = 2
-    runs = st.simulate(zoo.model("arcs2"), q, np.zeros(10), controller=tired, t_span=0.02)
+    how = {"controller": tired, "t_span": 0.02}
+    runs = st.simulate(zoo.model("arcs2"), q, np.zeros(10), **how)
     begun, _ = shown(runs, tmp_path)
     assert Output(runs).words == repr(runs) and "1 failed, the first run 1" in repr(runs)
     assert [run["name"] for run in begun] == ["run 0", "run 1", "run 2"]
-    assert begun[0]["rows"] == begun[2]["rows"] == 201 > begun[1]["rows"] > 1
+    assert begun[0]["rows"] == begun[2]["rows"] == 21 > begun[1]["rows"] > 1
 
 
 def test_without_a_page_a_line_says_why(flight, monkeypatch, tmp_path):
