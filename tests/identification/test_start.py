@@ -45,8 +45,9 @@ def test_positions_in_a_wrong_unit_are_refused_before_a_fit():
         (r"0\.00\d* times .* m read as mm: .*unit=\"m\"", 1, "mm", placed(model)),
         (r"(99\d|1000)\S* times .* mm read as m: .*unit=\"mm\"", 1e3, "m", placed(model)),
         (r"9\.\d* times .* mm read as cm: .*unit=\"mm\"", 1e3, "cm", placed(model)),
-        (r"0\.039\d* times .* check the unit 'mm'", 1 / 0.0254, "mm", placed(model)),
-        (r"0\.39\d* times .* check the unit 'cm'", 1 / 0.0254, "cm", placed(model)),
+        (r"0\.039\d* times .* in read as mm: .*unit=\"in\"", 1 / 0.0254, "mm", placed(model)),
+        (r"0\.39\d* times .* in read as cm: .*unit=\"in\"", 1 / 0.0254, "cm", placed(model)),
+        (r"0\.003\d* times .* check the unit 'mm'", 1 / 0.3048, "mm", placed(model)),
         (r"9\d\d\S* times .* mm read as m", 1e3, "m", tail),
     ):
         given = st.marker_tracks(TIMES, factor * data.positions, data.names, unit=unit)

@@ -108,7 +108,7 @@ def test_a_run_that_ends_behind_a_stop_is_continued_and_told():
     model, (q, v) = elastic(tail_stop_width=0.05), bent(0.0)
     v[6] = 40.0
     run = st.simulate(model, q, v, t_span=0.02)
-    assert "coordinate 0" in run.warnings[-1] and "behind tail_stop_upper 0.6" in run.warnings[-1]
+    assert "alpha_1 is" in run.warnings[-1] and "behind tail_stop_upper 0.6" in run.warnings[-1]
     k = int(run.tail[:, 0].argmax())
     assert run.tail[k, 0] > 0.65 and f"{run.tail[k, 0]:.6g} rad" in run.warnings[-1]
     # which is one motion
