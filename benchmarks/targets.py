@@ -44,6 +44,7 @@ class Target:
 
 
 SHORT, SHORTER, LONG = ("(1, 3)", "(3, 4)"), ("(1, 3)", "(3, 4)", "(6, 6)"), ("(8, 16)",)
+ARCS = ("continuum, m = 64",)
 
 
 def batch(what: str, function: str, bound: float, of: tuple[str, ...], on: str = "") -> Target:
@@ -77,9 +78,13 @@ TARGETS = (
     Target("Jacobians: Pinocchio", "jacobians", "Pinocchio, ratio", 14),
     Target("Jacobians: Pinocchio tuned", "jacobians", "Pinocchio tuned, ratio", 14),
     Target("Hessian: CasADi's C", "hessians", "CasADi, ratio", 1.5, ("(1, 3)",)),
-    Target("Hessian: CasADi's C", "hessians", "CasADi, ratio", 2, ("(3, 4)",)),
-    batch("v_dot", FD, 6, SHORTER, "AVX-512"),
-    batch("v_dot", FD, 2.5, LONG),
+    Target("Hessian: CasADi's C", "hessians", "CasADi, ratio", 2.5, ("(3, 4)",)),
+    Target("Jacobians: CasADi's C", "jacobians", "CasADi, ratio", 2.2, ("(3, 4)",)),
+    Target("64 arcs: v_dot, ns", "long_tails", "v_dot, ns", 25e3, ARCS, at_most=True),
+    Target("64 arcs: Jacobians", "long_tails", "Jacobians, ns", 6e5, ARCS, at_most=True),
+    batch("v_dot", FD, 6, SHORT, "AVX-512"),
+    batch("v_dot", FD, 4, ("(6, 6)",), "AVX-512"),
+    batch("v_dot", FD, 3, LONG, "AVX-512"),
     batch("Jacobians", DFD, 3, SHORT, "AVX-512"),
     batch("Jacobians", DFD, 2, SHORT, "AVX2"),
     batch("Hessian", HESSIAN, 4, SHORT, "AVX-512"),
@@ -96,6 +101,7 @@ TARGETS = (
     flight("flight of 0.6 s", "times real time", 5000, ("(1, 3)",)),
     flight("flight of 0.6 s", "times real time", 1000, ("(3, 4)",)),
     flight("impact", "times real time", 150, ("(3, 4)",)),
+    Target("sliding", "simulations", "times real time", 600, where=("scene", "sliding")),
 )
 
 
