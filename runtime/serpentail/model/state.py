@@ -91,6 +91,14 @@ def named(whole: Any, names: Names, name: object, known: tuple[str, ...]) -> Any
     return getattr(whole, place[0])[..., place[1]]
 
 
+def _may_span(value: Any) -> bool:
+    """Tell if a value can be a time or two."""
+    if isinstance(value, np.ndarray):
+        return value.shape in ((), (2,))
+    both = value if isinstance(value, tuple | list) and len(value) == 2 else [value]
+    return all(isinstance(time, str | int | float | np.number) for time in both)
+
+
 def parted(
     model: Model, q0: Any, v0: Any = None, t_span: Any = SPAN
 ) -> tuple[tuple[Any, Any], Any]:
@@ -99,7 +107,7 @@ def parted(
     In place of q0 and v0 there may be a State, (q, v), or x of both; the span may follow it.
     StateError for a start of one half, or of one and a half.
     """
-    spans = np.shape(v0) in ((), (2,))
+    spans = _may_span(v0)
     if v0 is not None and not isinstance(q0, State) and (not spans or model.nv == 2):
         return (q0, v0), t_span
     if v0 is not None:
@@ -109,7 +117,8 @@ def parted(
         t_span = v0
     if isinstance(q0, State):
         return (q0.q, q0.v), t_span
-    if isinstance(q0, tuple | list) and len(q0) == 2 and all(np.ndim(part) for part in q0):
+    sequences = (tuple, list, np.ndarray)
+    if isinstance(q0, sequences[:2]) and len(q0) == 2 and all(isinstance(x, sequences) for x in q0):
         return (q0[0], q0[1]), t_span
     x = real_array("q0", q0)
     if x.shape[-1:] != (model.nq + model.nv,):
