@@ -7,13 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..basics.checks import number, refusal
+from ..basics.checks import number, whole_number
 from ..basics.errors import SimulationError, StateError
 from ..model.model import Model
 from ..model.state import State
 from ..motion.trajectory import Trajectory
 from .controllers.controller import Controller
 from .simulate import simulate
+
+MOST_ROUNDS = 100
 
 
 def settle(
@@ -35,8 +37,8 @@ def settle(
     q0 : array_like, shape (nq,), or State
         Configuration at the start, without velocity.
     rounds : int, default 1
-        Number of runs. All velocities are set to zero after each run, so many short runs damp
-        the motion faster.
+        Number of runs, at most 100. All velocities are set to zero after each run, so many short
+        runs damp the motion faster.
     duration : float or str, default 1.5
         Duration of a run (s).
     controller : controller or callable, optional
@@ -88,8 +90,7 @@ def settle(
 def check_settling(model: Model, rounds: object = 1, duration: object = 1.5) -> float:
     """Return the duration (s); SimulationError if a model cannot settle, or a number is wrong."""
     seconds = number("duration", duration, SimulationError, unit="s", above=0)
-    if isinstance(rounds, bool) or not isinstance(rounds, int) or rounds < 1:
-        raise refusal("rounds", rounds, "a whole number from 1", SimulationError)
+    whole_number("rounds", rounds, SimulationError, least=1, most=MOST_ROUNDS)
     if not model.contacts:
         raise SimulationError(
             f"{model.name} has no contacts, so it cannot settle: add `contacts` to its scene"
