@@ -137,7 +137,7 @@ def test_a_touch_that_a_tolerance_misses_is_named(count):
             with row(method, rtol):
                 for run, time in zip(flown(animal(), q, v, **how), times, strict=True):
                     first = min((event["time"] for event in run.events), default=np.inf)
-                    if first > time + 1e-2:
+                    if first > time + max(1e-2, 5 * rtol):  # later, heights off by mm touch, too
                         missed[rtol] += 1
                         near = run.info["near"]
                         assert 0 < near["height"] < near["error"] < 200 * rtol
