@@ -14,18 +14,19 @@ WRITTEN = {ROOT / "runtime" / "serpentail" / "model" / "functions.py"}  # by `ma
 
 
 def main() -> int:
-    """Print a complaint for each file that is too long and each name of two classes of the
-    packages; return the exit status.
+    """Print a complaint for each file that is too long and each name of two classes of a
+    package; return the exit status.
     """
     complaints, homes = [], defaultdict(list)
     for path in sorted(path for name in FOLDERS for path in (ROOT / name).rglob("*.py")):
         text = path.read_text(encoding="utf-8")
         if (lines := text.count("\n")) > MOST_LINES and path not in WRITTEN:
             complaints.append(f"{path}: {lines} lines, more than {MOST_LINES}: split it by concept")
-        if path.relative_to(ROOT).parts[0] in FOLDERS[:2]:
+        package = path.relative_to(ROOT).parts[0]
+        if package in FOLDERS[:2]:
             for name in CLASS.findall(text):
-                homes[name].append(str(path.relative_to(ROOT)))
-    for name, paths in homes.items():
+                homes[package, name].append(str(path.relative_to(ROOT)))
+    for (_, name), paths in homes.items():
         if len(paths) > 1:
             complaints.append(f"class {name} stands in {' and in '.join(paths)}: rename one")
     print("\n".join(complaints) or f"all files have {MOST_LINES} lines or less, all classes a name")

@@ -8,6 +8,7 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from ..ir import program as ir
+from ..ir.builder import narrowed
 from ..ir.dataflow import forward_slice, inner_arrays, names, pruned, rewritten, rule_of, writes
 from .angles import SinesAndCosinesArray, angle_inputs, kinds, sines_and_cosines_arrays
 from .step import tangent
@@ -28,6 +29,8 @@ class Lanes:
     bound: how many are needed inside given loops.
     prefix: how the names of their tangents begin, as in ``d_x``.
     wanted: the outputs whose tangents are given; None for all.
+    cut: arrays to which values are copied and straight back. Tangents end there: from there on they
+    have the tangents that are given, if the array is active, or none.
     """
 
     active: Collection[str]
@@ -35,10 +38,12 @@ class Lanes:
     bound: Bound = all_lanes
     prefix: str = "d"
     wanted: Collection[str] | None = None
+    cut: Collection[str] = ()
 
     def companion(self, array: ir.Array) -> ir.Array:
-        """Return the tangents of an array; those of parameters are inputs."""
-        role = "input" if array.role == "parameters" else array.role
+        """Return the tangents of an array; those of parameters and of cuts are inputs."""
+        given = array.role == "parameters" or array.name in self.cut
+        role = "input" if given else array.role
         if role == "output" and self.wanted is not None and array.name not in self.wanted:
             role = "local"
         name = f"{self.prefix}_{array.name}"
@@ -55,12 +60,9 @@ def tangent_program(
 ) -> ir.Program:
     """Return the program that takes ``d_<input>`` of the active inputs to ``d_<output>``.
 
-    ``lanes`` is the number of directions, 0 for one direction in narrow scalars; ``bound`` tells
-    how many of the lanes are needed inside given loops.  ``kept`` outputs are given, too.
-    Tangents end where values are copied to a ``cut`` array and straight back: from there on they
-    have the tangents that are given, if the array is active, or none.
+    lanes, bound, cut: as of ``Lanes``; kept: outputs that are given, too.
     """
-    return tangents_together(program, [Lanes(active, lanes, bound)], kept)
+    return tangents_together(program, [Lanes(active, lanes, bound, cut=cut)], kept)
 
 
 def tangents_together(
@@ -78,7 +80,7 @@ def tangents_together(
         sweeps.append(_Tangents(companions, by_angles, lanes.bound, cut))
 
     # lanes that a statement leaves out are zero from the start
-    body = _Tangents(companions, by_angles, bound, cuts).body(program.body, ())
+    body = _Together(sweeps).body(program.body, ())
     fills = tuple(ir.Fill(ref, (0,) * ref.size) for ref in _partly_written(body))
 
     own = inner_arrays(program)
@@ -118,10 +120,10 @@ class _Tangents:
         companions: dict[str, ir.Array],
         by_angles: dict[str, SinesAndCosinesArray],
         bound: Bound,
-        cut: Collection[str] = (),
+        cut: Collection[str],
     ):
         self.companions, self.by_angles, self.bound = companions, by_angles, bound
-        self.cut = frozenset(cut)
+        self.cut = cut
 
     def moves(self, ref: ir.Ref) -> bool:
         """Tell if the scalars of a reference have tangents."""
@@ -195,15 +197,14 @@ class _Together:
             yield from sweep.cleared(fill.target)
 
     def copy(self, copy: ir.Copy, loops: tuple[ir.Loop, ...]) -> Iterator[ir.Statement]:
-        """Yield a copy, and that of the tangents."""
-        if copy.target.array.name in self.cut:
-            return
-        if copy.source.array.name not in self.cut:
+        """Yield a copy, and that of the tangents; what is cut keeps its value."""
+        source, target = copy.source.array.name, copy.target.array.name
+        cut = set().union(*(sweep.cut for sweep in self.sweeps))
+        if not {source, target} & cut:
             yield copy
-        if self.moves(copy.target) and self.moves(copy.source):
-            yield replace(copy, target=self.of(copy.target), source=self.of(copy.source))
-        elif not copy.adds:
-            yield from self.cleared(copy.target)
+        for sweep in self.sweeps:
+            if target not in sweep.cut:
+                yield from sweep.copy(copy)
 
     def apply(self, call: ir.Apply, loops: tuple[ir.Loop, ...]) -> Iterator[ir.Statement]:
         """Yield a step with its tangents of the last kind; before it come those of the other kinds,

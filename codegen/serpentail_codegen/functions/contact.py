@@ -10,7 +10,7 @@ from .dynamics import accelerate_by_segments, copied_torques
 from .factored import factored_dynamics
 from .layout import coordinates
 from .passive import net_torques
-from .scope import StateRefs, Torso, Vectors
+from .scope import State, Torso, Vectors
 from .sweeps.pieces import attitude, each_point, mechanism, torso_pose
 from .tail import Tail
 from .tails.mechanism import Segments
@@ -57,11 +57,7 @@ def first_points(tail: Tail) -> dict[str, int]:
 
 
 def gather_points(
-    draft: Draft,
-    state: StateRefs,
-    R: Ref,
-    arrays: dict[str, Array],
-    segments: Segments | None = None,
+    draft: Draft, state: State, R: Ref, arrays: dict[str, Array], segments: Segments | None = None
 ) -> Points:
     """Compute all points that can touch the ground: feet, then tail, then the lowest of the torso.
 
@@ -184,7 +180,7 @@ def gather_contact_loads(
 
 
 def contact_load(
-    draft: Draft, state: StateRefs, R: Ref, arrays: dict[str, Array]
+    draft: Draft, state: State, R: Ref, arrays: dict[str, Array]
 ) -> tuple[Vectors, Array]:
     """Forces of all points; returns their load at B, and the torques of actuators and forces
     together.

@@ -18,7 +18,7 @@ from ..ir.tape import Number
 from ..mechanics.lower import declared_shapes, derive
 from ..scene.variant import Stretch
 from .layout import block
-from .scope import Instead, Scope, StateRefs, Vectors
+from .scope import Instead, Scope, State, Vectors
 from .tail import Tail
 
 AT_REST = ("identity", "still", "zero_1", "zero_3")  # constants that have one value by each name
@@ -49,9 +49,9 @@ class Draft(Builder):
             refs |= {"torso_mass": self.zero(1), "torso_inertia": self.zero(3)}
         self.parameters = MappingProxyType(refs)
 
-    def state(self, q: Array, v: Array | None = None) -> StateRefs:
+    def state(self, q: Array, v: Array | None = None) -> State:
         """Return a state; leave out the velocity if it is not used."""
-        return StateRefs(self.tail, q, v, self.zero(3) if self.tail.fixed else None)
+        return State(self.tail, q, v, self.zero(3) if self.tail.fixed else None)
 
     def of_torso(self, array: Array, part: slice) -> Ref:
         """Return the torso's part of a velocity or an acceleration, zeros on a fixed base."""

@@ -13,7 +13,7 @@ from .factored import FactoredDynamics, factored_dynamics
 from .function import Assembly, Function, assemble
 from .layout import block
 from .passive import add_elastic_energy, add_passive_forces, net_torques
-from .scope import Motion, StateRefs, Vectors
+from .scope import Motion, State, Vectors
 from .sweeps.inertia import column_of, tail_inertia
 from .sweeps.loads import gather_loads
 from .sweeps.momentum import gather_kinetic, gather_momentum
@@ -31,7 +31,7 @@ def assemble_mass_matrix(draft: Draft, arrays: dict[str, Array], world: bool = F
 
 
 def fill_mass_matrix(
-    draft: Draft, state: StateRefs, H: Array, row: int, world: bool = False
+    draft: Draft, state: State, H: Array, row: int, world: bool = False
 ) -> tuple[Segments, Ref]:
     """H (Eq. 2), both triangles; its rows are ``row`` apart.  Returns segments and attitude."""
     tail, R, before = draft.tail, attitude(draft, state), draft.tail.torso_nv

@@ -13,7 +13,7 @@ from ..mechanics import passive
 from ..mechanics.lower import declared_shapes
 from .draft import Draft
 from .layout import coordinates
-from .scope import Instead, StateRefs, Vectors
+from .scope import Instead, State, Vectors
 from .tails.mechanism import StepFunction
 
 FORCES: dict[str, StepFunction] = {
@@ -32,7 +32,7 @@ def passive_parameters(draft: Draft, step: StepFunction, part: Callable[[Array],
 
 
 @contextmanager
-def each_passive_force(draft: Draft, state: StateRefs) -> Iterator[tuple[Index, Ref]]:
+def each_passive_force(draft: Draft, state: State) -> Iterator[tuple[Index, Ref]]:
     """Open a loop over segments; yields the segment and the forces of its passive parts."""
     force = draft.vector("passive", 2)
     with draft.loop("i", draft.tail.segments) as i:
@@ -41,7 +41,7 @@ def each_passive_force(draft: Draft, state: StateRefs) -> Iterator[tuple[Index, 
         yield i, force
 
 
-def _add_forces(draft: Draft, state: StateRefs, i: Index, force: Ref) -> None:
+def _add_forces(draft: Draft, state: State, i: Index, force: Ref) -> None:
     reads = Vectors({"angles": state.angles(i), "rates": state.rates(i)})
     for name in draft.tail.passive:
         step = FORCES[name]
@@ -49,14 +49,14 @@ def _add_forces(draft: Draft, state: StateRefs, i: Index, force: Ref) -> None:
         draft.step(step, reads, own, passive_=force)
 
 
-def add_passive_forces(draft: Draft, state: StateRefs, force: Callable[[Index], Ref]) -> None:
+def add_passive_forces(draft: Draft, state: State, force: Callable[[Index], Ref]) -> None:
     """Add the forces of the passive parts to the force on each segment."""
     if draft.tail.passive:
         with draft.loop("i", draft.tail.segments) as i:
             _add_forces(draft, state, i, force(i))
 
 
-def add_passive_power(draft: Draft, state: StateRefs, multiplier: Array, power: Ref) -> None:
+def add_passive_power(draft: Draft, state: State, multiplier: Array, power: Ref) -> None:
     """Add the power of the passive parts, when the tail moves with a multiplier."""
     if draft.tail.passive:
         with each_passive_force(draft, state) as (i, passive_force):
@@ -64,7 +64,7 @@ def add_passive_power(draft: Draft, state: StateRefs, multiplier: Array, power: 
             draft.step(passive.virtual_power, reads, power_=power)
 
 
-def net_torques(draft: Draft, state: StateRefs, tau: Array) -> Array:
+def net_torques(draft: Draft, state: State, tau: Array) -> Array:
     """Return the torques minus those of the passive parts: what is left for the dynamics."""
     if not draft.tail.passive:
         return tau
@@ -75,24 +75,7 @@ def net_torques(draft: Draft, state: StateRefs, tau: Array) -> Array:
     return net
 
 
-def add_passive_slopes(
-    draft: Draft, state: StateRefs, own: Mapping[str, Ref], slopes: Callable[[Index], Ref]
-) -> None:
-    """Add the derivatives of each segment's passive parts by its own ``angles`` and ``rates``,
-    whose directions are ``own``.
-    """
-    for name in draft.tail.passive:
-        function = FORCES[name]
-        active = sorted({"angles", "rates"} & declared_shapes(function).keys())
-        step = tangent(derive(function), frozenset(active))
-        turning = {f"d_{each}": own[each] for each in active}
-        with draft.loop("i", draft.tail.segments) as i:
-            moving = Vectors({"angles": state.angles(i), "rates": state.rates(i)}).only(*active)
-            parameters = passive_parameters(draft, function, partial(coordinates, i=i))
-            draft.step(step, moving, parameters, turning, d_passive_=slopes(i))
-
-
-def add_elastic_energy(draft: Draft, state: StateRefs, potential: Ref) -> None:
+def add_elastic_energy(draft: Draft, state: State, potential: Ref) -> None:
     """Add the energy that springs and stops store."""
     for name in draft.tail.passive:
         if name in ENERGIES:

@@ -7,7 +7,7 @@ from ..mechanics import rotations, torso, translation
 from .draft import Draft
 from .layout import block, coordinates
 from .passive import add_passive_forces
-from .scope import StateRefs, Vectors
+from .scope import State, Vectors
 from .sweeps.inertia import column_of, columns_and_inertia
 from .sweeps.pieces import attitude, mechanism
 from .sweeps.wrenches import forward_wrenches, gather_wrenches, torso_without_acceleration
@@ -46,7 +46,7 @@ def assemble_pfl(draft: Draft, arrays: dict[str, Array]) -> None:
         draft.copy(block(v_dot, OMEGA), motion["w_dot"])
 
 
-def hold_base(draft: Draft, state: StateRefs, arrays: dict[str, Array]) -> None:
+def hold_base(draft: Draft, state: State, arrays: dict[str, Array]) -> None:
     """Torques H v_dot + C: on a fixed base they give exactly the wanted accelerations."""
     segments, v_dot = mechanism(draft).prepare(draft, state, False), arrays["accelerations"]
     tail_alone(draft, segments, v_dot, arrays["tau"])

@@ -84,7 +84,7 @@ class Torso(Fields):
 
 
 @dataclass(frozen=True)
-class StateRefs:
+class State:
     """The arguments q and v of a function; v is missing if the function does not use it.
 
     still: zeros in place of what a fixed base does not have: it rests at the world's origin.

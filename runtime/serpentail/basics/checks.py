@@ -148,6 +148,8 @@ def numbers(
     most: float = np.inf,
 ) -> NDArray[np.float64]:
     """Return finite numbers (size,) within bounds, texts as ``number``; one alone is repeated."""
+    if type(value) is float and least <= value <= most and abs(value) < np.inf:
+        return np.full(size, value)
     value = measured(field, value, unit, error) if unit else value
     numbers, rule = numbers_in(value), NumberRule("", least=least, most=most)
     shapes = ((), (size,))

@@ -14,6 +14,7 @@ from ..basics.errors import ModelError, StateError
 from .kernel import Kernel
 from .library import BatchLibrary
 from .manifest import CheckedFolder
+from .memory import Out
 
 if TYPE_CHECKING:
     from .model import Model

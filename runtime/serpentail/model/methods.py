@@ -17,6 +17,9 @@ from .functions import Array, ModelFunctions
 from .growth import Grow, grown
 from .kernel import Kernel
 from .lazy import lazy_property
+from .library import BatchLibrary
+from .manifest import CheckedFolder
+from .memory import Out, filled
 from .state import parted
 from .state_space import jacobians, q_dot, split
 

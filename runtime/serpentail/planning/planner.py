@@ -66,9 +66,9 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     Parameters
     ----------
     model : Model
-        The model, with a free base; its scene needs "mass_matrix", "inverse_dynamics",
-        "forward_dynamics", "rollout", "energy" and "momentum". If it has contacts, its flight is
-        planned without the ground.
+        The model, with a free base. A loaded one needs "mass_matrix", "forward_dynamics",
+        "rollout", "energy" and "momentum". If it has contacts, its flight is planned without the
+        ground.
     start : State, or (array_like, array_like)
         State at the start, such as ``model.state(height="34 cm")``, or (q0 (nq,), v0 (nv,)).
     goal : Goal or str, optional

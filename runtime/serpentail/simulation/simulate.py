@@ -158,9 +158,7 @@ def simulate(
     >>> law = st.Damping(1e-4)
     >>> motion = st.simulate(model, q0, v0, controller=law, t_span=0.4)  # doctest: +SKIP
     """
-    missing = [name for name in ("rollout", "energy", "momentum") if name not in model.generated]
-    if missing:
-        raise model.without(*missing)
+    model.need("rollout", "energy", "momentum")
     state, t_span = parted(model, q0, v0, t_span)
     start = Start.checked(model, state, t_span, settings.pop("output_step", None))
     watch = checked_watch(settings.pop("watch", None), start.many)

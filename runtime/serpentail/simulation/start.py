@@ -50,7 +50,8 @@ class Start:
         q0, v0, many = checked_starts(model, state)
         # the grid of output times, the end among them
         start, end = checked_span(t_span)
-        output_step = (end - start) / 200 if output_step is None else output_step
+        if output_step is None:
+            output_step = (end - start) / (INTERVALS_OF_MANY if many else INTERVALS)
         step = number("output_step", output_step, SimulationError, unit="s", above=0)
         if len(q0) * (end - start) > MOST_SAMPLES * step:
             remedy = f"give {len(q0) * (end - start) / MOST_SAMPLES:.2g} s or more"

@@ -13,7 +13,7 @@ from ..dynamics import inertial_forces
 from ..function import Function, signed
 from ..layout import block
 from ..passive import add_passive_forces, add_passive_power
-from ..scope import Motion, StateRefs, Vectors
+from ..scope import Motion, State, Vectors
 from ..sweeps.momentum import gather_moment
 from ..sweeps.pieces import mechanism
 from ..sweeps.wrenches import virtual_power
@@ -40,7 +40,7 @@ def assemble_inertia(draft: Draft, arrays: dict[str, Array]) -> None:
     core_forces(draft, draft.state(arrays["q"]), draft.zero(3), arrays)
 
 
-def core_forces(draft: Draft, state: StateRefs, omega: Ref, arrays: dict[str, Array]) -> None:
+def core_forces(draft: Draft, state: State, omega: Ref, arrays: dict[str, Array]) -> None:
     """Store H v_dot + C in torso axes."""
     v_dot = arrays["v_dot"]
     segments = mechanism(draft).prepare(draft, state, False)

@@ -21,7 +21,7 @@ from ..draft import Draft
 from ..dynamics import fill_mass_matrix
 from ..layout import coordinate
 from ..passive import SLOPES, passive_parameters
-from ..scope import StateRefs, Torso, Vectors
+from ..scope import State, Torso, Vectors
 from ..sweeps.pieces import each_segment, points_of
 from ..tails.mechanism import Segments
 from .layout import Factors, each_contact, first_tail_point
@@ -59,7 +59,7 @@ def assemble_factor(draft: Draft, arrays: dict[str, Array]) -> None:
         draft.factor(f.array, nv)
 
 
-def add_passive_stiffness(draft: Draft, f: Factors, state: StateRefs, k: Index) -> None:
+def add_passive_stiffness(draft: Draft, f: Factors, state: State, k: Index) -> None:
     """Add springs, damping and stops of coordinate k, except those that tracking cancels."""
     weights = {"weight": f("weight"), "gain_v": f("gain_v")}
 
@@ -115,7 +115,7 @@ class ContactLinearisation:
 def add_contacts(
     draft: Draft,
     f: Factors,
-    state: StateRefs,
+    state: State,
     R: Ref,
     segments: Segments,
     arrays: dict[str, Array],

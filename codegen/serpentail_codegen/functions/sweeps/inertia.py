@@ -8,7 +8,7 @@ from ...ir.program import Array, Index, Ref, as_index
 from ...mechanics import mount, torso
 from ..draft import Draft
 from ..layout import coordinate
-from ..scope import Pose, StateRefs, Vectors
+from ..scope import Pose, State, Vectors
 from ..tails.mechanism import Segments
 from .pieces import across, each_segment, mechanism, pieces_of, torso_pose
 
@@ -89,7 +89,7 @@ def forward_roots(
 
 
 def tail_inertia(
-    draft: Draft, state: StateRefs, H_tail: Block, columns: Array, R: Ref | None = None
+    draft: Draft, state: State, H_tail: Block, columns: Array, R: Ref | None = None
 ) -> tuple[Segments, Vectors]:
     """Compute everything that H consists of (Eqs. 2, 16, 18): ``mass, h, I`` at B, momentum
     columns, H of the tail (lower triangle).
@@ -116,7 +116,7 @@ def tail_inertia(
     return segments, composite
 
 
-def columns_and_inertia(draft: Draft, state: StateRefs) -> tuple[Segments, Array, Vectors]:
+def columns_and_inertia(draft: Draft, state: State) -> tuple[Segments, Array, Vectors]:
     """Return the segments, the momentum columns, and ``mass, h, I`` at B, without H."""
     segments = mechanism(draft).prepare(draft, state, True)
     columns, roots = draft.array("columns", 12, draft.tail.segments), segment_roots(draft)

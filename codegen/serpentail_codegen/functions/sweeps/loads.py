@@ -4,11 +4,11 @@ from ...ir.program import Array, Index, Ref
 from ...mechanics import loads
 from ..draft import Draft
 from ..layout import LOAD, coordinates
-from ..scope import StateRefs, Vectors
+from ..scope import State, Vectors
 from .pieces import each_point, mechanism, torso_pose
 
 
-def sample_joints(draft: Draft, state: StateRefs) -> tuple[Array, Array]:
+def sample_joints(draft: Draft, state: State) -> tuple[Array, Array]:
     """Compute spatial columns between tail points, and all tail points, in torso axes from B."""
     tail, samples = draft.tail, mechanism(draft).prepare_samples(draft, state, None)
     S, points = draft.array("S_joint", 12, tail.total), draft.array("tail_point", 3, tail.total + 1)
@@ -21,7 +21,7 @@ def sample_joints(draft: Draft, state: StateRefs) -> tuple[Array, Array]:
     return S, points
 
 
-def gather_loads(draft: Draft, state: StateRefs, R: Ref, f_ext: Array, torques: Array) -> Vectors:
+def gather_loads(draft: Draft, state: State, R: Ref, f_ext: Array, torques: Array) -> Vectors:
     """J^T f (Eq. 10) of the loads in ``f_ext``: returns ``load_force, load_moment`` at B; the
     joints' part is added to ``torques``.
     """

@@ -3,13 +3,13 @@
 from ...ir.program import Ref
 from ...mechanics import mount, torso
 from ..draft import Draft
-from ..scope import StateRefs, Vectors
+from ..scope import State, Vectors
 from ..tails.mechanism import Segments, Wrenches
 from .pieces import across, each_piece, mechanism
 from .wrenches import gather_wrenches
 
 
-def gather_momentum(draft: Draft, state: StateRefs, R: Ref, p_dot: Ref) -> Vectors:
+def gather_momentum(draft: Draft, state: State, R: Ref, p_dot: Ref) -> Vectors:
     """``mass`` and first moment ``h`` of the animal, and its momentum ``force, moment``, at B,
     which moves with p_dot.
     """
@@ -23,7 +23,7 @@ def gather_momentum(draft: Draft, state: StateRefs, R: Ref, p_dot: Ref) -> Vecto
     return Vectors({**moment, **momentum})
 
 
-def gather_kinetic(draft: Draft, state: StateRefs, R: Ref, kinetic: Ref) -> Vectors:
+def gather_kinetic(draft: Draft, state: State, R: Ref, kinetic: Ref) -> Vectors:
     """``mass`` and first moment ``h`` of the animal; sums its energy in ``kinetic``."""
     segments, moment, velocity, u_torso = _begin_momentum(draft, state, R, state.velocity)
     draft.fill(kinetic, 0)
@@ -34,7 +34,7 @@ def gather_kinetic(draft: Draft, state: StateRefs, R: Ref, kinetic: Ref) -> Vect
 
 
 def _begin_momentum(
-    draft: Draft, state: StateRefs, R: Ref, p_dot: Ref
+    draft: Draft, state: State, R: Ref, p_dot: Ref
 ) -> tuple[Segments, Vectors, Vectors, Vectors]:
     """Return segments, mass and first moment, velocities of the tail mount, and of the torso."""
     segments = mechanism(draft).prepare(draft, state, False)

@@ -12,7 +12,7 @@ from ...ir.program import Index, Ref
 from ...mechanics import mount, rotations, torso
 from ...scene.variant import Stretch
 from ..draft import Draft
-from ..scope import Pose, StateRefs
+from ..scope import Pose, State
 from ..tails.articulated import ARTICULATED
 from ..tails.continuum import CONTINUUM
 from ..tails.mechanism import Mechanism
@@ -35,7 +35,7 @@ def mechanism(draft: Draft) -> Mechanism:
     return {"articulated": ARTICULATED, "continuum": CONTINUUM}[draft.tail.kind]
 
 
-def attitude(draft: Draft, state: StateRefs) -> Ref:
+def attitude(draft: Draft, state: State) -> Ref:
     """Store the rotation matrix of the torso; that of a fixed base is a constant."""
     if draft.tail.fixed:
         return draft.fixed("identity", IDENTITY)

@@ -12,9 +12,7 @@ from ...mechanics import free_segment, mount, rotations, torso
 from ...mechanics.link_columns import torso_bias
 from ..draft import Draft
 from ..layout import block, coordinates
-from ..scope import StateRefs, Vectors
-from ..tails.articulated import link_properties
-from ..tails.mechanism import simplified
+from ..scope import Motion, State, Vectors
 from .bodies import ArticulatedBody, Freed, Passes, lane
 from .pieces import IDENTITY, across, mechanism
 from .side_by_side import SegmentGroup, groups_of, joined
@@ -24,7 +22,7 @@ OWN_INERTIA = {"h": 3, "I": 6, "pitch": 6, "yaw": 6, "H_pp": 1, "H_py": 1, "H_yy
 
 
 def forward_dynamics(
-    draft: Draft, state: StateRefs, load: Array, torques: Array, v_dot: Array, again: bool = False
+    draft: Draft, state: State, load: Array, torques: Array, v_dot: Array, again: bool = False
 ) -> Freed:
     """Fill ``v_dot`` from a load (force, moment) at B in torso axes and torques.
 
@@ -55,17 +53,10 @@ def forward_dynamics(
     return Freed(passes, inertia, *freed)
 
 
-def _wide(draft: Draft, name: str, size: int, *values: Number) -> Ref:
-    """Declare a vector with one lane for each segment, which begins with ``values``."""
-    vector = draft.wide(f"{name}_lanes", size, draft.tail.segments)[0]
-    if values:
-        draft.fill(vector, *values)
-    return vector
-
-
-def _base_velocities(draft: Draft, state: StateRefs, passes: Passes) -> Ref:
-    """Angular velocities of the bases of all segments."""
-    w, w_base = _wide(draft, "w", 3, 0), draft.vector("w_base", 3)
+def _base_velocities(draft: Draft, state: State, passes: Passes) -> Ref:
+    """Angular velocities of the bases of all segments, the first in the tail's root axes."""
+    w, w_base = draft.wide("w_lanes", 3, draft.tail.segments)[0], draft.vector("w_base", 3)
+    draft.fill(w, 0)
     draft.copy(w_base, state.omega)
     with draft.loop("i", draft.tail.segments) as i:
         draft.copy(lane(w, i), w_base)
@@ -75,42 +66,42 @@ def _base_velocities(draft: Draft, state: StateRefs, passes: Passes) -> Ref:
     return w
 
 
-def _prepare(draft: Draft, state: StateRefs) -> Vectors:
-    """Link properties, coordinates, rates and trigonometry of all joints."""
-    properties = link_properties(draft)
-    angles, rates = _wide(draft, "angles", 2, 0), _wide(draft, "rates", 2, 0)
-    with draft.loop("i", draft.tail.segments) as i:
-        draft.copy(angles.array.down(0, i, PER_SEGMENT), state.angles(i))
-        draft.copy(rates.array.down(0, i, PER_SEGMENT), state.rates(i))
-    joint = _wide(draft, "joint", 4)
-    draft.step(link.joint_trigonometry, {"angles": angles}, joint=joint)
-    twice = _wide(draft, "twice", 10)
-    draft.step(link.double_angles, {"joint": joint}, twice=twice)
-    return Vectors({**properties, "rates": rates, "joint": joint, "twice": twice})
+def _own_inertia(group: SegmentGroup) -> Vectors:
+    """Compute how each tip moves, and the composite inertia of each segment's own pieces.
+
+    The base of the first segment has the axes of the torso.
+    """
+    draft, first = group.draft, as_index(0)
+    with group.at_once():
+        # from the base to the tip
+        tail, begin = mechanism(draft), group.vectors(R=IDENTITY, P=(0,) * 3, S=(0,) * 12)
+        pose = begin.only("R", "P")
+        if not group.number:
+            across(draft, mount.mounted_frame, R=lane(pose["R"], first))
+        with draft.loop("j", group.pieces) as j:
+            piece = group.segments.at(first, j)
+            draft.step(tail.twist, piece, pose, S_=begin["S"])
+            draft.step(tail.pose, piece, pose, **pose)
+        tip = draft.vectors(tip_map=30)
+        draft.step(free_segment.tip_motion, begin, **tip)
+
+        # from the tip to the base
+        inertia = group.vectors(**{name: (0,) * size for name, size in OWN_INERTIA.items()})
+        carried = inertia.only("h", "I", "pitch", "yaw")
+        own = {f"{name}_": inertia[name] for name in ("H_pp", "H_py", "H_yy")}
+        mass = group.mass()
+        with draft.loop("j", group.pieces, downward=True) as j:
+            reads = group.segments.at(first, j), mass, carried
+            draft.step(tail.gather, *reads, **mass, **carried, **own)
+    if not group.number:
+        own = {name: lane(ref, first) for name, ref in carried.named.items()}
+        across(draft, mount.composite_at_mount, {name: own[name] for name in ("h", "I")})
+        for name in ("pitch", "yaw"):
+            across(draft, mount.wrench_at_mount, F_next=own[name])
+    return Vectors({**inertia, **mass, **tip})
 
 
-def _own_inertia(draft: Draft, links: Vectors, passes: Passes) -> Vectors:
-    """Compute how each tip moves, and the composite inertia of each segment's own links."""
-    # from the base to the tip
-    pose = {"R": _wide(draft, "R", 9, *IDENTITY), "P": _wide(draft, "P", 3, 0)}
-    S = _wide(draft, "S", 12, 0)
-    with draft.loop("j", draft.tail.links):
-        draft.step(link.joint_twist, links, pose, S_=S)
-        draft.step(link.link_pose, links, pose, **pose)
-    draft.step(free_segment.tip_motion, pose, {"S": S}, tip_map=passes.tip[0])
-
-    # from the tip to the base
-    inertia = Vectors({name: _wide(draft, name, size, 0) for name, size in OWN_INERTIA.items()})
-    mass = draft.vectors(mass=1)
-    draft.fill(mass["mass"], 0)
-    carried = inertia.only("h", "I", "pitch", "yaw")
-    own = {f"{name}_": inertia[name] for name in ("H_pp", "H_py", "H_yy")}
-    with draft.loop("j", draft.tail.links, downward=True):
-        draft.step(link.gather_links, links, mass, carried, **mass, **carried, **own)
-    return Vectors({**inertia, **mass})
-
-
-def _bias(draft: Draft, state: StateRefs, links: Vectors, w: Ref) -> Vectors:
+def _bias(group: SegmentGroup, w: Ref) -> Vectors:
     """Compute loads and tip accelerations of each segment that velocities alone cause."""
     draft, first = group.draft, as_index(0)
     with group.at_once():
@@ -189,7 +180,7 @@ def _inward_pass(
 
 
 def _at_torso(
-    draft: Draft, state: StateRefs, body: ArticulatedBody, load: Array, v_dot: Array
+    draft: Draft, state: State, body: ArticulatedBody, load: Array, v_dot: Array
 ) -> tuple[tuple[Array, Ref], Ref]:
     """Accelerate the torso; return its inertia and attitude, and how the mount accelerates."""
     H, rhs = draft.array("H", UNKNOWNS, 6), draft.array("rhs", 6)

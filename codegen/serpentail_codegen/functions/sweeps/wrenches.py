@@ -9,7 +9,7 @@ from ...ir.program import Array, Index, Ref
 from ...mechanics import airborne_power, mount, torso
 from ..draft import Draft
 from ..layout import block
-from ..scope import Motion, StateRefs, Vectors
+from ..scope import Motion, State, Vectors
 from ..tails.mechanism import Segments, Wrenches
 from .pieces import across, attitude, each_piece, each_segment, mechanism, pieces_of
 
@@ -70,7 +70,7 @@ def core_bias(draft: Draft, segments: Segments, bias: Array) -> None:
         torso_wrench(draft, motion, total, bias)
 
 
-def torso_without_acceleration(draft: Draft, state: StateRefs) -> Motion:
+def torso_without_acceleration(draft: Draft, state: State) -> Motion:
     """Return the motion of a torso that falls freely, without gravity in its own axes; a fixed base
     does not fall, and gravity is an acceleration of it.
     """

@@ -7,8 +7,8 @@ from ...ir.program import Array, Ref
 from ...mechanics import airborne_power, link
 from ...scene.variant import SegmentRun
 from ..draft import Draft
-from ..scope import Instead, Motion, StateRefs, Vectors
-from .mechanism import Mechanism, Place, Segments, simplified
+from ..scope import Instead, Motion, State, Vectors
+from .mechanism import Mechanism, Place, Segments, in_turn, simplified
 
 JOINT = {"joint": 4, "twice": 10}
 SIZES = {"link_inertias": 3}  # parameters with more than one number for each link
@@ -49,14 +49,14 @@ def describe_joint(draft: Draft, piece: Vectors) -> None:
         draft.step(link.double_angles, joint, **piece.only("twice"))
 
 
-def prepare_links(draft: Draft, state: StateRefs, doubled: bool = False) -> Segments:
+def prepare_links(draft: Draft, state: State, doubled: bool = False) -> Segments:
     """Link properties, and the trigonometry of every segment's joint."""
     sizes = JOINT if doubled else {"joint": JOINT["joint"]}
     own = link_properties(draft, state)
     return in_turn(draft, "articulated", own, sizes, describe_joint)
 
 
-def prepare_link_samples(draft: Draft, state: StateRefs, segments: Segments | None) -> Segments:
+def prepare_link_samples(draft: Draft, state: State, segments: Segments | None) -> Segments:
     """The tail points are the joints, so the data of the links serve for them, too."""
     return segments or prepare_links(draft, state)
 

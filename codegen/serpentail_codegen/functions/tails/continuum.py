@@ -9,8 +9,8 @@ from ...ir.step import Step
 from ...mechanics import airborne_power, arc, arc_inertia, arc_shape, arc_wrench
 from ...mechanics.lower import derive
 from ..draft import Draft
-from ..scope import Instead, Motion, StateRefs, Vectors
-from .mechanism import Mechanism, Place, Segments, simplified
+from ..scope import Instead, Motion, State, Vectors
+from .mechanism import Mechanism, Place, Segments, in_turn, simplified
 
 ARC = {"tip": 8, "shape": 16, "E": 9, "r": 3, "bend": 12}
 OWN = {"h_own": 3, "I_own": 6, "pitch_own": 6, "yaw_own": 6, "H_own": 3}
@@ -58,7 +58,7 @@ def describe_arc(draft: Draft, piece: Vectors) -> None:
     draft.step(arc_inertia.segment_inertia, piece, **piece.only(*OWN))
 
 
-def prepare_arcs(draft: Draft, state: StateRefs, doubled: bool = False) -> Segments:
+def prepare_arcs(draft: Draft, state: State, doubled: bool = False) -> Segments:
     """Shape, tip and own inertia of every segment."""
     del doubled
     own = section_properties(draft, state)
@@ -88,7 +88,7 @@ def sample_arrays(draft: Draft) -> dict[str, Array]:
     }
 
 
-def prepare_arc_samples(draft: Draft, state: StateRefs, segments: Segments | None) -> Segments:
+def prepare_arc_samples(draft: Draft, state: State, segments: Segments | None) -> Segments:
     """Rotation, position and columns over one n-th of every segment."""
     del segments
     fraction, section = sample_section(draft)

@@ -11,7 +11,7 @@ from ...ir.program import Array, Index, Ref
 from ...ir.step import Step, specialised
 from ...mechanics.lower import derive
 from ..draft import Draft
-from ..scope import Motion, StateRefs, Vectors
+from ..scope import Motion, State, Vectors
 
 StepFunction = Callable[..., dict]  # a function of mechanics, from which a step is derived
 Place = tuple[Index, Index]  # a segment, and a piece
@@ -23,7 +23,7 @@ class Segments:
     all segments share, and arrays with an entry for each piece.
     """
 
-    state: StateRefs
+    state: State
     arrays: dict[str, Array]
     shared: Mapping[str, Ref] = field(default_factory=dict)
     each: Mapping[str, Array] = field(default_factory=dict)
@@ -92,8 +92,11 @@ class Mechanism:
     A place is a segment and one of its pieces. The other fields are steps.
     """
 
-    prepare: Callable[[Draft, StateRefs, bool], Segments]
-    prepare_samples: Callable[[Draft, StateRefs, Segments | None], Segments]
+    prepare: Callable[[Draft, State, bool], Segments]
+    properties: Callable[[Draft, State], Segments]
+    data: Mapping[str, int]
+    describe: Callable[[Draft, Vectors], None]
+    prepare_samples: Callable[[Draft, State, Segments | None], Segments]
     declare_torques: Callable[[Draft], Array | None]
     move: Callable[[Draft, Segments, Place, Motion, Array | None, Vectors], None]
     momentum: Callable[[Draft, Segments, Place, Vectors, Mapping[str, Ref]], None]
@@ -106,7 +109,7 @@ class Mechanism:
     power_and_momentum: StepFunction
 
 
-def simplified(function: StepFunction, state: StateRefs, forced: bool = True) -> Step:
+def simplified(function: StepFunction, state: State, forced: bool = True) -> Step:
     """Return a step, specialised to an animal at rest or to a tail that does not accelerate."""
     step = derive(function)
     if state.v is None:

@@ -9,7 +9,7 @@ from dataclasses import fields, replace
 from typing import Any
 
 from ..draft import Draft
-from ..scope import StateRefs
+from ..scope import State
 from .articulated import ARTICULATED, fill_links, prepare_links
 from .continuum import CONTINUUM, bending_torques, prepare_arc_samples, prepare_arcs
 from .mechanism import Mechanism, Segments
@@ -25,12 +25,12 @@ def both(links: Segments, arcs: Segments) -> Segments:
     )
 
 
-def prepare_both(draft: Draft, state: StateRefs, doubled: bool = False) -> Segments:
+def prepare_both(draft: Draft, state: State, doubled: bool = False) -> Segments:
     """Link properties and trigonometry of joints; shape, tip and own inertia of arcs."""
     return both(prepare_links(draft, state, doubled), prepare_arcs(draft, state))
 
 
-def prepare_both_samples(draft: Draft, state: StateRefs, segments: Segments | None) -> Segments:
+def prepare_both_samples(draft: Draft, state: State, segments: Segments | None) -> Segments:
     """Prepare links by the numbers of their points, and one n-th of each arc, whose frames replace
     those of whole arcs.
     """

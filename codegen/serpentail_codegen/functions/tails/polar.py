@@ -5,7 +5,7 @@ from dataclasses import replace
 from ...ir.program import Array, Ref
 from ...mechanics import polar_arc
 from ..draft import Draft
-from ..scope import Motion, StateRefs, Vectors
+from ..scope import Motion, State, Vectors
 from .continuum import (
     ARC,
     CONTINUUM,
@@ -28,7 +28,7 @@ def guard_polar(draft: Draft, angles: Ref, limit: dict[str, Ref], *protects: Ref
         draft.guard(margin, "OUT_OF_RANGE", *protects)
 
 
-def prepare_polar_arcs(draft: Draft, state: StateRefs, doubled: bool = False) -> Segments:
+def prepare_polar_arcs(draft: Draft, state: State, doubled: bool = False) -> Segments:
     """Integrals over the slices, tip and own inertia of every segment."""
     del doubled
     own = section_properties(draft, state)
@@ -45,7 +45,7 @@ def describe_polar_arc(draft: Draft, piece: Vectors) -> None:
     draft.step(polar_arc.segment_inertia, piece, **piece.only(*OWN))
 
 
-def prepare_polar_samples(draft: Draft, state: StateRefs, segments: Segments | None) -> Segments:
+def prepare_polar_samples(draft: Draft, state: State, segments: Segments | None) -> Segments:
     """Rotation, position and columns over one n-th of every segment."""
     del segments
     fraction, section = sample_section(draft)

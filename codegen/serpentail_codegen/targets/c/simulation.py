@@ -21,6 +21,9 @@ TURNED_AT = {  # where along a tail its turn grows, and by what
 }
 # ros34pw2's error in flight at one tolerance, over that of tsit5: measured, docs/simulation.md
 AIR = 5.0
+# s: how long ros34pw2 takes an error of a rate to last in contact; measured: with it, short steps
+# after a touch and long ones add equally to the error at the end
+LASTING = 1e-3
 # states in the workspace, see simulation/workspace.c.jinja: with contacts; without, dp8 has stages
 SLOTS = {True: 11, False: 2 + len(DP8.nodes) + 2}
 # of simulation/workspace.c.jinja, undefined again where the file ends

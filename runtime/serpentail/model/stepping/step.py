@@ -105,7 +105,8 @@ def step(
 ) -> tuple[np.ndarray, ...]:
     """Return the states after the steps: see ``Model.step``."""
     asked = StepSettings.named(settings)
-    method, stepping = _method(model, asked.method), model.stepping
+    method = _method(model, asked.method)
+    stepping = model.stepping
     length = number("step: h", h, SimulationError, unit="s", above=0)
     steps = whole_number("step: steps", asked.steps, SimulationError, least=1, most=MOST_STEPS)
     threads = model.batch_library.threads

@@ -69,9 +69,8 @@ class Pfl:
     ):
         self.model = model
         needed = NEEDED[:1] if model.fixed else NEEDED
-        missing = [name for name in needed if name not in model.generated]
-        if missing and "pfl" not in model.generated:
-            raise model.without(*missing)
+        if not model.has("pfl"):
+            model.need(*needed)
         self.kp = number("Pfl: kp", kp, SimulationError, unit="1/s2", least=0)
         self.kd = number("Pfl: kd", kd, SimulationError, unit="1/s", least=0)
         self.curve = _curve(reference, model.layout.nt)
