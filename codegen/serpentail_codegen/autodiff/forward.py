@@ -94,7 +94,9 @@ def tangents_together(
 
 def without_writes(body: ir.Body, arrays: Collection[str]) -> ir.Body:
     """Return a body without the statements that write to some arrays."""
-    return rewritten(body, lambda s: () if names(writes(s)) & set(arrays) else (s,))
+    if not arrays:
+        return body
+    return rewritten(body, lambda s: () if names(writes(s)).intersection(arrays) else (s,))
 
 
 def _partly_written(body: ir.Body) -> list[ir.Ref]:

@@ -56,7 +56,7 @@ def identify(
     Parameters
     ----------
     model : Model
-        The model, with the parameters to begin with. Its scene needs "tail_points",
+        The model, with the parameters to begin with. A loaded one needs "tail_points",
         "forward_dynamics", "forward_dynamics_derivatives", "energy", "momentum" and, if parameters
         are estimated, "forward_dynamics_parameter_derivatives".
     data : MarkerTracks, str, path, or a sequence of these

@@ -11,6 +11,7 @@ import numpy as np
 
 from serpentail_scene.layout import OMEGA, QUATERNION, TAIL_Q
 
+from ..basics.attitude import turn_between, turned
 from ..model.model import Model
 from ..model.state_space import product_matrix
 from ..optimal.rules import collocation_rule
@@ -149,15 +150,7 @@ def moved(model: Model, x: np.ndarray, step: np.ndarray) -> np.ndarray:
     nq, nv = model.nq, model.nv
     new = x.copy()
     new[..., :3] += step[..., :3]
-    turn = step[..., OMEGA]
-    angle = np.linalg.norm(turn, axis=-1, keepdims=True)
-    part = np.sinc(angle / (2 * np.pi)) / 2
-    quaternion = x[..., QUATERNION]
-    new[..., QUATERNION] = (
-        np.cos(angle / 2) * quaternion
-        + part * (product_matrix(quaternion) @ turn[..., None])[..., 0]
-    )
-    new[..., QUATERNION] /= np.linalg.norm(new[..., QUATERNION], axis=-1, keepdims=True)
+    new[..., QUATERNION] = turned(x[..., QUATERNION], step[..., OMEGA])
     new[..., TAIL_Q.start : nq] += step[..., 6:nv]
     new[..., nq:] += step[..., nv:]
     return new
@@ -168,14 +161,7 @@ def difference(model: Model, to: np.ndarray, x: np.ndarray) -> np.ndarray:
     nq, nv = model.nq, model.nv
     step = np.zeros((*x.shape[:-1], 2 * nv))
     step[..., :3] = to[..., :3] - x[..., :3]
-    a, b = x[..., QUATERNION], to[..., QUATERNION]
-    vector = (np.swapaxes(product_matrix(a), -1, -2) @ b[..., None])[..., 0]
-    scalar = (a * b).sum(-1, keepdims=True)
-    vector, scalar = np.where(scalar < 0, -vector, vector), np.abs(scalar)
-    size = np.linalg.norm(vector, axis=-1, keepdims=True)
-    angle = 2 * np.arctan2(size, scalar)
-    factor = np.where(size > 1e-9, angle / np.where(size > 0, size, 1), 2 / scalar)
-    step[..., OMEGA] = factor * vector
+    step[..., OMEGA] = turn_between(x[..., QUATERNION], to[..., QUATERNION])
     step[..., 6:nv] = to[..., TAIL_Q.start : nq] - x[..., TAIL_Q.start : nq]
     step[..., nv:] = to[..., nq:] - x[..., nq:]
     return step

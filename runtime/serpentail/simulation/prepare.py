@@ -99,8 +99,9 @@ def choose(
 def long_and_free(actuations: RunActuations, start: Start, parameters: RunParameters) -> bool:
     """Tell whether it is a single long run in which neither damping nor torques act."""
     long = not start.many and start.end - start.start >= LONG
-    damped = np.any(parameters.values.get("tail_damping", 0.0))
-    return long and not damped and not any(each.acts for each in actuations.distinct)
+    if not long or np.any(parameters.values.get("tail_damping", 0.0)):
+        return False
+    return not any(each.acts for each in actuations.distinct)
 
 
 def place_of(model: Model) -> str:

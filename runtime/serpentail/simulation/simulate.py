@@ -51,7 +51,7 @@ def simulate(
     Parameters
     ----------
     model : Model
-        The model; its scene needs the functions "rollout", "energy" and "momentum".
+        The model; a loaded one needs the functions "rollout", "energy" and "momentum".
     q0, v0 : array_like, shapes (nq,) and (nv,)
         State at the start; the quaternion is normalised. With a leading axis, (k, nq) or
         (k, nv), they are k starts; see Notes. In their place one argument may be a ``State``, a

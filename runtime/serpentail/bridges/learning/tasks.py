@@ -55,8 +55,7 @@ class LearningTask:
                 f"{self.name} has no setting {', '.join(map(repr, unknown))}; it has "
                 f"{', '.join(settings)}"
             )
-        for name, value in given.items():
-            settings[name] = value
+        settings |= given
         for name in ("torque", "step", "duration", "angle"):
             settings[name] = number(
                 name, settings[name], SimulationError, unit=UNITS[name], above=0
