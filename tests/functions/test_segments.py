@@ -58,12 +58,20 @@ def test_many_segments_are_exact_too():
 @pytest.mark.parametrize("arcs", [5, pytest.param(16, marks=pytest.mark.slow)])
 def test_many_arcs_are_exact_too(arcs):
     """The size is the point: lanes that fill no vector, and two vectors."""
-    model = st.load(model_folder(arcs, None, functions=[FUNCTION]), profile="reproducible")
+    functions = [FUNCTION, f"{FUNCTION}_vjp"]
+    model = st.load(model_folder(arcs, None, functions=functions), profile="reproducible")
     assert model.manifest["functions"][FUNCTION]["emission"] == "segments"
     exact = ExactContinuum(dict(TABLE_1), arcs)
     q, v, _, tau = (x[0] for x in random_states(arcs, 11, 1, "random"))
     error = block_error(model.forward_dynamics(q, v, tau), exact.forward_dynamics(q, v, tau))
     assert error <= 1e-13
+
+    # the adjoint product, which needs H beside it, along one direction of the rates
+    weights, along, h = np.cos(np.arange(model.nv)), np.sin(np.arange(model.nv)), 1e-5
+    ahead, behind = (exact.forward_dynamics(q, v + step * along, tau) for step in (h, -h))
+    slope = weights @ np.array(ahead - behind, float) / (2 * h)
+    dv = model.forward_dynamics_vjp(q, v, tau, weights)[1]
+    assert dv @ along == pytest.approx(slope, rel=1e-7)
     q[-1] = 6.4
     with pytest.raises(st.StateError, match=rf"segment {arcs} .*6\.4"):
         model.forward_dynamics(q, v, tau)

@@ -37,7 +37,7 @@ def assemble_factored_dynamics(draft: Draft, arrays: dict[str, Array]) -> None:
     if not tail.fixed:
         quaternion = {"quaternion": state.quaternion}
         draft.step(rotations.quaternion_rotation, quaternion, R=arrays["R"].part(0, 9))
-    if draft.dynamics != "composite":
+    if draft.dynamics != "composite" and tail.kind == "articulated":
         factored_dynamics_by_columns(draft, arrays, entry)
         draft.factor(A, size)
         return
