@@ -66,9 +66,14 @@ def _of_motions(verbs: argparse._SubParsersAction) -> None:
         verb.add_argument("--view", metavar="PAGE", help=page)
     _add_sweep(verbs)
     view = verbs.add_parser("view", help="show saved motions in a page, over each other")
-    view.add_argument("files", nargs="+", help="what --save wrote: .npz files")
-    view.add_argument("--folder", help=FOLDER.replace("the model is built", "it is found"))
     view.add_argument("--output", help="the page, by default the first file's name with .html")
+    text = "print the numbers of saved motions beside each other, and their differences"
+    compare = verbs.add_parser("compare", help=text)
+    compare.add_argument("--view", metavar="PAGE", help="write a page of them to this .html file")
+    compare.add_argument("--plot", metavar="FIGURE", help="draw them to this .png, .svg, .pdf file")
+    for verb in (view, compare):
+        verb.add_argument("files", nargs="+", help="what --save wrote: .npz files")
+        verb.add_argument("--folder", help=FOLDER.replace("the model is built", "it is found"))
 
 
 def _scene_verb(

@@ -19,7 +19,7 @@ except KeyboardInterrupt:  # these take longer than Python itself
 
 ROOMS = {  # modules, each with a function of the name of each verb
     "scenes": ("examples", "new", "generate", "schema", "completion"),
-    "motions": ("simulate", "plan", "identify", "sweep", "view"),
+    "motions": ("simulate", "plan", "identify", "sweep", "view", "compare"),
     "models": ("info", "verify", "export", "cache"),
 }
 

@@ -1,4 +1,4 @@
-"""The verbs that make motions, or show them: plan, simulate, identify, sweep, view."""
+"""The verbs that make motions, or show them: plan, simulate, identify, sweep, view, compare."""
 
 import argparse
 from functools import partial
@@ -97,6 +97,17 @@ def view(arguments: argparse.Namespace) -> VerbOutcome:
     path = arguments.output or Path(arguments.files[0]).with_suffix(".html")
     page = page_of(motions, path, names=names)
     return VerbOutcome({"page": str(page)}, str(page))
+
+
+def compare(arguments: argparse.Namespace) -> VerbOutcome:
+    """Return the numbers of saved motions beside each other."""
+    from ..show.compare import compare as compared
+    from ..show.motions import saved_motion
+
+    motions = [saved_motion(file, arguments.folder) for file in arguments.files]
+    both = compared(motions, names=arguments.files)
+    files: Files = {"view": both.view, "plot": lambda path: both.plot(path=path)}
+    return VerbOutcome({"runs": arguments.files, "rows": both.rows}, str(both), True, files)
 
 
 def sweep(arguments: argparse.Namespace) -> VerbOutcome:

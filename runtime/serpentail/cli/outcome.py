@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from ..basics.errors import SerpentailError
 from ..basics.files import refuse_unwritable
 
-OPTIONS = ("save", "film", "view")
+OPTIONS = ("save", "film", "view", "plot")
 SEPARATORS = ("/", os.sep)
 Files = Mapping[str, Callable[[str], object]]  # option with the file's name -> what writes it
 
@@ -63,6 +63,12 @@ def target(option: str, path: str) -> Path:
         from ..show.page.view import checked_path
 
         return checked_path(path)
+    if option == "plot":
+        from ..basics.extras import needed
+        from ..show.pictures.style import figure_path
+
+        needed("matplotlib", "plot")
+        return figure_path(path)
     from ..bridges.containers.tables import checked
 
     return checked(path)

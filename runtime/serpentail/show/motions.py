@@ -1,6 +1,8 @@
 """Which motions are shown: checks of what users give, and saved motions with their models."""
 
 import dataclasses
+import os
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,17 +14,34 @@ from ..model.parameters import independent
 from ..motion.trajectory import Trajectory
 
 GENERATED = Path("generated")
+FILE = (str, os.PathLike)
+Shown = Trajectory | str | os.PathLike[str]  # a motion, or the file that has it
+Motions = Shown | Sequence[Shown] | Mapping[str, Shown]
 
 
-def checked_motions(motions: Any) -> list[Trajectory]:
-    """Return the motions as a list; ViewError if it is empty or holds something else."""
+def checked_motions(motions: Any, names: Any, model: Any) -> tuple[list[Trajectory], Any]:
+    """Return the motions as a list, read if they are files, and their names, if there are any.
+
+    ViewError if there is none, something else or a file that cannot be read, and for names twice.
+    """
+    if isinstance(motions, Mapping):
+        if names is not None:
+            raise ViewError("names: given twice: motions is a dict, whose keys are the names")
+        motions, names = list(motions.values()), list(motions)
     listed = list(motions) if isinstance(motions, list | tuple) else [motions]
+    if names is None and listed and all(isinstance(each, FILE) for each in listed):
+        names = list(map(str, listed))
     for k, motion in enumerate(listed):
-        if not isinstance(motion, Trajectory):
-            raise ViewError(f"motions[{k}]: type {type(motion).__name__}: needs a Trajectory")
+        if isinstance(motion, FILE):
+            listed[k] = saved_motion(motion, model=model)
+        elif not isinstance(motion, Trajectory):
+            raise ViewError(
+                f"motions[{k}]: type {type(motion).__name__}: needs a Trajectory, such as "
+                "plan.trajectory or rollouts[0], or an .npz file"
+            )
     if not listed:
         raise ViewError("motions: none: needs one Trajectory or more")
-    return listed
+    return listed, names
 
 
 def checked_names(names: Any, motions: list[Trajectory]) -> list[str]:
@@ -62,16 +81,19 @@ def checked_models(motions: list[Trajectory], model: Any) -> list[Model]:
     return models
 
 
-def saved_motion(file: str, folder: str | None = None) -> Trajectory:
+def saved_motion(
+    file: str | os.PathLike[str], folder: str | None = None, model: Any = None
+) -> Trajectory:
     """Return the motion of a file with its model; ViewError if one of them is missing.
 
     folder: the model's generated folder; None: the cache and generated/ are searched.
+    model: the model itself, if the caller has it.
     """
     try:
         motion = Trajectory.load(file)
     except (OSError, ValueError) as error:
-        raise ViewError(f"file: value {file!r}: {error}") from error
-    return dataclasses.replace(motion, model=_saved_model(motion, folder))
+        raise ViewError(f"file: value {str(file)!r}: {error}") from error
+    return dataclasses.replace(motion, model=model or _saved_model(motion, folder))
 
 
 def _saved_model(motion: Trajectory, folder: str | None) -> Model:

@@ -14,7 +14,7 @@ from ...basics.errors import ViewError
 from ...basics.files import replacing
 from ...model.model import Model
 from ...motion.trajectory import Trajectory
-from ..motions import checked_models, checked_motions, checked_names
+from ..motions import Motions, checked_models, checked_motions, checked_names
 from .data import page_data
 from .samples import packed, thinned_rows
 
@@ -41,7 +41,7 @@ class Page:
 
 @overload
 def view(
-    motions: Trajectory | Sequence[Trajectory],
+    motions: Motions,
     path: str | os.PathLike[str] = "run.html",
     *,
     names: Sequence[str] | None = None,
@@ -53,7 +53,7 @@ def view(
 
 @overload
 def view(
-    motions: Trajectory | Sequence[Trajectory],
+    motions: Motions,
     path: None,
     *,
     names: Sequence[str] | None = None,
@@ -64,7 +64,7 @@ def view(
 
 
 def view(
-    motions: Trajectory | Sequence[Trajectory],
+    motions: Motions,
     path: str | os.PathLike[str] | None = "run.html",
     *,
     names: Sequence[str] | None = None,
@@ -75,8 +75,9 @@ def view(
 
     Parameters
     ----------
-    motions : Trajectory or sequence of Trajectory
-        The motions. More than 2400 samples are thinned, which the page says.
+    motions : Trajectory, str, path, sequence or dict of these
+        The motions or their .npz files; a dict has names as keys. More than 2400 samples are
+        thinned, which the page says. The page's switch "Side by side" sets several motions apart.
     path : str, path or None, default "run.html"
         The .html file. It contains all that it needs, and loads nothing from elsewhere. It
         replaces an older file when it is complete. With None no file is written: the result is
@@ -117,14 +118,14 @@ def view(
 
 
 def page_text(
-    motions: Trajectory | Sequence[Trajectory],
+    motions: Motions,
     names: Sequence[str] | None = None,
     model: Model | None = None,
     most: int = MOST,
     markers: Sequence[Any] | None = None,
 ) -> str:
     """Return the page of motions as text, with at most ``most`` samples of each; see ``view``."""
-    motions = checked_motions(motions)
+    motions, names = checked_motions(motions, names, model)
     names = checked_names(names, motions)
     models = checked_models(motions, model)
     page, data = template(), page_data(motions, names, models, most)

@@ -14,8 +14,7 @@ from ...basics.checks import number
 from ...basics.errors import ViewError
 from ...basics.extras import needed
 from ...model.model import Model
-from ...motion.trajectory import Trajectory
-from ..motions import checked_motions
+from ..motions import Motions, checked_motions
 from ..page.view import template
 from ..page.view import view as write_page
 from .encode import RATE, Picture, encoder, write_gif, write_mp4
@@ -39,7 +38,7 @@ LASTS = 4.0  # s, of a film without given speed: slow motion, never faster than 
 
 
 def film(
-    motions: Trajectory | Sequence[Trajectory],
+    motions: Motions,
     path: str | os.PathLike[str],
     *,
     speed: float | None = None,
@@ -51,8 +50,8 @@ def film(
 
     Parameters
     ----------
-    motions : Trajectory or sequence of Trajectory
-        The motions.
+    motions : Trajectory, str, path, sequence or dict of these
+        The motions or their .npz files; a dict has names as keys.
     path : str or path
         The file. .mp4 and .gif are moving films with 25 frames per second; .png, .pdf and .svg
         are filmstrips as of ``filmstrip``; .html is the page of ``view``.
@@ -87,7 +86,7 @@ def film(
     if kind in METADATA:
         filmstrip(motions, target, views=views, names=names, model=model)
         return target
-    every = checked_motions(motions)
+    every, names = checked_motions(motions, names, model)
     begin, end = max(m.t[0] for m in every), min(m.t[-1] for m in every)
     if begin >= end:
         raise ViewError("motions: they have no time in common, which a moving film needs")

@@ -9,8 +9,7 @@ import numpy as np
 
 from ...basics.extras import needed
 from ...model.model import Model
-from ...motion.trajectory import Trajectory
-from ..motions import checked_motions
+from ..motions import Motions, checked_motions
 from .frames import Frame, drawn_points, window_around
 from .pen import Pen, draw_animal, draw_ground, draw_moment
 from .sheet import LEFT, Sheet, sheet_of
@@ -26,7 +25,7 @@ VIEWS = ("side", "oblique")
 
 
 def filmstrip(
-    motions: Trajectory | Sequence[Trajectory],
+    motions: Motions,
     path: str | os.PathLike[str] | None = None,
     *,
     frames: int | Sequence[float] = 8,
@@ -41,8 +40,8 @@ def filmstrip(
 
     Parameters
     ----------
-    motions : Trajectory or sequence of Trajectory
-        The motions.
+    motions : Trajectory, str, path, sequence or dict of these
+        The motions or their .npz files; a dict has names as keys.
     path : str or path, optional
         A .pdf, .png or .svg file to write the figure to, whole or not at all.
     frames : int or sequence of float, default 8
@@ -72,7 +71,8 @@ def filmstrip(
         Matplotlib is not installed; it comes with the extra "plot".
     """
     needed("matplotlib", "plot")
-    strip = strip_of(checked_motions(motions), frames, views_of(views), names, model)
+    every, names = checked_motions(motions, names, model)
+    strip = strip_of(every, frames, views_of(views), names, model)
     return drawn(lambda: _draw(strip), path)
 
 

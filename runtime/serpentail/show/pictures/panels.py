@@ -12,37 +12,91 @@ from ...basics.attitude import pitch_roll_yaw, tilt_deg
 from ...model.model import Model
 from ...motion.trajectory import Trajectory
 from ..animal import bends
-from .style import INK, TAIL, Array
+from .style import INK, SERIES, TAIL, Array
 
 # Okabe and Ito, dashed for grey prints
 TRIPLE = (("#0072b2", "-"), ("#d55e00", "--"), ("#009e73", "-."))
 WORLD = ("right $x$", "forward $y$", "up $z$")
 SINGULAR = 0.15  # |cos(pitch)| below which roll and yaw are not drawn: 9 degrees about the vertical
 SEEN = 1e-3  # of a panel's least span
+PALEST = 0.35  # opacity of the last of several runs' curves of one dash
+
+
+Style = tuple[Any, str]  # colour, dash
 
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """One axis, and the curves on it; `still` names curves that stay zero, which are not drawn."""
+    """One axis, the curves on it, and what else the legend has; curves of several runs have gaps.
+
+    A name that begins with "_" is not in the legend.
+    """
 
     label: str
     curves: Array  # (K, n)
     names: Sequence[str]
-    styles: Sequence[tuple[Any, str]]  # (colour, dash)
+    styles: Sequence[Style]
     span: float  # the least
-    still: Sequence[str] = ()
+    key: Sequence[tuple[str, Style]] = ()
 
     def without_still(self) -> "Panel":
-        """The panel with the curves that do not stay zero."""
+        """The panel without the curves that stay zero in all runs, which the legend lists."""
         moves = np.nanmax(np.abs(self.curves), axis=0, initial=0) > SEEN * self.span
-        moving, still = (np.flatnonzero(which).tolist() for which in (moves, ~moves))
+        moving = {name for name, moved in zip(self.names, moves, strict=True) if moved}
+        kept = [k for k, name in enumerate(self.names) if name in moving]
+        still = [name for name in dict.fromkeys(self.names) if name not in moving]
         return replace(
             self,
-            curves=self.curves[:, moving],
-            names=[self.names[k] for k in moving],
-            styles=[self.styles[k] for k in moving],
-            still=[self.names[k] for k in still],
+            curves=self.curves[:, kept],
+            names=[self.names[k] for k in kept],
+            styles=[self.styles[k] for k in kept],
+            key=[(f"{_listed(still)}: 0", (INK, " "))] if still else [],
         )
+
+    def of_runs(self, runs: Sequence[str]) -> "Panel":
+        """The panel of several runs: the legend has the runs, then what dashes and shades mean."""
+        words = {
+            name: ((INK, shade), dash)
+            for name, ((_, shade), dash) in zip(self.names, self.styles, strict=True)
+        }
+        words = words if len(words) + len(self.key) > 1 else {}
+        colours = [(name, (colour_of(k), "-")) for k, name in enumerate(runs)]
+        hidden = [f"_{name}" for name in self.names]
+        return replace(self, names=hidden, key=[*colours, *words.items(), *self.key])
+
+
+def colour_of(run: int) -> str:
+    """The colour of one of several runs."""
+    return SERIES[run % len(SERIES)]
+
+
+def beside(panels: Sequence[Panel]) -> Panel:
+    """Return panels of several runs as one: each run has a colour, and rows of its own.
+
+    Curves of equal dashes, such as those of a tail's segments, become paler from first to last.
+    """
+    most = max(panels, key=lambda panel: len(panel.names))
+    shades: dict[str, float] = {}
+    for dash in {dash for _, dash in most.styles}:
+        alike = [n for n, style in zip(most.names, most.styles, strict=True) if style[1] == dash]
+        shades |= dict(zip(alike, np.linspace(1, PALEST, len(alike)).tolist(), strict=True))
+    sizes = np.array([panel.curves.shape for panel in panels])
+    curves, (row, column) = np.full(sizes.sum(axis=0), np.nan), (0, 0)
+    for panel, (rows, columns) in zip(panels, sizes, strict=True):
+        curves[row : row + rows, column : column + columns] = panel.curves
+        row, column = row + rows, column + columns
+    names = [name for panel in panels for name in panel.names]
+    styles = [
+        ((colour_of(k), shades.get(name, 1.0)), dash)
+        for k, panel in enumerate(panels)
+        for name, (_, dash) in zip(panel.names, panel.styles, strict=True)
+    ]
+    return replace(most, curves=curves, names=names, styles=styles)
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Names of curves, the first and the last of many."""
+    return ", ".join(names) if len(names) < 4 else f"{names[0]} to {names[-1]}"
 
 
 def height(motion: Trajectory, model: Model | None) -> Panel:

@@ -1,4 +1,4 @@
-"""``plot``: panels over time, such as height, attitude, tail and forces."""
+"""``plot``: panels over time, such as height, attitude, tail and forces, of one run or several."""
 
 import math
 import os
@@ -12,7 +12,8 @@ from ...basics.errors import ViewError
 from ...basics.extras import needed
 from ...model.model import Model
 from ...motion.trajectory import Trajectory
-from .panels import PANELS, Panel
+from ..motions import Motions, checked_motions, checked_names
+from .panels import PANELS, Panel, beside, colour_of
 from .style import QUIET, Array, drawn
 
 if TYPE_CHECKING:
@@ -24,6 +25,8 @@ LETTER, HANDLE = 0.056, 0.55  # inches in a legend
 APART = 0.07  # of the time axis, between labels of events
 ABOVE = 0.09  # of a panel, from the first row of labels to the second
 FIRST = ("feet", "torso", "tail")  # whose events are labelled where there is no room for all
+WORDS = {QUIET: "#555555"}  # colours of labels that differ from those of their lines
+Event = tuple[str, dict[str, Any]]  # with its colour
 LEGEND: dict[str, Any] = {
     **{"fontsize": 7, "labelspacing": 0.25, "columnspacing": 1.2, "borderaxespad": 0.2},
     **{"borderpad": 0.1, "frameon": True, "fancybox": False, "framealpha": 1.0},
@@ -32,20 +35,21 @@ LEGEND: dict[str, Any] = {
 
 
 def plot(
-    motion: Trajectory,
+    motions: Motions,
     *panels: str,
     ax: "Axes | Sequence[Axes] | None" = None,
     path: str | os.PathLike[str] | None = None,
+    names: Sequence[str] | None = None,
     model: Model | None = None,
 ) -> tuple["Figure", Any]:
-    """Draw panels of a motion over time.
+    """Draw panels of a motion over time; of several motions in one colour each.
 
     Vertical lines are touch-downs (solid) and take-offs (dashed).
 
     Parameters
     ----------
-    motion : Trajectory
-        The motion.
+    motions : Trajectory, str, path, sequence or dict of these
+        The motions or their .npz files; a dict has names as keys.
     *panels : str
         Names: "height", "attitude", "tilt", "tail", "torque", "force", "rate", "energy",
         "momentum", "angular_momentum". Default: all that do not stay zero.
@@ -53,8 +57,10 @@ def plot(
         Axes to draw on, as many as panels. Default: a new figure.
     path : str or path, optional
         A .pdf, .png or .svg file to write the new figure to, whole or not at all.
+    names : sequence of str, optional
+        Names of several motions, for the legend of the first panel.
     model : Model, optional
-        The model of a motion that was read from a file; it is needed for the bends of segments.
+        The model of motions that were read from files; it is needed for the bends of segments.
 
     Returns
     -------
@@ -73,21 +79,32 @@ def plot(
     Examples
     --------
     >>> figure, axes = st.plot(motion, "height", "tail")  # doctest: +SKIP
+    >>> figure, axes = st.plot({"long": motion, "short": other}, "tilt")  # doctest: +SKIP
     """
     needed("matplotlib", "plot")
-    names = [one_of(f"panels[{k}]", name, PANELS, ViewError) for k, name in enumerate(panels)]
-    if len(motion.t) < 2:
-        raise ViewError("motion: one sample: give at least two to draw over time")
-    model = motion.model if motion.model is not None else model
-    chosen = [PANELS[name](motion, model).without_still() for name in names or PANELS]
-    chosen = chosen if names else [panel for panel in chosen if panel.names]
+    wanted = [one_of(f"panels[{k}]", name, PANELS, ViewError) for k, name in enumerate(panels)]
+    every, names = checked_motions(motions, names, model)
+    for k, motion in enumerate(every):
+        if len(motion.t) < 2:
+            raise ViewError(f"motions[{k}]: one sample: give at least two to draw over time")
+    chosen = [panel_of(name, every, model) for name in wanted or PANELS]
+    chosen = chosen if wanted else [panel for panel in chosen if panel.names]
+    if len(every) > 1:
+        runs = checked_names(names, every)
+        chosen = [panel.of_runs([] if k else runs) for k, panel in enumerate(chosen)]
     if ax is None:
-        return drawn(lambda: stacked(motion, chosen), path)
-    return drawn_on(ax, motion, chosen, path)
+        return drawn(lambda: stacked(every, chosen), path)
+    return drawn_on(ax, every, chosen, path)
+
+
+def panel_of(name: str, motions: list[Trajectory], model: Model | None) -> Panel:
+    """A panel of one motion or several, without curves that stay zero."""
+    each = [PANELS[name](motion, motion.model or model) for motion in motions]
+    return (each[0] if len(each) == 1 else beside(each)).without_still()
 
 
 def drawn_on(
-    ax: Any, motion: Trajectory, chosen: list[Panel], path: str | os.PathLike[str] | None
+    ax: Any, motions: list[Trajectory], chosen: list[Panel], path: str | os.PathLike[str] | None
 ) -> tuple["Figure", Any]:
     """Draw on given axes, without changing their style."""
     every = np.atleast_1d(np.asarray(ax, dtype=object)).ravel()
@@ -95,11 +112,11 @@ def drawn_on(
         raise ViewError(f"ax: {len(every)} axes for {len(chosen)} panels: name one panel for each")
     if path is not None:
         raise ViewError("path: is for a new figure only: leave ax out, or save ax.figure")
-    _draw(every, motion, chosen)
+    _draw(every, motions, chosen)
     return every[0].figure, ax
 
 
-def stacked(motion: Trajectory, chosen: list[Panel]) -> tuple["Figure", Array]:
+def stacked(motions: list[Trajectory], chosen: list[Panel]) -> tuple["Figure", Array]:
     """A figure of stacked panels."""
     from .figure import Drawing
 
@@ -107,18 +124,25 @@ def stacked(motion: Trajectory, chosen: list[Panel]) -> tuple["Figure", Array]:
     figure = Drawing(figsize=(WIDTH, 0.6 + sum(tall)), layout="constrained")
     look: dict[str, Any] = {"squeeze": False, "height_ratios": tall}
     every = figure.subplots(len(chosen), 1, sharex=True, **look)[:, 0]
-    _draw(every, motion, chosen)
+    _draw(every, motions, chosen)
     figure.align_ylabels(every)
     return figure, every
 
 
-def _draw(every: Any, motion: Trajectory, chosen: list[Panel]) -> None:
+def _draw(every: Any, motions: list[Trajectory], chosen: list[Panel]) -> None:
     """A panel on each of the axes, marks of events on all."""
+    t = np.concatenate([motion.t for motion in motions])
+    colours = [colour_of(k) for k in range(len(motions))] if len(motions) > 1 else [QUIET]
+    events = [
+        (colour, event)
+        for colour, motion in zip(colours, motions, strict=True)
+        for event in _events(motion)
+    ]
     for axes, panel in zip(every, chosen, strict=True):
-        _draw_panel(axes, motion.t, panel)
-        _draw_events(axes, motion)
-    _label_events(every[0], motion)
-    every[-1].set(xlabel="time [s]", xlim=(motion.t[0], motion.t[-1]))
+        _draw_panel(axes, t, panel)
+        _draw_events(axes, events)
+    _label_events(every[0], events, APART * (t.max() - t.min()))
+    every[-1].set(xlabel="time [s]", xlim=(t.min(), t.max()))
 
 
 def _draw_panel(axes: "Axes", t: Array, panel: Panel) -> None:
@@ -128,8 +152,8 @@ def _draw_panel(axes: "Axes", t: Array, panel: Panel) -> None:
     # curves
     for curve, name, (colour, dash) in zip(panel.curves.T, panel.names, panel.styles, strict=True):
         axes.plot(t, curve, dash, color=colour, label=name)
-    if panel.still:
-        axes.plot([], [], " ", label=f"{_listed(panel.still)}: 0")
+    for name, (colour, dash) in panel.key:
+        axes.plot([], [], dash, color=colour, label=name)
 
     # the axis, with room for the legend
     size = axes.get_window_extent().transformed(axes.figure.dpi_scale_trans.inverted())
@@ -161,7 +185,7 @@ def _limits(panel: Panel) -> tuple[float, float]:
 
 def _legend_rows(panel: Panel, width: float) -> tuple[int, int]:
     """Rows and columns of a legend on axes of a width in inches; none for a single curve."""
-    labels = [*panel.names, *([f"{_listed(panel.still)}: 0"] if panel.still else [])]
+    labels = [name for name in panel.names if name[0] != "_"] + [name for name, _ in panel.key]
     if len(labels) < 2:
         return 0, 0
     letters = max(len(label.replace("$", "").replace("\\phi_", "")) for label in labels)
@@ -169,35 +193,31 @@ def _legend_rows(panel: Panel, width: float) -> tuple[int, int]:
     return math.ceil(len(labels) / columns), columns
 
 
-def _listed(names: Sequence[str]) -> str:
-    """Names of curves, the first and the last of many."""
-    return ", ".join(names) if len(names) < 4 else f"{names[0]} to {names[-1]}"
-
-
 def _events(motion: Trajectory) -> list[dict[str, Any]]:
     """Touch-downs and take-offs, as far as they are known."""
     return [] if "events" not in motion.info else motion.events
 
 
-def _draw_events(axes: "Axes", motion: Trajectory) -> None:
+def _draw_events(axes: "Axes", events: Sequence[Event]) -> None:
     """A vertical line at each event."""
     for kind, dash in (("touch_down", "-"), ("take_off", "--")):
-        times = [event["time"] for event in _events(motion) if event["kind"] == kind]
-        if times:
-            look: dict[str, Any] = {"colors": QUIET, "linewidth": 0.6, "zorder": 0.5}
+        marks = [(colour, event["time"]) for colour, event in events if event["kind"] == kind]
+        if marks:
+            colours, times = zip(*marks, strict=True)
+            look: dict[str, Any] = {"colors": colours, "linewidth": 0.6, "zorder": 0.5}
             look |= {"transform": axes.get_xaxis_transform(), "label": f"_{kind}"}
             axes.vlines(times, 0, 1, linestyles=dash, **look)
 
 
-def _label_events(axes: "Axes", motion: Trajectory) -> None:
+def _label_events(axes: "Axes", events: Sequence[Event], apart: float) -> None:
     """What happens, above the first axes, in two rows: feet first, then torso, then tail."""
     words = {"touch_down": "on", "take_off": "off"}
-    apart, rows = APART * (motion.t[-1] - motion.t[0]), [[math.inf], [math.inf]]
-    for event in sorted(_events(motion), key=lambda each: FIRST.index(each["group"])):
+    rows = [[math.inf], [math.inf]]
+    for colour, event in sorted(events, key=lambda each: FIRST.index(each[1]["group"])):
         time, text = event["time"], f"{event['group']} {words[event['kind']]}"
         free = [k for k, row in enumerate(rows) if min(abs(time - x) for x in row) > apart]
         if free:
             rows[free[0]].append(time)
             look: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": 6}
-            look |= {"transform": axes.get_xaxis_transform(), "color": "#555555"}
+            look |= {"transform": axes.get_xaxis_transform(), "color": WORDS.get(colour, colour)}
             axes.text(time, 1.02 + ABOVE * free[0], text, **look)

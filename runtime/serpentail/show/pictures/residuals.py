@@ -47,7 +47,7 @@ def _figure(motion: Trajectory, residuals: Residuals, bands: Bands) -> tuple["Fi
     power = Panel("power\n[mW]", tau.curves * rates, coordinates, styles, 0.01)
     dots = [(colour, ".") for colour in colours]
     figure, every = stacked(
-        motion, [Panel("residual\n[mm]", distances, names, dots, 0.1), tau, power]
+        [motion], [Panel("residual\n[mm]", distances, names, dots, 0.1), tau, power]
     )
     usual = 1e3 * noise * np.sqrt(3)
     noise_label = f"rms of noise: {usual:.2g} mm"

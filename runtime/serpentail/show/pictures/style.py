@@ -24,6 +24,8 @@ METADATA: dict[str, dict[str, Any]] = {
 DPI = 200
 INK, QUIET, TORSO, TAIL, HEAD = "#222222", "#8c8c8c", "#c6e0f0", "#d55e00", "#0072b2"
 LEG, FORCE = "#009e73", "#cc79a7"  # Okabe and Ito
+# of runs, as in the page
+SERIES = ("#0072b2", "#d55e00", "#00805d", "#b5508c", "#a86f00", "#3a8fc4", "#6b5bb5", "#555555")
 SHADE, SHADOW = "#ecebe6", "#c9c7bf"  # the ground
 STYLE: dict[str, Any] = {
     "svg.hashsalt": "serpentail",
@@ -42,19 +44,23 @@ STYLE: dict[str, Any] = {
 Drawn = tuple["Figure", Any]  # with its axes
 
 
+def figure_path(path: str | os.PathLike[str]) -> Path:
+    """Return the path of a figure; ViewError if its suffix is of no known format."""
+    target = Path(path)
+    if target.suffix.lower() not in METADATA:
+        known = ", ".join(METADATA)
+        raise ViewError(f"figure {str(path)!r} has suffix {target.suffix!r}: use one of {known}")
+    return target
+
+
 def drawn(draw: Callable[[], Drawn], path: str | os.PathLike[str] | None) -> Drawn:
     """Draw in the shared style; with a path, write the figure too, whole or not at all.
 
-    The same figure gives the same bytes. ViewError if the path's suffix is of no known format.
+    The same figure gives the same bytes. ViewError is that of ``figure_path``.
     """
     from matplotlib import style
 
-    kind = "" if path is None else Path(path).suffix.lower()
-    if path is not None and kind not in METADATA:
-        known = ", ".join(METADATA)
-        raise ViewError(
-            f"figure {str(path)!r} has suffix {Path(path).suffix!r}: use one of {known}"
-        )
+    kind = "" if path is None else figure_path(path).suffix.lower()
     with style.context(STYLE, after_reset=True):
         figure, axes = draw()
         if path is not None:
