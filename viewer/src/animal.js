@@ -15,6 +15,7 @@ import { BALL, Balls, Heads, Rods } from "./shapes.js";
 import { colour, series } from "./theme.js";
 import { Torso } from "./torso.js";
 
+const GHOST = 0.5; // opacity of all runs but the first
 const LEG = 6; // joints: hip, D, knee, A, M and T
 const from = new Vector3();
 const to = new Vector3();
@@ -23,7 +24,7 @@ const force = new Vector3();
 // Offsets the depth of each run. Where runs overlap, the first one is drawn, not spots of each.
 const ghost = (k) => ({
   transparent: true,
-  opacity: 0.5,
+  opacity: GHOST,
   polygonOffset: true,
   polygonOffsetFactor: k,
   polygonOffsetUnits: 4 * k,
@@ -93,6 +94,13 @@ export class Animal {
     this.materials.marker.color.set(colour("marker"));
     this.centre.material.color.set(colour("centre"));
     this.path.material.color.set(this.alone ? colour("path") : own);
+  }
+
+  // Side by side, no run is seen through another.
+  setSolid(on) {
+    this.group.traverse(({ material }) => {
+      if (material?.polygonOffset) material.opacity = on ? 1 : GHOST;
+    });
   }
 
   show(t) {

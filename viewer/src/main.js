@@ -48,6 +48,9 @@ async function open() {
   const look = () => stage?.look(views.value);
   views.addEventListener("change", look);
   find("follow").addEventListener("change", () => stage?.follow(find("follow").checked));
+  const apart = find("apart");
+  apart.addEventListener("change", () => stage?.setApart(apart.checked, views.value));
+  apart.parentElement.hidden = runs.length === 1;
   look();
   document.addEventListener("keydown", (event) => obey(event, player, switches, look));
   return player;
@@ -55,7 +58,7 @@ async function open() {
 
 function obey(event, player, switches, look) {
   if (event.ctrlKey || event.altKey || event.metaKey || event.target.matches("select")) return;
-  const own = { f: () => find("follow").click(), r: look };
+  const own = { f: () => find("follow").click(), s: () => find("apart").click(), r: look };
   const action = player.action(event) ?? own[event.key] ?? switched(switches, event.key);
   if (!action) return;
   event.preventDefault();

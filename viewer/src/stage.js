@@ -30,6 +30,7 @@ const VIEWS = {
 };
 const FIELD = 35; // degrees
 const DISTANCE = 2.5; // of the camera, in lengths of the animal
+const APART = 1.3; // between runs side by side, in lengths of the animal
 const SQUARES = 60; // of the ground, along and across
 
 // Each edge of a square is a line of its own, because a browser may not draw a long line that
@@ -65,6 +66,7 @@ export class Stage {
     this.ground = new Group();
     this.scene.add(this.ground);
     this.following = true;
+    this.apart = false;
     this.at = new Vector3();
     this.grounded = runs.some((run) => run.grounded);
     this.paint();
@@ -117,35 +119,56 @@ export class Stage {
       );
   }
 
-  // The camera follows the first run that is shown.
-  get followed() {
-    return this.animals.find((animal) => animal.group.visible) ?? this.animals[0];
+  // The camera follows the first run that is shown; side by side, the middle of all that are.
+  followed() {
+    const shown = this.animals.filter((animal) => animal.group.visible);
+    const seen = shown.length ? shown : this.animals;
+    const sum = new Vector3();
+    const few = this.apart ? seen : seen.slice(0, 1);
+    for (const { centre, group } of few) sum.add(centre.position).add(group.position);
+    return sum.divideScalar(few.length);
   }
 
   look(view) {
     const away = new Vector3(...VIEWS[view]).normalize();
     const narrow = Math.min(this.camera.aspect, 1);
-    this.at.copy(this.followed.centre.position);
+    this.place(away);
+    this.at.copy(this.followed());
     this.orbit.target.copy(this.at);
-    this.camera.position.copy(this.at).addScaledVector(away, (DISTANCE * this.length) / narrow);
+    const wide = this.apart ? 1 + (0.8 * (this.animals.length - 1)) / this.camera.aspect : 1;
+    const distance = (wide * DISTANCE * this.length) / narrow;
+    this.camera.position.copy(this.at).addScaledVector(away, distance);
     this.orbit.update();
     this.render();
   }
 
+  // Side by side, the runs stand in a row from left to right, across the view.
+  place({ x, y }) {
+    const across = new Vector3(-y, x, 0).normalize();
+    const step = this.apart ? APART * this.length : 0;
+    this.animals.forEach(({ group }, k) => group.position.copy(across).multiplyScalar(k * step));
+  }
+
+  setApart(on, view) {
+    this.apart = on;
+    for (const animal of this.animals) animal.setSolid(on);
+    this.look(view);
+  }
+
   follow(on) {
     this.following = on;
-    this.at.copy(this.followed.centre.position);
+    this.at.copy(this.followed());
   }
 
   switchRun(k, on) {
     this.animals[k].group.visible = on;
-    this.at.copy(this.followed.centre.position);
+    this.at.copy(this.followed());
     this.render();
   }
 
   show(t) {
     for (const animal of this.animals) animal.show(t);
-    const centre = this.followed.centre.position;
+    const centre = this.followed();
     this.moveGround(centre);
     if (this.following) {
       this.camera.position.add(centre).sub(this.at);
