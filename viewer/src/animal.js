@@ -96,10 +96,11 @@ export class Animal {
     this.path.material.color.set(this.alone ? colour("path") : own);
   }
 
-  // Side by side, no run is seen through another.
-  setSolid(on) {
+  // Moves all by k steps; a run that stands apart is not seen through.
+  place(step, k, apart) {
+    this.group.position.copy(step).multiplyScalar(k);
     this.group.traverse(({ material }) => {
-      if (material?.polygonOffset) material.opacity = on ? 1 : GHOST;
+      if (material?.polygonOffset) material.opacity = apart ? 1 : GHOST;
     });
   }
 

@@ -45,12 +45,12 @@ async function open() {
   resize();
   player.seek(player.begin);
   const views = find("camera");
-  const look = () => stage?.look(views.value);
+  const apart = find("apart");
+  const look = () => stage?.look(views.value, apart.checked);
+  apart.addEventListener("change", look);
+  apart.parentElement.hidden = runs.length === 1;
   views.addEventListener("change", look);
   find("follow").addEventListener("change", () => stage?.follow(find("follow").checked));
-  const apart = find("apart");
-  apart.addEventListener("change", () => stage?.setApart(apart.checked, views.value));
-  apart.parentElement.hidden = runs.length === 1;
   look();
   document.addEventListener("keydown", (event) => obey(event, player, switches, look));
   return player;

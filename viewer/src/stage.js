@@ -66,7 +66,6 @@ export class Stage {
     this.ground = new Group();
     this.scene.add(this.ground);
     this.following = true;
-    this.apart = false;
     this.at = new Vector3();
     this.grounded = runs.some((run) => run.grounded);
     this.paint();
@@ -129,30 +128,20 @@ export class Stage {
     return sum.divideScalar(few.length);
   }
 
-  look(view) {
+  // Side by side, the runs stand in a row from left to right, across the view.
+  look(view, apart) {
+    this.apart = apart;
     const away = new Vector3(...VIEWS[view]).normalize();
+    const across = new Vector3(-away.y, away.x, 0).setLength(apart ? APART * this.length : 0);
+    this.animals.forEach((animal, k) => animal.place(across, k, apart));
     const narrow = Math.min(this.camera.aspect, 1);
-    this.place(away);
     this.at.copy(this.followed());
     this.orbit.target.copy(this.at);
-    const wide = this.apart ? 1 + (0.8 * (this.animals.length - 1)) / this.camera.aspect : 1;
+    const wide = apart ? 1 + (0.8 * (this.animals.length - 1)) / this.camera.aspect : 1;
     const distance = (wide * DISTANCE * this.length) / narrow;
     this.camera.position.copy(this.at).addScaledVector(away, distance);
     this.orbit.update();
     this.render();
-  }
-
-  // Side by side, the runs stand in a row from left to right, across the view.
-  place({ x, y }) {
-    const across = new Vector3(-y, x, 0).normalize();
-    const step = this.apart ? APART * this.length : 0;
-    this.animals.forEach(({ group }, k) => group.position.copy(across).multiplyScalar(k * step));
-  }
-
-  setApart(on, view) {
-    this.apart = on;
-    for (const animal of this.animals) animal.setSolid(on);
-    this.look(view);
   }
 
   follow(on) {

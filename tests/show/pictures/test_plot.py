@@ -120,6 +120,27 @@ def test_angles_have_gaps_where_they_mean_little_and_the_tilt_has_none():
     np.testing.assert_allclose(curves(axes)["tilt"].get_ydata(), wanted, atol=1e-5)
 
 
+def test_runs_of_any_times_have_a_colour_each(tmp_path):
+    """Of tails of one segment and of two; the first panel's legend has their names."""
+    runs = {"one": flight(segments=1), "two": flight(segments=2, samples=31)}
+    _, axes = st.plot(runs, "tilt", "tail", "momentum", path=tmp_path / "both.png")
+    legends = [[text.get_text() for text in each.get_legend().get_texts()] for each in axes]
+    assert legends[0] == ["one", "two"]
+    assert set(legends[1]) == {"pitch", "yaw", "pitch 1", "pitch 2", "yaw 1", "yaw 2"}
+    assert legends[2] == ["forward $y$", "up $z$", "right $x$: 0"] and len(curves(axes[2])) == 2
+    drawn = [line for line in axes[0].lines if len(line.get_xdata())]
+    for line, (name, run), key in zip(drawn, runs.items(), axes[0].lines[2:], strict=True):
+        _, (alone,) = run.plot("tilt")
+        x, y = line.get_data()
+        with row(name):
+            np.testing.assert_array_equal(x[np.isfinite(y)], run.t)
+            np.testing.assert_array_equal(y[np.isfinite(y)], curves(alone)["tilt"].get_ydata())
+            assert line.get_color() == key.get_color()
+    assert drawn[0].get_color() != drawn[1].get_color()
+    with pytest.raises(st.ViewError, match="motions.1.: type int"):
+        st.plot([flight(), 1], "tilt")
+
+
 def test_everything_is_labelled_and_legends_cover_nothing():
     every = []
     with matplotlib.rc_context(STYLE):

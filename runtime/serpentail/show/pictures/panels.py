@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ TRIPLE = (("#0072b2", "-"), ("#d55e00", "--"), ("#009e73", "-."))
 WORLD = ("right $x$", "forward $y$", "up $z$")
 SINGULAR = 0.15  # |cos(pitch)| below which roll and yaw are not drawn: 9 degrees about the vertical
 SEEN = 1e-3  # of a panel's least span
-PALEST = 0.35  # opacity of the last of several runs' curves of one dash
+DASHES = ("-", "--", "-.", ":")  # of the curves of several runs
 
 
 Style = tuple[Any, str]  # colour, dash
@@ -53,45 +54,32 @@ class Panel:
             key=[(f"{_listed(still)}: 0", (INK, " "))] if still else [],
         )
 
-    def of_runs(self, runs: Sequence[str]) -> "Panel":
-        """The panel of several runs: the legend has the runs, then what dashes and shades mean."""
-        words = {
-            name: ((INK, shade), dash)
-            for name, ((_, shade), dash) in zip(self.names, self.styles, strict=True)
-        }
-        words = words if len(words) + len(self.key) > 1 else {}
-        colours = [(name, (colour_of(k), "-")) for k, name in enumerate(runs)]
-        hidden = [f"_{name}" for name in self.names]
-        return replace(self, names=hidden, key=[*colours, *words.items(), *self.key])
-
 
 def colour_of(run: int) -> str:
     """The colour of one of several runs."""
     return SERIES[run % len(SERIES)]
 
 
-def beside(panels: Sequence[Panel]) -> Panel:
-    """Return panels of several runs as one: each run has a colour, and rows of its own.
+def beside(panels: Sequence[Panel], runs: Sequence[str]) -> Panel:
+    """Return panels of several runs as one: a colour for each run, a dash for each curve.
 
-    Curves of equal dashes, such as those of a tail's segments, become paler from first to last.
+    The legend has the given names of runs, and the dashes. Each run has rows of its own.
     """
     most = max(panels, key=lambda panel: len(panel.names))
-    shades: dict[str, float] = {}
-    for dash in {dash for _, dash in most.styles}:
-        alike = [n for n, style in zip(most.names, most.styles, strict=True) if style[1] == dash]
-        shades |= dict(zip(alike, np.linspace(1, PALEST, len(alike)).tolist(), strict=True))
-    sizes = np.array([panel.curves.shape for panel in panels])
-    curves, (row, column) = np.full(sizes.sum(axis=0), np.nan), (0, 0)
-    for panel, (rows, columns) in zip(panels, sizes, strict=True):
-        curves[row : row + rows, column : column + columns] = panel.curves
-        row, column = row + rows, column + columns
+    ends = np.cumsum([len(panel.curves) for panel in panels])
+    curves = []
+    for panel, end in zip(panels, ends, strict=True):
+        gap = (end - len(panel.curves), ends[-1] - end)
+        curves.append(np.pad(panel.curves, (gap, (0, 0)), constant_values=np.nan))
     names = [name for panel in panels for name in panel.names]
-    styles = [
-        ((colour_of(k), shades.get(name, 1.0)), dash)
-        for k, panel in enumerate(panels)
-        for name, (_, dash) in zip(panel.names, panel.styles, strict=True)
-    ]
-    return replace(most, curves=curves, names=names, styles=styles)
+    dashes = dict(zip(dict.fromkeys(names), cycle(DASHES), strict=False))
+    styles = [(colour_of(k), dashes[x]) for k, panel in enumerate(panels) for x in panel.names]
+    whole = replace(most, curves=np.hstack(curves), names=names, styles=styles).without_still()
+    left = {name: (INK, dashes[name]) for name in whole.names}
+    words = left.items() if len(left) + len(whole.key) > 1 else ()
+    colours = [(name, (colour_of(k), "-")) for k, name in enumerate(runs)]
+    hidden = [f"_{name}" for name in whole.names]
+    return replace(whole, names=hidden, key=[*colours, *words, *whole.key])
 
 
 def _listed(names: Sequence[str]) -> str:

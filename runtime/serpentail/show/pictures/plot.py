@@ -87,33 +87,23 @@ def plot(
     for k, motion in enumerate(every):
         if len(motion.t) < 2:
             raise ViewError(f"motions[{k}]: one sample: give at least two to draw over time")
-    chosen = [panel_of(name, every, model) for name in wanted or PANELS]
-    chosen = chosen if wanted else [panel for panel in chosen if panel.names]
-    if len(every) > 1:
-        runs = checked_names(names, every)
-        chosen = [panel.of_runs([] if k else runs) for k, panel in enumerate(chosen)]
+    runs = checked_names(names, every) if len(every) > 1 else []
+    chosen: list[Panel] = []
+    for name in wanted or PANELS:
+        each = [PANELS[name](motion, motion.model or model) for motion in every]
+        panel = beside(each, [] if chosen else runs) if runs else each[0].without_still()
+        if wanted or panel.names:
+            chosen.append(panel)
     if ax is None:
         return drawn(lambda: stacked(every, chosen), path)
-    return drawn_on(ax, every, chosen, path)
-
-
-def panel_of(name: str, motions: list[Trajectory], model: Model | None) -> Panel:
-    """A panel of one motion or several, without curves that stay zero."""
-    each = [PANELS[name](motion, motion.model or model) for motion in motions]
-    return (each[0] if len(each) == 1 else beside(each)).without_still()
-
-
-def drawn_on(
-    ax: Any, motions: list[Trajectory], chosen: list[Panel], path: str | os.PathLike[str] | None
-) -> tuple["Figure", Any]:
-    """Draw on given axes, without changing their style."""
-    every = np.atleast_1d(np.asarray(ax, dtype=object)).ravel()
-    if len(every) != len(chosen):
-        raise ViewError(f"ax: {len(every)} axes for {len(chosen)} panels: name one panel for each")
+    # given axes keep their style
+    given = np.atleast_1d(np.asarray(ax, dtype=object)).ravel()
+    if len(given) != len(chosen):
+        raise ViewError(f"ax: {len(given)} axes for {len(chosen)} panels: name one panel for each")
     if path is not None:
         raise ViewError("path: is for a new figure only: leave ax out, or save ax.figure")
-    _draw(every, motions, chosen)
-    return every[0].figure, ax
+    _draw(given, every, chosen)
+    return given[0].figure, ax
 
 
 def stacked(motions: list[Trajectory], chosen: list[Panel]) -> tuple["Figure", Array]:
@@ -136,7 +126,7 @@ def _draw(every: Any, motions: list[Trajectory], chosen: list[Panel]) -> None:
     events = [
         (colour, event)
         for colour, motion in zip(colours, motions, strict=True)
-        for event in _events(motion)
+        for event in motion.info.get("events", [])
     ]
     for axes, panel in zip(every, chosen, strict=True):
         _draw_panel(axes, t, panel)
@@ -191,11 +181,6 @@ def _legend_rows(panel: Panel, width: float) -> tuple[int, int]:
     letters = max(len(label.replace("$", "").replace("\\phi_", "")) for label in labels)
     columns = max(1, min(len(labels), int(width / (LETTER * letters + HANDLE))))
     return math.ceil(len(labels) / columns), columns
-
-
-def _events(motion: Trajectory) -> list[dict[str, Any]]:
-    """Touch-downs and take-offs, as far as they are known."""
-    return [] if "events" not in motion.info else motion.events
 
 
 def _draw_events(axes: "Axes", events: Sequence[Event]) -> None:

@@ -46,13 +46,11 @@ def _figure(motion: Trajectory, residuals: Residuals, bands: Bands) -> tuple["Fi
     rates = motion.v[:, -motion.tau.shape[1] :][:, order]
     power = Panel("power\n[mW]", tau.curves * rates, coordinates, styles, 0.01)
     dots = [(colour, ".") for colour in colours]
-    figure, every = stacked(
-        [motion], [Panel("residual\n[mm]", distances, names, dots, 0.1), tau, power]
-    )
     usual = 1e3 * noise * np.sqrt(3)
-    noise_label = f"rms of noise: {usual:.2g} mm"
-    every[0].axhline(usual, color=QUIET, linewidth=0.8, zorder=0.5, label=noise_label)
-    labelled(every[0], len(names) + 1)
+    key = [(f"rms of noise: {usual:.2g} mm", (QUIET, "-"))]
+    off_by = Panel("residual\n[mm]", distances, names, dots, 0.1, key)
+    figure, every = stacked([motion], [off_by, tau, power])
+    every[0].axhline(usual, color=QUIET, linewidth=0.8, zorder=0.5)
     if bands is not None:
         times, low, high, probability = bands
         shown = np.stack([np.interp(times, motion.t, row) for row in rates.T], axis=1)
