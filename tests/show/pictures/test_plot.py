@@ -137,7 +137,7 @@ def test_runs_of_any_times_have_a_colour_each(tmp_path):
             np.testing.assert_array_equal(y[np.isfinite(y)], curves(alone)["tilt"].get_ydata())
             assert line.get_color() == key.get_color()
     assert drawn[0].get_color() != drawn[1].get_color()
-    with pytest.raises(st.ViewError, match="motions.1.: type int"):
+    with pytest.raises(st.ViewError, match=r"motions\[1\]: type int"):
         st.plot([flight(), 1], "tilt")
 
 

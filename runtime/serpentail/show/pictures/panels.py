@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -21,8 +20,6 @@ WORLD = ("right $x$", "forward $y$", "up $z$")
 SINGULAR = 0.15  # |cos(pitch)| below which roll and yaw are not drawn: 9 degrees about the vertical
 SEEN = 1e-3  # of a panel's least span
 DASHES = ("-", "--", "-.", ":")  # of the curves of several runs
-
-
 Style = tuple[Any, str]  # colour, dash
 
 
@@ -63,7 +60,8 @@ def colour_of(run: int) -> str:
 def beside(panels: Sequence[Panel], runs: Sequence[str]) -> Panel:
     """Return panels of several runs as one: a colour for each run, a dash for each curve.
 
-    The legend has the given names of runs, and the dashes. Each run has rows of its own.
+    After four curves the dashes come again, paler. The legend has the given names of runs, and
+    the dashes. Each run has rows of its own.
     """
     most = max(panels, key=lambda panel: len(panel.names))
     ends = np.cumsum([len(panel.curves) for panel in panels])
@@ -72,12 +70,16 @@ def beside(panels: Sequence[Panel], runs: Sequence[str]) -> Panel:
         gap = (end - len(panel.curves), ends[-1] - end)
         curves.append(np.pad(panel.curves, (gap, (0, 0)), constant_values=np.nan))
     names = [name for panel in panels for name in panel.names]
-    dashes = dict(zip(dict.fromkeys(names), cycle(DASHES), strict=False))
-    styles = [(colour_of(k), dashes[x]) for k, panel in enumerate(panels) for x in panel.names]
+    looks = {name: divmod(i, len(DASHES)) for i, name in enumerate(dict.fromkeys(names))}
+
+    def style(colour: str, name: str) -> Style:
+        return (colour, 1 / (1 + looks[name][0])), DASHES[looks[name][1]]
+
+    styles = [style(colour_of(k), name) for k, panel in enumerate(panels) for name in panel.names]
     whole = replace(most, curves=np.hstack(curves), names=names, styles=styles).without_still()
-    left = {name: (INK, dashes[name]) for name in whole.names}
+    left = {name: style(INK, name) for name in whole.names}
     words = left.items() if len(left) + len(whole.key) > 1 else ()
-    colours = [(name, (colour_of(k), "-")) for k, name in enumerate(runs)]
+    colours = [(name, ((colour_of(k), 1.0), "-")) for k, name in enumerate(runs)]
     hidden = [f"_{name}" for name in whole.names]
     return replace(whole, names=hidden, key=[*colours, *words, *whole.key])
 
