@@ -246,7 +246,7 @@ def test_page_and_figure_have_what_was_measured_and_its_gaps(tmp_path):
     bands = found.trials[0].torques
     edge = axes[1].collections[1].get_paths()[0].vertices[:, 1]
     assert edge.min() == pytest.approx(1e3 * bands.low[:, 1].min())
-    curves = [line.get_ydata() for line in axes[0].lines[:-1]]
+    curves = [line.get_ydata() for line in axes[0].lines[: len(data.names)]]
     distance = 1e3 * np.linalg.norm(found.trials[0].residuals, axis=2)
     np.testing.assert_allclose(np.array(curves).T, distance)
     np.testing.assert_allclose(axes[2].lines[1].get_ydata(), 1e3 * found.trials[0].power[:, 1])
