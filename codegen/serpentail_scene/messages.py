@@ -15,13 +15,19 @@ ALIASES = {
 }
 
 
-def did_you_mean(value: object, names: Collection[str]) -> str:
-    """Return a question with the nearest name; "" if no name is near."""
+def nearest(value: object, names: Collection[str]) -> str:
+    """Return the nearest name; "" if no name is near."""
     text = value[:64] if isinstance(value, str) else ""
     alias = ALIASES.get(text.lower(), "")
     near = [alias] if alias in names else get_close_matches(text, names, 1)
     near = near or get_close_matches(text.lower(), names, 1)
-    return f"did you mean {near[0]!r}?" if near else ""
+    return near[0] if near else ""
+
+
+def did_you_mean(value: object, names: Collection[str]) -> str:
+    """Return a question with the nearest name; "" if no name is near."""
+    near = nearest(value, names)
+    return f"did you mean {near!r}?" if near else ""
 
 
 def shown(value: object, most: int = 200) -> str:

@@ -32,6 +32,7 @@ _HOME = {
     **dict.fromkeys(["polar_to_bend", "bend_to_polar"], "model.polar"),
     "plan": "planning.planner",
     **dict.fromkeys(["Goal", "Bounds"], "planning.goal"),
+    **dict.fromkeys(["Mesh", "Tolerances", "Solver", "Guess"], "planning.settings"),
     "Plan": "planning.result.plan",
     "Gains": "planning.gains.gains",
     "Mpc": "mpc.mpc",

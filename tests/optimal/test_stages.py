@@ -16,7 +16,7 @@ from serpentail.optimal import fatrop
 from serpentail.optimal import thread_pool as helpers
 from serpentail.optimal.control_mesh import bernstein
 from serpentail.optimal.library import kernel
-from serpentail.optimal.mesh import Mesh, refined, uniform
+from serpentail.optimal.mesh import TimeMesh, refined, uniform
 from serpentail.optimal.rules import MOST_DEGREE, collocation_rule
 from tests.support import zoo
 from tests.support.rows import row
@@ -199,7 +199,7 @@ def test_rules_are_exact_up_to_their_order_and_no_further():
 
 def test_meshes_are_split_and_refined():
     """Refinement splits where errors are and obeys the most; controls keep their intervals."""
-    mesh = Mesh(np.array([0.0, 0.2, 1.0]), np.array([0, 1])).split(np.array([2, 1]))
+    mesh = TimeMesh(np.array([0.0, 0.2, 1.0]), np.array([0, 1])).split(np.array([2, 1]))
     np.testing.assert_allclose(mesh.ends, [0, 0.1, 0.2, 1])
     assert mesh.controls.tolist() == [0, 0, 1]
     points, (a, b) = mesh.points(collocation_rule(2)), (0.1 / 3, 0.2 + 0.8 / 3)

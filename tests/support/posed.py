@@ -8,7 +8,5 @@ from serpentail.planning import planner
 
 def posed(model, **arguments):
     """The problem and the settings of a plan."""
-    with patch.object(
-        planner, "best_plan", lambda model, problem, settings, watch: (problem, settings)
-    ):
+    with patch.object(planner, "best_plan", lambda model, problem, settings: (problem, settings)):
         return st.plan(model, **arguments)

@@ -5,7 +5,7 @@ from math import comb
 
 import numpy as np
 
-from .mesh import Mesh
+from .mesh import TimeMesh
 from .rules import CollocationRule
 
 
@@ -27,7 +27,7 @@ class Cut:
         return len(self.ends) - 1
 
 
-def cut(mesh: Mesh, rule: CollocationRule, coefficients: int) -> Cut:
+def cut(mesh: TimeMesh, rule: CollocationRule, coefficients: int) -> Cut:
     """Return the stages of a mesh; controls have the same number of coefficients in each stage."""
     controls = np.arange(mesh.intervals) if mesh.controls is None else mesh.controls
     first = np.append(np.flatnonzero(np.diff(controls, prepend=-1)), mesh.intervals)

@@ -11,7 +11,7 @@ MOST_PIECES = 4  # an interval is split into at a time
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
+class TimeMesh:
     """Ends of the intervals (N + 1,) as fractions of the duration, from 0 to 1.
 
     controls (N,): number of the control interval of each; torques are one polynomial in it, however
@@ -32,7 +32,7 @@ class Mesh:
         """Widths (N,) of the intervals."""
         return np.diff(self.ends)
 
-    def same(self, other: "Mesh") -> bool:
+    def same(self, other: "TimeMesh") -> bool:
         """Tell if two meshes are the same."""
         return self.key == other.key
 
@@ -42,7 +42,7 @@ class Mesh:
         controls = () if self.controls is None else tuple(self.controls)
         return (*self.ends, *controls)
 
-    def halved(self, chosen: np.ndarray, most: int) -> "Mesh":
+    def halved(self, chosen: np.ndarray, most: int) -> "TimeMesh":
         """Return the mesh with chosen intervals (N,) halved, as many of them as ``most`` allows."""
         room = most - self.intervals
         return self.split(1 + (chosen & (np.cumsum(chosen) <= room)))
@@ -53,25 +53,25 @@ class Mesh:
         nodes[:, -1] = self.ends[1:]
         return np.append(0.0, nodes.ravel())
 
-    def split(self, pieces: np.ndarray) -> "Mesh":
+    def split(self, pieces: np.ndarray) -> "TimeMesh":
         """Return the mesh whose interval k is split into pieces[k] equal ones."""
         rows = [
             np.linspace(a, b, count, endpoint=False)
             for a, b, count in zip(self.ends[:-1], self.ends[1:], pieces, strict=True)
         ]
         controls = None if self.controls is None else np.repeat(self.controls, pieces)
-        return Mesh(np.append(np.concatenate(rows), 1.0), controls)
+        return TimeMesh(np.append(np.concatenate(rows), 1.0), controls)
 
 
-def uniform(intervals: int, controls: int | None = None) -> Mesh:
+def uniform(intervals: int, controls: int | None = None) -> TimeMesh:
     """Return a mesh of equal intervals, or of at least as many in equal control intervals."""
     if controls is None:
-        return Mesh(np.linspace(0.0, 1.0, intervals + 1), None)
-    coarse = Mesh(np.linspace(0.0, 1.0, controls + 1), np.arange(controls))
+        return TimeMesh(np.linspace(0.0, 1.0, intervals + 1), None)
+    coarse = TimeMesh(np.linspace(0.0, 1.0, controls + 1), np.arange(controls))
     return coarse.split(np.full(controls, -(-intervals // controls)))
 
 
-def refined(mesh: Mesh, errors: np.ndarray, factor: float, order: int, most: int) -> Mesh:
+def refined(mesh: TimeMesh, errors: np.ndarray, factor: float, order: int, most: int) -> TimeMesh:
     """Return a mesh of at most `most` intervals whose errors sum to `factor` of these (N,).
 
     Errors are spread evenly; the error of an interval of width h falls as h^(order + 1).

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .control_mesh import Cut, cut
-from .mesh import Mesh
+from .mesh import TimeMesh
 from .rules import CollocationRule
 from .terms import Terms
 
@@ -125,7 +125,7 @@ class OptimalProblem:
     """
 
     node: OcpNode
-    mesh: Mesh
+    mesh: TimeMesh
     rule: CollocationRule
     coefficients: int
     start: np.ndarray | None

@@ -12,7 +12,7 @@ from ..basics.attitude import angle_deg
 from ..model.model import Model
 from ..optimal import fatrop, ipopt
 from ..optimal.interrupt import stop_reason
-from ..optimal.mesh import Mesh, uniform
+from ..optimal.mesh import TimeMesh, uniform
 from ..optimal.rules import CollocationRule
 from ..optimal.solution import Solution
 from .free_variables import guessed
@@ -25,7 +25,7 @@ from .settings import PlanSettings
 
 FIRST_PUSH = 0.05  # of the torques' unit: takes the first guess out of a plane of symmetry
 DURATIONS = (1.0, 0.5, 0.75, 0.25)  # of guesses, in turn, from the least (0) to the most (1)
-CONTROL_INTERVALS, MOST = 12, 400  # control intervals, and the most intervals of a mesh
+CONTROL_INTERVALS = 12
 # (most segments, intervals in each control interval at first): with fewer, optima of long tails
 # exploit the errors of the mesh
 PIECES = ((2, 1), (4, 4), (np.inf, 12))
@@ -67,40 +67,34 @@ class Attempts:
         self.stopped = stop_reason()
         return self.stopped is not None
 
-    @property
-    def most_intervals(self) -> int:
-        """The most intervals of a mesh."""
-        return self.settings.most_intervals or MOST
-
-    def meshes(self) -> tuple[Mesh, ...]:
+    def meshes(self) -> tuple[TimeMesh, ...]:
         """Return the first mesh, and a finer one to begin with if no plan of that becomes true.
 
         States have a mesh of their own: one or more intervals in each control interval.
         """
-        settings = self.settings
-        guess = settings.guess
+        guess, asked = self.settings.guess.motion, self.settings.mesh
         if isinstance(guess, Plan) and guess.rule is self.rule:
             return (guess.mesh,)
         if isinstance(guess, GuessMotion) and guess.mesh is not None:
             return (guess.mesh,)
-        if settings.intervals:
-            controls = settings.controls or min(CONTROL_INTERVALS, settings.intervals)
-            return (uniform(settings.intervals, controls),)
-        controls = settings.controls or CONTROL_INTERVALS
+        if asked.intervals:
+            controls = asked.controls or min(CONTROL_INTERVALS, asked.intervals)
+            return (uniform(asked.intervals, controls),)
+        controls = asked.controls or CONTROL_INTERVALS
         pieces = next(count for segments, count in PIECES if self.model.segments <= segments)
         first, finer = (uniform(controls * each, controls) for each in (pieces, FINE))
-        if first.intervals < finer.intervals <= self.most_intervals:
+        if first.intervals < finer.intervals <= asked.most_intervals:
             return first, finer
         return (first,)
 
-    def program(self, problem: PlanningProblem, mesh: Mesh, softening: float) -> PlanProgram:
+    def program(self, problem: PlanningProblem, mesh: TimeMesh, softening: float) -> PlanProgram:
         """Return the program of a problem on a mesh."""
         with self.timed("derive_s"):
             return plan_program(self.model, problem, mesh, self.rule, softening)
 
     def given(self, problem: PlanningProblem) -> tuple[GuessMotion, str]:
         """Return the user's guess, or passive flight, and whether it is "far" or "close"."""
-        guess = self.settings.guess
+        guess = self.settings.guess.motion
         if guess is None or isinstance(guess, tuple | list):
             return self.pushed(problem, 0), "far"
         if isinstance(guess, GuessMotion):
@@ -116,7 +110,7 @@ class Attempts:
 
     def nearest(self, problem: PlanningProblem) -> GuessMotion | None:
         """Return that of the user's stored plans whose start is nearest; None if there is none."""
-        plans = self.settings.guess
+        plans = self.settings.guess.motion
         if not isinstance(plans, tuple | list) or not plans:
             return None
         return self.motion_of(min(plans, key=lambda plan: _apart(problem, plan)))
@@ -126,10 +120,10 @@ class Attempts:
         settings, (least, most) = self.settings, problem.duration
         duration = least + (most - least) * DURATIONS[k % len(DURATIONS)]
         size = float(torque_unit(problem).mean()) * (FIRST_PUSH if k == 0 else 1.0)
-        random = np.random.default_rng([settings.seed, k])
+        random = np.random.default_rng([settings.solver.seed, k])
         push = pushes(random, size, self.model)
         own = guessed(self.model, problem, random if k else None)
-        return passive(*own, settings.guess_damping, duration, push)
+        return passive(*own, settings.guess.damping, duration, push)
 
     def solved(
         self,
@@ -144,7 +138,7 @@ class Attempts:
         quick: with few iterations, to see whether that leads anywhere.
         """
         begin = samples_of(motion, program)
-        options = self.settings.options_of(solver)
+        options = self.settings.solver.options_of(solver)
         threads = self.model.batch_library.threads
         if solver == "ipopt":
             found = ipopt.solve(program.optimal, begin, guess, options, threads, quick)

@@ -1,6 +1,5 @@
 """Searches for a plan, round by round, and returns the best one."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 from ..basics.progress import Stage
@@ -26,12 +25,7 @@ NEEDED = (  # functions of the model
 AROUND_ROUNDS, AROUND_OPTIONS = 2, {"fatrop.max_iter": 100}
 
 
-def best_plan(
-    model: Model,
-    problem: PlanningProblem,
-    settings: PlanSettings,
-    watch: Callable[[Plan], object] | None,
-) -> Plan:
+def best_plan(model: Model, problem: PlanningProblem, settings: PlanSettings) -> Plan:
     """Search round by round, and return the best plan."""
     begun, easier = read_clocks(), None
     model.serve("plan")
@@ -39,24 +33,22 @@ def best_plan(
     refuse_impossible(model, problem)
     refuse_violated(model, problem)
     with forks_wait(), Stage("plan", model.name) as stage:
-        with stoppable(settings.time_limit, stage.tell):
-            if problem.objective in SOFTENING and settings.guess is None:
+        with stoppable(settings.solver.time_limit, stage.tell):
+            if problem.objective in SOFTENING and settings.guess.motion is None:
                 # these objectives are seldom solved from passive flight
-                calm, untracked = (
-                    replace(problem, objective="effort"),
-                    replace(settings, track=False),
-                )
-                easier = Search(model, calm, untracked)
+                calm = replace(problem, objective="effort")
+                alone = replace(settings.solver, track=False, watch=None)
+                easier = Search(model, calm, replace(settings, solver=alone))
                 found = rounds_of(easier, stage)
                 guess = easier.plan(easier.best(found), len(found), begun)
-                settings = replace(settings, guess=guess)
+                settings = replace(settings, guess=replace(settings.guess, motion=guess))
             search = Search(model, problem, settings, easier)
-            rounds = rounds_of(search, stage, watch, begun)
+            rounds = rounds_of(search, stage, begun)
             best, tried = search.best(rounds), search
             if not search.is_true(best):
                 best, tried = explained(search, best, stage)
-            elif not settings.through_torso:
-                best, tried = kept_off(search, best, stage, watch, begun)
+            elif not settings.tolerances.through_torso:
+                best, tried = kept_off(search, best, stage, begun)
         return tried.plan(best, len(rounds), begun)
 
 
@@ -78,11 +70,7 @@ def explained(search: Search, best: Round, stage: Stage) -> tuple[Round, Search]
 
 
 def kept_off(
-    search: Search,
-    best: Round,
-    stage: Stage,
-    watch: Callable[[Plan], object] | None,
-    begun: tuple[float, float],
+    search: Search, best: Round, stage: Stage, begun: tuple[float, float]
 ) -> tuple[Round, Search]:
     """Return a plan whose tail stays out of the torso where that of the best round does not."""
     if not goes_through_torso(best):
@@ -92,17 +80,20 @@ def kept_off(
         return best, search
     motion = search.motion(best.program, best.solution)
     settings = search.settings
+    most, solver = 2 * best.program.mesh.intervals, settings.solver
     nearby = replace(
         settings,
-        guess=motion,
-        retries=0,
-        multi_start=1,
-        solver=settings.first_solver,
-        rounds=AROUND_ROUNDS,
-        most_intervals=2 * best.program.mesh.intervals,
-        options=AROUND_OPTIONS | settings.options,
+        mesh=replace(settings.mesh, rounds=AROUND_ROUNDS, most_intervals=most),
+        solver=replace(
+            solver,
+            name=solver.first,
+            retries=0,
+            multi_start=1,
+            options=AROUND_OPTIONS | solver.options,
+        ),
+        guess=replace(settings.guess, motion=motion),
     )
-    return searched_on(search, problem, nearby, stage, watch, begun) or (best, search)
+    return searched_on(search, problem, nearby, stage, begun) or (best, search)
 
 
 def searched_on(
@@ -110,26 +101,20 @@ def searched_on(
     problem: PlanningProblem,
     settings: PlanSettings,
     stage: Stage,
-    watch: Callable[[Plan], object] | None = None,
     begun: tuple[float, float] = (0.0, 0.0),
 ) -> tuple[Round, Search] | None:
     """Return the best round of another search after one; None, its cost counted, if untrue."""
     later = Search(search.model, problem, settings, search)
-    last = later.best(rounds_of(later, stage, watch, begun))
+    last = later.best(rounds_of(later, stage, begun))
     if later.is_true(last):
         return last, later
     search.attempts.share(later.attempts)
     return None
 
 
-def rounds_of(
-    search: Search,
-    stage: Stage,
-    watch: Callable[[Plan], object] | None = None,
-    begun: tuple[float, float] = (0.0, 0.0),
-) -> list[Round]:
+def rounds_of(search: Search, stage: Stage, begun: tuple[float, float] = (0.0, 0.0)) -> list[Round]:
     """Return all rounds of a search; each is reported and passed to ``watch`` when it is found."""
-    rounds: list[Round] = []
+    watch, rounds = search.settings.solver.watch, list[Round]()
     for each in search.rounds():
         rounds.append(each)
         stage.tell(what=f"{search.model.name}: {each} after round {len(rounds)}")

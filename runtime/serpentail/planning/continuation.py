@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..optimal.mesh import Mesh
+from ..optimal.mesh import TimeMesh
 from ..optimal.solution import Solution
 from .attempts import Attempts
 from .problem import PlanningProblem
@@ -71,7 +71,7 @@ def _value(problem: PlanningProblem, bound: str) -> float:
 
 
 def led(
-    attempts: Attempts, problem: PlanningProblem, mesh: Mesh, softening: float, finish: Finish
+    attempts: Attempts, problem: PlanningProblem, mesh: TimeMesh, softening: float, finish: Finish
 ) -> Led | None:
     """Return where the first continuation that finds anything ends; None if none does."""
     for bound in EASIER:

@@ -1,11 +1,14 @@
 """``plan``: finds motions of the tail by direct collocation."""
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from inspect import Parameter, signature
 from typing import Any, Never
 
+from serpentail_scene.messages import nearest
+
 from ..basics import extras
-from ..basics.checks import Refusals, needed, none_of
+from ..basics.checks import Refusals
 from ..basics.errors import PlanningError
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
@@ -14,7 +17,8 @@ from .best import best_plan
 from .goal import Bounds, Goal
 from .problem import SMOOTHING, PathConstraint, checked_problem
 from .result.plan import Plan
-from .settings import PlanSettings, check_settings
+from .settings import PLACES, Guess, Mesh, Solver, Tolerances, spelled
+from .settings_checks import checked_settings
 
 
 def plan(  # noqa: PLR0913 - the public face names all that it takes
@@ -33,30 +37,12 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     legs: Legs | None = None,
     design: Mapping[str, Any] | None = None,
     free_start: Mapping[str, Any] | None = None,
-    # the mesh
-    degree: int | None = None,
-    intervals: int | None = None,
-    most_intervals: int | None = None,
-    controls: int | None = None,
-    rounds: int = 6,
-    tolerance: float | None = 0.01,
-    tail_tolerance: float | None = 0.1,
-    rate_tolerance: float | None = 0.1,
-    # the solver
-    solver: str = "auto",
-    options: dict[str, Any] | None = None,
-    time_limit: float | None = None,
-    # where it begins
-    guess: Plan | Trajectory | Sequence[Plan] | None = None,
-    guess_damping: float = 1e-3,
-    multi_start: int = 1,
-    retries: int = 4,
-    seed: int = 0,
-    # output
-    track: bool = True,
-    through_torso: bool = False,
-    watch: Callable[[Plan], object] | None = None,
-    **unknown: Never,
+    # the search
+    mesh: Mesh | None = None,
+    tolerances: Tolerances | None = None,
+    solver: Solver | str = "auto",
+    guess: Guess | Plan | Trajectory | Sequence[Plan] | None = None,
+    **old: Never,
 ) -> Plan:
     """Plan a motion of the tail by direct collocation, and check what its torques do (Sect. 3).
 
@@ -102,62 +88,21 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
         "position", "velocity", or "attitude" (pitch, roll, yaw), to (least, most), each one
         number or all of the part (SI).
         ``start`` is then the first guess of these parts.
+    mesh : Mesh, optional
+        The mesh: ``st.Mesh(degree=, intervals=, most_intervals=, controls=, rounds=)``.
+    tolerances : Tolerances, optional
+        When the plan is true: ``st.Tolerances(attitude=, tail=, rate=, through_torso=)``.
+    solver : Solver or {"auto", "fatrop", "ipopt"}, default "auto"
+        What solves the program: a name, or ``st.Solver(name, options=, time_limit=,
+        multi_start=, retries=, seed=, track=, watch=)``.
+    guess : Guess, Plan, Trajectory or sequence of Plan, optional
+        Where the search begins: a motion, or ``st.Guess(motion, damping=)``. Default: passive
+        flight.
 
     Returns
     -------
     Plan
         The best plan found; see its ``success`` and ``report``.
-
-    Other Parameters
-    ----------------
-    degree : int, optional
-        Degree of Radau's collocation rule, from 1 to 5. Default: 3.
-    intervals : int, optional
-        Number of intervals of the first mesh. Default: in each control interval 1 if the tail has
-        up to two segments, 4 up to four segments, else 12; a search that finds no true plan begins
-        again with 12.
-    most_intervals : int, default 400
-        Largest number of intervals.
-    controls : int, default 12
-        Number of equal control intervals; in each, the torques are one polynomial, however fine
-        the mesh is. With the objective "time" torques are linear in each.
-    rounds : int, default 6
-        Largest number of refinements.
-    tolerance : float or None, default 0.01
-        Largest error of the true attitude at the end (deg); None for no demand.
-    tail_tolerance : float or None, default 0.1
-        Largest error of the true tail coordinates at the end (deg); None for no demand.
-    rate_tolerance : float or None, default 0.1
-        Largest error of the true rates of torso and tail at the end (rad/s); None for no demand.
-    solver : {"auto", "fatrop", "ipopt"}, default "auto"
-        What solves the program. "auto" is FATROP, and IPOPT from the same guesses if FATROP finds
-        nothing; ``report["solver"]`` says which.
-    options : dict, optional
-        Options of the solvers, such as ``{"fatrop.max_iter": 500, "ipopt.max_iter": 500}``.
-    time_limit : float, optional
-        Time for the search (s). If it leaves no time to track the plan, the report has no errors
-        of tracking.
-    guess : Plan, Trajectory or sequence of Plan, optional
-        First guess. Default: passive flight. Of a sequence of plans, that with the nearest start
-        is tried if passive flight leads to none.
-    guess_damping : float, default 1e-3
-        Damping of that passive flight (N m s).
-    multi_start : int, default 1
-        Number of guesses that are solved; the best solution is kept.
-    retries : int, default 4
-        Number of further guesses if all of these fail, after a continuation: an easier problem is
-        solved, whose bound is led back to the wanted one. At 0 there is none. A search that fails
-        says in ``report["advice"]`` which value of the bound suffices.
-    seed : int, default 0
-        Seed of the random guesses.
-    track : bool, default True
-        Whether to simulate the plan tracked by ``Pfl`` too, for the report.
-    through_torso : bool, default False
-        Whether the tail may go through the torso. Otherwise a plan in which it does is made again
-        with a constraint; if that finds none, ``plan.warnings`` tells.
-    watch : callable, optional
-        Function that receives the Plan of each round when it is found. An exception that it
-        raises ends the search.
 
     Raises
     ------
@@ -191,33 +136,15 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     extras.needed("casadi", "plan")
     model.refuse_fixed("plan")
     refused = Refusals(PlanningError)
-    for name in unknown:
-        same = OTHER_WORDS.get(name)
-        meant = f"setting: value {name!r}: did you mean {same!r}?"
-        refused.add(name, meant if same else none_of("setting", name, NAMES))
-    if watch is not None and not callable(watch):
-        refused.add("watch", needed("watch", watch, "a function of a Plan, or None"))
-    settings = PlanSettings(
-        degree=degree,
-        intervals=intervals,
-        most_intervals=most_intervals,
-        controls=controls,
-        rounds=rounds,
-        tolerance=tolerance,
-        tail_tolerance=tail_tolerance,
-        rate_tolerance=rate_tolerance,
-        solver=solver,
-        options={} if options is None else options,
-        time_limit=time_limit,
-        guess=guess,
-        guess_damping=guess_damping,
-        multi_start=multi_start,
-        retries=retries,
-        seed=seed,
-        track=track,
-        through_torso=through_torso,
-    )
-    check_settings(model, settings, refused)
+    known: dict[str, Any] = {name: old[name] for name in old if name in PLACES}
+    for name in old:
+        if name in known:
+            told = f"{name}= is now {spelled(name)}"
+            warnings.warn(told, DeprecationWarning, stacklevel=2)
+        else:
+            refused.add(name, f"setting: value {name!r}: {_meant(name)}")
+    given = {"mesh": mesh, "tolerances": tolerances, "solver": solver, "guess": guess}
+    settings = checked_settings(model, given, known, refused)
     of_problem = {
         "objective": objective,
         "smoothing": smoothing,
@@ -228,16 +155,11 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
         "design": design,
         "free_start": free_start,
     }
-    task = (
-        start,
-        goal,
-        duration,
-        Bounds() if bounds is None else bounds,
-    )
+    task = (start, goal, duration, Bounds() if bounds is None else bounds)
     problem = checked_problem(model, task, of_problem, refused)
     refused.tell()
     assert problem is not None  # otherwise tell() has raised
-    return best_plan(model, problem, settings, watch)
+    return best_plan(model, problem, settings)
 
 
 OTHER_WORDS = {  # of other planners, for our settings
@@ -251,3 +173,11 @@ NAMES = [
     for name, parameter in signature(plan).parameters.items()
     if parameter.kind == Parameter.KEYWORD_ONLY
 ]
+
+
+def _meant(name: str) -> str:
+    """Return what may have been meant by the name of a setting that there is not."""
+    near = nearest(OTHER_WORDS.get(name, name), [*NAMES, *PLACES])
+    if not near:
+        return f"needs {' or '.join(map(repr, NAMES))}"
+    return f"did you mean {repr(near) if near in NAMES else spelled(near)}?"

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..model.model import Model
 from ..optimal.interrupt import time_left
-from ..optimal.mesh import Mesh, refined
+from ..optimal.mesh import TimeMesh, refined
 from ..optimal.rules import collocation_rule
 from ..optimal.solution import Solution
 from ..optimal.violation import violation
@@ -46,11 +46,11 @@ class Search:
         before: "Search | None" = None,
     ):
         self.model, self.problem, self.settings = model, problem, settings
-        self.rule = collocation_rule(settings.degree)
+        self.rule = collocation_rule(settings.mesh.degree)
         spent_before = None if before is None else before.attempts
         self.attempts: Attempts = Attempts(model, settings, self.rule, spent_before)
-        self.softening = softening_of(problem, settings.guess)
-        self.solver = settings.first_solver
+        self.softening = softening_of(problem, settings.guess.motion)
+        self.solver = settings.solver.first
         self.led: Led | None = None
         self.advice: str | None = None
 
@@ -59,7 +59,7 @@ class Search:
         """Why the search was stopped before it was done."""
         return self.attempts.stopped
 
-    def _first(self, mesh: Mesh) -> Round:
+    def _first(self, mesh: TimeMesh) -> Round:
         """Return the best solution on a mesh: from the guesses, else by continuation, from the
         nearest stored plan, from more guesses, or by IPOPT.
         """
@@ -68,13 +68,13 @@ class Search:
         if near == "close":
             solutions = [attempts.solved_near(program, motion, self.solver)]
         else:
-            quick = settings.retries > 0  # what follows leads further than many iterations
+            quick = settings.solver.retries > 0  # what follows leads further than many iterations
             solutions = [attempts.solved(program, motion, "far", self.solver, quick)]
-        for k in range(1, settings.multi_start):
+        for k in range(1, settings.solver.multi_start):
             if attempts.is_stopped():
                 break
             solutions.append(self._from_push(program, k))
-        if settings.retries and not self._is_done(solutions):
+        if settings.solver.retries and not self._is_done(solutions):
             led_to = self._retried(program, mesh, solutions)
             if led_to is not None:
                 return led_to
@@ -88,7 +88,9 @@ class Search:
         """Return the objective of a solution; of a failure how much it violates."""
         return found.value if found.success else violation(program.optimal, found.samples)
 
-    def _retried(self, program: PlanProgram, mesh: Mesh, solutions: list[Solution]) -> Round | None:
+    def _retried(
+        self, program: PlanProgram, mesh: TimeMesh, solutions: list[Solution]
+    ) -> Round | None:
         """Try further, and add what is found; return a round where a continuation leads to one."""
         settings, attempts = self.settings, self.attempts
         stored = attempts.nearest(self.problem)
@@ -96,7 +98,7 @@ class Search:
             solutions.append(attempts.solved_near(program, stored, self.solver))
         if self._is_done(solutions):
             return None
-        if settings.solver == "ipopt":
+        if settings.solver.name == "ipopt":
             self._pushed_on(program, solutions)
             return None
         found = led(attempts, self.problem, mesh, self.softening[0], self.motion)
@@ -104,15 +106,15 @@ class Search:
             return self._round(found.program, found.solution)
         self.led = found
         self._pushed_on(program, solutions)
-        if settings.solver == "auto":
-            guesses = settings.multi_start + settings.retries
+        if settings.solver.name == "auto":
+            guesses = settings.solver.multi_start + settings.solver.retries
             self._try_ipopt(program, solutions, guesses if found is None else 1)
         return None
 
     def _pushed_on(self, program: PlanProgram, solutions: list[Solution]) -> None:
         """Add what is found from further guesses, up to a first solution."""
-        first = self.settings.multi_start
-        for k in range(first, first + self.settings.retries):
+        first = self.settings.solver.multi_start
+        for k in range(first, first + self.settings.solver.retries):
             if self._is_done(solutions):
                 return
             solutions.append(self._from_push(program, k))
@@ -151,11 +153,11 @@ class Search:
             if not found or self.is_true(last) or self.attempts.is_stopped():
                 break
 
-    def _rounds(self, mesh: Mesh) -> Iterator[Round]:
+    def _rounds(self, mesh: TimeMesh) -> Iterator[Round]:
         """Make rounds: intervals that are wrong are split until the end is right."""
         last = self._first(mesh)
         yield last
-        for _ in range(self.settings.rounds + len(self.softening) - 1):
+        for _ in range(self.settings.mesh.rounds + len(self.softening) - 1):
             if not last.solution.success or self.attempts.is_stopped():
                 break
             mesh = last.program.mesh if self._wrong(last) <= 1 else self._finer(last)
@@ -170,13 +172,13 @@ class Search:
     def _solved_on(self, program: PlanProgram, motion: GuessMotion, solver: str) -> Solution:
         """Solve from the motion of the round before; by the other solver if its own fails."""
         found = self.attempts.solved_near(program, motion, solver)
-        if found.success or self.settings.solver != "auto" or self.attempts.is_stopped():
+        if found.success or self.settings.solver.name != "auto" or self.attempts.is_stopped():
             return found
         other = "fatrop" if solver == "ipopt" else "ipopt"
         again = self.attempts.solved(program, motion, "close", other, quick=True)
         return again if again.success else found
 
-    def _program(self, mesh: Mesh) -> PlanProgram:
+    def _program(self, mesh: TimeMesh) -> PlanProgram:
         return self.attempts.program(self.problem, mesh, self.softening[0])
 
     def best(self, rounds: list[Round]) -> Round:
@@ -190,12 +192,12 @@ class Search:
 
     def _off(self, found: Round) -> float:
         """Return the largest true error relative to its tolerance."""
-        allowed = self.settings.allowed
+        allowed = self.settings.tolerances.allowed
         return max((found.errors[name] / most for name, most in allowed.items()), default=0.0)
 
     def _wrong(self, found: Round) -> float:
         """Return the larger of ``_off`` and the excess over bounds relative to its tolerance."""
-        if self.settings.tolerance is None:
+        if self.settings.tolerances.attitude is None:
             return 0.0
         return max(self._off(found), largest(found.excess)[0] / SLACK)
 
@@ -233,7 +235,7 @@ class Search:
 
     def leaves_no_time(self, needed: float) -> bool:
         """Tell, and note, whether work that needs so long (s) would end far beyond the limit."""
-        limit = self.settings.time_limit
+        limit = self.settings.solver.time_limit
         if limit is None or needed <= time_left() + OVERRUN * limit:
             return False
         self.attempts.stopped = self.attempts.stopped or "time limit"
@@ -252,12 +254,12 @@ class Search:
         truth = (planned, true, errors, beyond, self.softening[0])
         return Round(model, problem, program, solution, motion, *truth)
 
-    def _finer(self, last: Round) -> Mesh:
+    def _finer(self, last: Round) -> TimeMesh:
         """Return the next mesh: finer where the true motion is wrong, or else where bounds are
         exceeded.
         """
         mesh, off = last.program.mesh, self._off(last)
-        most = self.attempts.most_intervals
+        most = self.settings.mesh.most_intervals
         if off <= 1:
             far = [exceeded(part) for part in last.excess.values()]
             return mesh.halved(np.any(far, axis=0), most)

@@ -1,148 +1,210 @@
-"""How to search for a plan: settings of rule, mesh, solver and guesses, and their checks."""
+"""How to search for a plan: mesh, tolerances, solver, guess, and the keys of [plan] for these."""
 
-import re
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
-import numpy as np
+from ..basics.short_repr import brief
+from .result.plan import Plan
 
-from ..basics.checks import Refusals, needed, number, one_of, shown, whole_number
-from ..basics.errors import PlanningError
-from ..model.model import Model
-from ..motion.trajectory import Trajectory
-from ..optimal.rules import collocation_rule
-from .magnitudes import HUGE
-
-WHOLE_NUMBERS = {  # least and most of each; beyond the most a search would not end
-    "rounds": (0, 1000),
-    "multi_start": (1, 10_000),
-    "retries": (0, 10_000),
-    "seed": (0, 2**63 - 1),
-}
-# None: the planner chooses
-CHOSEN = dict.fromkeys(("intervals", "most_intervals", "controls"), (1, 10_000))
 ROUGHLY = 10.0  # times the tolerances
-SOLVERS = ("auto", "fatrop", "ipopt")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mesh:
+    """The mesh of a plan: where it begins, and how often it is refined.
+
+    Parameters
+    ----------
+    degree : int, optional
+        Degree of Radau's collocation rule, from 1 to 5. Default: 3.
+    intervals : int, optional
+        Number of intervals of the first mesh. Default: in each control interval 1 if the tail has
+        up to two segments, 4 up to four segments, else 12; a search that finds no true plan begins
+        again with 12.
+    most_intervals : int, default 400
+        Largest number of intervals.
+    controls : int, optional
+        Number of equal control intervals; in each, the torques are one polynomial, however fine
+        the mesh is. With the objective "time" torques are linear in each. Default: 12, or
+        ``intervals`` if that is less.
+    rounds : int, default 6
+        Largest number of refinements.
+
+    Examples
+    --------
+    >>> import serpentail as st
+    >>> st.Mesh(intervals=24).rounds
+    6
+    """
+
+    degree: int | None = None
+    intervals: int | None = None
+    most_intervals: int = 400
+    controls: int | None = None
+    rounds: int = 6
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tolerances:
+    """What makes a plan true: largest errors at the end of its simulation; None demands nothing.
+
+    Each is a number, or text with a unit, such as "0.2 mrad".
+
+    Parameters
+    ----------
+    attitude : float, str or None, default 0.01
+        Error of the attitude (deg). With None, bounds may be exceeded between nodes, too.
+    tail : float, str or None, default 0.1
+        Error of the tail coordinates (deg).
+    rate : float, str or None, default 0.1
+        Error of the rates of torso and tail (rad/s).
+    through_torso : bool, default False
+        Whether the tail may go through the torso. Otherwise a plan in which it does is made again
+        with a constraint; if that finds none, ``plan.warnings`` tells.
+
+    Examples
+    --------
+    >>> import serpentail as st
+    >>> st.Tolerances(attitude="1 mrad").tail
+    0.1
+    """
+
+    attitude: Any = 0.01
+    tail: Any = 0.1
+    rate: Any = 0.1
+    through_torso: bool = False
+
+    @property
+    def allowed(self) -> dict[str, float]:
+        """Largest true errors at the end: attitude and tail (deg), rates (rad/s)."""
+        named = {name: getattr(self, name) for name in ("attitude", "tail", "rate")}
+        return {name: most for name, most in named.items() if most is not None}
 
 
 @dataclass(frozen=True)
-class PlanSettings:
-    """How to search for a plan: collocation rule, mesh, tolerances, solver, guesses."""
+class Solver:
+    """What solves the program of a plan, from how many guesses, and what it reports.
 
-    degree: int | None
-    intervals: int | None
-    most_intervals: int | None
-    controls: int | None
-    rounds: int
-    tolerance: float | None  # deg; None: no demand at all
-    tail_tolerance: float | None  # deg; None: no demand
-    rate_tolerance: float | None  # rad/s; None: no demand
-    solver: str
-    options: dict[str, Any]
-    time_limit: float | None  # s
-    guess: Any  # a Plan, a Trajectory, or Plans of which one may help
-    guess_damping: float  # N m s
-    multi_start: int
-    retries: int
-    seed: int
-    track: bool
-    through_torso: bool
+    Parameters
+    ----------
+    name : {"auto", "fatrop", "ipopt"}, default "auto"
+        "auto" is FATROP, and IPOPT from the same guesses if FATROP finds nothing;
+        ``report["solver"]`` says which.
+    options : dict, optional
+        Options of the solvers, such as ``{"fatrop.max_iter": 500, "ipopt.max_iter": 500}``.
+    time_limit : float or str, optional
+        Time for the search (s, or text with a unit). If it leaves no time to track the plan, the
+        report has no errors of tracking.
+    multi_start : int, default 1
+        Number of guesses that are solved; the best solution is kept.
+    retries : int, default 4
+        Number of further guesses if all of these fail, after a continuation: an easier problem is
+        solved, whose bound is led back to the wanted one. At 0 there is none. A search that fails
+        says in ``report["advice"]`` which value of the bound suffices.
+    seed : int, default 0
+        Seed of the random guesses.
+    track : bool, default True
+        Whether to simulate the plan tracked by ``Pfl`` too, for the report.
+    watch : callable, optional
+        Function that receives the Plan of each round when it is found. An exception that it
+        raises ends the search.
 
-    def roughly(self, guess: Any) -> "PlanSettings":
-        """Return settings of a search that shows whether a problem has a plan, from a guess."""
-        rougher = [
-            None if most is None else ROUGHLY * most
-            for most in (self.tolerance, self.tail_tolerance, self.rate_tolerance)
-        ]
-        return replace(
-            self,
-            guess=guess,
-            retries=0,
-            multi_start=1,
-            track=False,
-            tolerance=rougher[0],
-            tail_tolerance=rougher[1],
-            rate_tolerance=rougher[2],
-        )
+    Examples
+    --------
+    >>> import serpentail as st
+    >>> st.Solver("ipopt", time_limit="20 s").retries
+    4
+    """
+
+    name: str = "auto"
+    options: dict[str, Any] = field(default_factory=dict)
+    time_limit: Any = None
+    multi_start: int = 1
+    retries: int = 4
+    seed: int = 0
+    track: bool = True
+    watch: Callable[[Plan], object] | None = None
 
     @property
-    def first_solver(self) -> str:
+    def first(self) -> str:
         """The solver that is tried first."""
-        return "ipopt" if self.solver == "ipopt" else "fatrop"
+        return "ipopt" if self.name == "ipopt" else "fatrop"
 
     def options_of(self, solver: str) -> dict[str, Any]:
         """Options whose names begin with a solver's."""
         return {k: v for k, v in self.options.items() if str(k).startswith(f"{solver}.")}
 
-    @property
-    def allowed(self) -> dict[str, float]:
-        """Largest true errors at the end: attitude and tail (deg), rates (rad/s)."""
-        named = {
-            "attitude": self.tolerance,
-            "tail": self.tail_tolerance,
-            "rate": self.rate_tolerance,
-        }
-        return {name: most for name, most in named.items() if most is not None}
+
+@dataclass(frozen=True, eq=False)
+class Guess:
+    """Where the search for a plan begins.
+
+    Parameters
+    ----------
+    motion : Plan, Trajectory or sequence of Plan, optional
+        First guess. Default: passive flight. Of a sequence of plans, that with the nearest start
+        is tried if passive flight leads to none.
+    damping : float or str, default 1e-3
+        Damping of that passive flight (N m s, or text with a unit).
+
+    Examples
+    --------
+    >>> import serpentail as st
+    >>> st.Guess(damping=2e-3).motion is None
+    True
+    """
+
+    motion: Any = None
+    damping: Any = 1e-3
+    __repr__ = brief
 
 
-def check_settings(model: Model, settings: PlanSettings, refused: Refusals) -> None:
-    """Add each wrong setting, with its remedy, to ``refused``."""
-    for name, bounds in WHOLE_NUMBERS.items():
-        refused.attempt(name, _check_whole, name, getattr(settings, name), *bounds)
-    for name, bounds in CHOSEN.items():
-        if getattr(settings, name) is not None:
-            refused.attempt(name, _check_whole, name, getattr(settings, name), *bounds)
-    for name in ("tolerance", "tail_tolerance", "rate_tolerance", "time_limit"):
-        if getattr(settings, name) is not None:
-            refused.attempt(name, _check_positive, name, getattr(settings, name))
-    refused.attempt("options", _check_options, settings.options)
-    refused.attempt("guess", _check_guess, model, settings.guess)
-    damping = partial(number, error=PlanningError, least=0, most=HUGE)
-    refused.attempt("guess_damping", damping, "guess_damping", settings.guess_damping)
-    for name in ("track", "through_torso"):
-        if not isinstance(getattr(settings, name), bool | np.bool_):
-            refused.add(name, needed(name, getattr(settings, name), "True or False"))
-    refused.attempt("solver", one_of, "solver", settings.solver, SOLVERS, PlanningError)
-    refused.attempt("degree", collocation_rule, settings.degree)
+@dataclass(frozen=True)
+class PlanSettings:
+    """How to search for a plan."""
 
+    mesh: Mesh
+    tolerances: Tolerances
+    solver: Solver
+    guess: Guess
 
-def _check_whole(name: str, value: Any, least: int, most: int) -> None:
-    """PlanningError unless a value is a whole number within bounds."""
-    whole_number(name, value, PlanningError, least=least, most=most)
-
-
-def _check_positive(name: str, value: Any) -> None:
-    """PlanningError unless a value is a number above 0."""
-    number(name, value, PlanningError, above=0)
-
-
-def _check_options(options: Any) -> None:
-    """PlanningError unless options are a dict of settings of FATROP and IPOPT."""
-    needs = "a dict, such as {'fatrop.max_iter': 500, 'ipopt.max_iter': 500}"
-    if not isinstance(options, dict):
-        raise PlanningError(needed("options", options, needs))
-    for name in options:
-        if not re.fullmatch(r"(ipopt|fatrop)\.\w+", str(name)):
-            raise PlanningError(
-                f"options: {shown(name)}: needs a name that begins with 'fatrop.' or 'ipopt.'"
-            )
-
-
-def _check_guess(model: Model, guess: Any) -> None:
-    """PlanningError unless the guess is None, or a motion of such a model."""
-    if guess is None:
-        return
-    if isinstance(guess, tuple | list):
-        for k, each in enumerate(guess):
-            if not hasattr(each, "trajectory"):
-                raise PlanningError(f"guess[{k}]: value {shown(each)}: needs a Plan")
-            _check_guess(model, each)
-        return
-    motion = getattr(guess, "trajectory", guess)
-    if not isinstance(motion, Trajectory):
-        raise PlanningError(f"guess: value {shown(guess)}: needs a Plan or a Trajectory")
-    if motion.q.shape[1] != model.nq or len(motion.t) < 2:
-        raise PlanningError(
-            f"guess: q has shape {motion.q.shape}: needs at least two samples of {model.nq}"
+    def roughly(self, motion: Any) -> "PlanSettings":
+        """Return settings of a search that shows whether a problem has a plan, from a guess."""
+        rougher: Any = {n: ROUGHLY * most for n, most in self.tolerances.allowed.items()}
+        return replace(
+            self,
+            tolerances=replace(self.tolerances, **rougher),
+            solver=replace(self.solver, retries=0, multi_start=1, track=False, watch=None),
+            guess=replace(self.guess, motion=motion),
         )
+
+
+KINDS: dict[str, Any] = {"mesh": Mesh, "tolerances": Tolerances, "solver": Solver, "guess": Guess}
+PLACES = {  # of keys of [plan], which were keywords of ``plan``, too: object and field
+    **{name: ("mesh", name) for name in Mesh.__annotations__},
+    "tolerance": ("tolerances", "attitude"),
+    "tail_tolerance": ("tolerances", "tail"),
+    "rate_tolerance": ("tolerances", "rate"),
+    "through_torso": ("tolerances", "through_torso"),
+    **{name: ("solver", name) for name in Solver.__annotations__ if name != "name"},
+    "solver": ("solver", "name"),
+    "guess": ("guess", "motion"),
+    "guess_damping": ("guess", "damping"),
+}
+
+
+def joined(arguments: Mapping[str, Any], others: Mapping[str, Any]) -> dict[str, Any]:
+    """Return arguments of ``plan`` over others; those named by keys of [plan] change one field."""
+    fields = [n for n, each in arguments.items() if n in PLACES and type(each) is not KINDS.get(n)]
+    whole = {**others, **{n: each for n, each in arguments.items() if n not in fields}}
+    for name in fields:
+        home, part = PLACES[name]
+        whole[home] = replace(whole.get(home, KINDS[home]()), **{part: arguments[name]})
+    return whole
+
+
+def spelled(name: str) -> str:
+    """Return how a field that a key of [plan] names is given to ``plan``."""
+    home, part = PLACES[name]
+    return f"{home}=st.{KINDS[home].__name__}({part}=...)"

@@ -16,7 +16,8 @@ from ..planning.goal import GOALS, HALF_TURN, Bounds, Goal
 from ..planning.planner import plan
 from ..planning.problem import OBJECTIVES
 from ..planning.result.plan import Plan
-from ..planning.settings import CHOSEN, SOLVERS, WHOLE_NUMBERS
+from ..planning.settings import joined
+from ..planning.settings_checks import CHOSEN, SOLVERS, WHOLE_NUMBERS
 from .file import UNSIZED, model_of, read_scene, size_of, subtable, values_of
 from .keys import sized
 
@@ -175,7 +176,7 @@ def arguments_but_start(
         goal = Goal(**{key: _free_parts(value) for key, value in goal.items()})
     arguments = {name: _unless_free(value) for name, value in table.items()}
     bounds = {name: _unless_free(value) for name, value in table.get("bounds", {}).items()}
-    return arguments | {"goal": goal, "bounds": Bounds(**bounds)}
+    return joined(arguments | {"goal": goal, "bounds": Bounds(**bounds)}, {})
 
 
 def _check_options(options: Any) -> None:

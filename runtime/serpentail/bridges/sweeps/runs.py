@@ -83,13 +83,14 @@ def _simulated(job: Job, model: Model, point: Point) -> tuple[dict[str, Any], Tr
 
 def _planned(job: Job, model: Model, point: Point) -> tuple[dict[str, Any], Any]:
     from ...planning.planner import plan
+    from ...planning.settings import joined
     from ...scenes.plan import arguments_for
 
     if job.table is not None:
         table = changed(job.table, job.keys_of(point))
-        solution = plan(model, **{**arguments_for(model, table), **job.settings})
+        solution = plan(model, **joined(job.settings, arguments_for(model, table)))
     else:
-        arguments = {**job.settings, **job.keys_of(point)}
+        arguments = joined(job.keys_of(point), joined(job.settings, {}))
         start = tuple(arguments.pop(name) for name in STARTS)
         solution = plan(model, start=start, **arguments)
     return solution.report | {"warnings": solution.warnings}, solution

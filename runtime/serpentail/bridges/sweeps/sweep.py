@@ -155,8 +155,9 @@ def _settings(settings: Any, run: Any) -> dict[str, Any]:
     checked = dict(settings or {})
     if checked and not isinstance(run, str):
         raise SweepError("settings: a function has none: pass what it needs by functools.partial")
+    watched = getattr(checked.get("solver"), "watch", None) is not None  # of a plan
     for name in WITHOUT:
-        if name in checked:
+        if name in checked or (watched and name == "watch"):
             raise SweepError(f"settings: {name}: is set by the sweep: leave it out")
     if isinstance(checked.get("q0"), State):
         checked |= dict(zip(STARTS, checked["q0"], strict=True))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...model.model import Model
-from ...optimal.mesh import Mesh
+from ...optimal.mesh import TimeMesh
 from ...optimal.problem import OptimalProblem
 from ...optimal.rules import CollocationRule
 from ..design import refuse_unused
@@ -50,7 +50,7 @@ class PlanProgram:
     compiled: bool
 
     @property
-    def mesh(self) -> Mesh:
+    def mesh(self) -> TimeMesh:
         """Its intervals."""
         return self.optimal.mesh
 
@@ -73,7 +73,7 @@ def conserved_at(model: Model, start: tuple[np.ndarray, np.ndarray]) -> dict[str
 def plan_program(
     model: Model,
     problem: PlanningProblem,
-    mesh: Mesh,
+    mesh: TimeMesh,
     rule: CollocationRule,
     softening: float,
 ) -> PlanProgram:

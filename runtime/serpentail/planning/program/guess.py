@@ -11,7 +11,7 @@ from ...basics.attitude import sign_continuous
 from ...basics.errors import SimulationError
 from ...model.model import Model
 from ...motion.trajectory import Trajectory
-from ...optimal.mesh import Mesh
+from ...optimal.mesh import TimeMesh
 from ...optimal.samples import MeshSamples
 from ...simulation.controllers.controller import TorqueTable
 from ..flight import State, flight
@@ -34,7 +34,7 @@ class GuessMotion:
     at: Callable[[np.ndarray], dict[str, np.ndarray]]
     start: State
     model: Model
-    mesh: Mesh | None = None
+    mesh: TimeMesh | None = None
 
 
 def passive(

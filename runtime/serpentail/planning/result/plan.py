@@ -17,7 +17,7 @@ from ...model.model import Model
 from ...motion.archive import origin
 from ...motion.text import SI, framed
 from ...motion.trajectory import Trajectory
-from ...optimal.mesh import Mesh
+from ...optimal.mesh import TimeMesh
 from ...optimal.rules import CollocationRule
 from ...optimal.solution import Solution
 from ...simulation.controllers.controller import Controller, Damping, TorqueCurve
@@ -54,7 +54,7 @@ class Plan:
         What was asked.
     curve : Curve
         The planned motion as polynomials; ``curve.at(times)`` evaluates them.
-    mesh : Mesh
+    mesh : TimeMesh
         Its intervals.
     rule : CollocationRule
         Its collocation rule.
@@ -74,7 +74,7 @@ class Plan:
     report: dict[str, Any]
     problem: PlanningProblem
     curve: Curve
-    mesh: Mesh
+    mesh: TimeMesh
     rule: CollocationRule
     solution: Solution
     design: Mapping[str, Any] = field(default_factory=dict)

@@ -79,7 +79,7 @@ def truth(search: "Search", best: "Round", planned: Trajectory) -> dict[str, Any
         "dyn_err": None,
     }
     needed = TRACKING_COST * float(planned.t[-1])
-    if not search.settings.track or search.leaves_no_time(needed):
+    if not search.settings.solver.track or search.leaves_no_time(needed):
         return errors
     try:
         motion = tracked(best.model, problem, planned)
@@ -89,7 +89,7 @@ def truth(search: "Search", best: "Round", planned: Trajectory) -> dict[str, Any
     ends = attitude_errors(problem, planned.attitude[-1], motion.attitude[-1])
     return errors | {
         "tracked_attitude_error_deg": max(ends),
-        "true_when_tracked": bool(max(ends) <= (search.settings.tolerance or np.inf)),
+        "true_when_tracked": bool(max(ends) <= (search.settings.tolerances.attitude or np.inf)),
         "tracked_tail_error_rad": float(np.abs(deviation).max()),
         "dyn_err": dynamics_error(planned, motion),
     }
