@@ -19,14 +19,14 @@ from examples import righting
 from examples.studies.righting_kinds import is_true
 
 EXAMPLE = 4  # the random start
-SOLVERS = {"FATROP": {"solver": "fatrop"}, "IPOPT": {"solver": "ipopt"}}
+SOLVERS = {"FATROP": "fatrop", "IPOPT": "ipopt"}
 MESHES = {(1, 3): (40, 2.0), (6, 2): (83, 2.0)}  # intervals, least times as fast as IPOPT
 BESIDE = {(1, 3): 20, (3, 2): 5}  # starts from which both solvers plan
 OBJECTIVES = 10  # starts
 AGAIN = 20  # starts of one problem, after the first
 OUTSIDE = 2e-3  # s of a repeated start, outside the solver
 WITHIN = 0.2  # s
-PLAIN = {"tolerance": None, "retries": 0, "track": False}
+UNTRUE = st.Tolerances(attitude=None)
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ def beside(rat: st.Model, count: int) -> dict:
     calls: dict[str, list[Call]] = {name: [] for name in SOLVERS}
     for seed in range(1, count + 1):
         for name, way in SOLVERS.items():
-            calls[name].append(timed(rat, seed, **way))
+            calls[name].append(timed(rat, seed, solver=way))
     ratios = [i.cpu_s / f.cpu_s for f, i in zip(*calls.values(), strict=True)]
     true = ", ".join(f"{name} {sum(one.true for one in of)} true" for name, of in calls.items())
     name = f"{label(rat.segments, rat.links)}, {count} starts, IPOPT over FATROP, median"
@@ -139,11 +139,11 @@ def beside(rat: st.Model, count: int) -> dict:
 def iteration(rat: st.Model, intervals: int, least: float) -> dict:
     """Time an iteration from passive flight, torques and states on one mesh."""
     each = dict.fromkeys(SOLVERS, np.inf)
-    mesh = {"intervals": intervals, "controls": intervals}
+    mesh = {"mesh": st.Mesh(intervals=intervals, controls=intervals), "tolerances": UNTRUE}
     for _ in range(3):
         for name, way in SOLVERS.items():
-            most = {"options": {f"{way['solver']}.max_iter": 30}}
-            report = plan(rat, **mesh, **PLAIN, **way, **most).report
+            solver = st.Solver(way, options={f"{way}.max_iter": 30}, retries=0, track=False)
+            report = plan(rat, **mesh, solver=solver).report
             each[name] = min(each[name], report["solve_cpu_s"] / report["iterations"])
     about = ", ".join(f"{name} {1e3 * s:.2f} ms" for name, s in each.items())
     name = f"{label(rat.segments, rat.links)}, an iteration of {intervals} intervals"
@@ -167,10 +167,11 @@ def objective(rat: st.Model, name: str) -> dict:
 def again(rat: st.Model) -> dict:
     """Plan again from near states, with the plan as the guess: a call without its solver."""
     q, v = righting.tumbling(rat, EXAMPLE)
-    first, random, calls = plan(rat, track=False), np.random.default_rng(0), []
+    untracked = {"solver": st.Solver(track=False)}
+    first, random, calls = plan(rat, **untracked), np.random.default_rng(0), []
     for _ in range(AGAIN):
         near = q, v * (1 + random.uniform(-0.01, 0.01, v.size))
-        calls.append(timed(rat, start=near, guess=first, tolerance=None, track=False))
+        calls.append(timed(rat, start=near, guess=first, tolerances=UNTRUE, **untracked))
     reports = [one.plan.report for one in calls]
     rest = [r["call_cpu_s"] - r["solve_cpu_s"] for r in reports]
     truth = 1e3 * np.median([r["truth_s"] for r in reports])

@@ -43,7 +43,8 @@ def power(point):
     return casadi.dot(point.torque, point.tail_rate) / 0.03
 
 
-own = st.plan(model, **task, objective=straight, path=[(power, -1, 1)], intervals=24)
+mesh = st.Mesh(intervals=24)
+own = st.plan(model, **task, objective=straight, path=[(power, -1, 1)], mesh=mesh)
 print(own)
 
 # %%

@@ -17,7 +17,8 @@ import serpentail as st
 rat = st.build("righting_m1_n3")
 q0 = np.array([0, 0, 0.34, np.cos(0.75), np.sin(0.75), 0, 0, 0.1, 0.1])  # pitched by 1.5 rad
 v0 = np.array([0, -0.3, 2.4, -4, 0, 0.5, 0, 0])
-task = {"start": (q0, v0), "duration": 0.4, "bounds": st.Bounds(angle=np.pi / 3), "track": False}
+task = {"start": (q0, v0), "duration": 0.4, "bounds": st.Bounds(angle=np.pi / 3)}
+task["solver"] = st.Solver(track=False)
 free = {"tail": (-0.5, 0.5)}  # rad
 length = {"tail_length": (0.08, 0.3)}  # m
 best = st.plan(rat, **task, design=length)
@@ -33,7 +34,7 @@ for lengths in (np.linspace(found, 0.12, 5), np.linspace(found, 0.24, 7)):
     plan = best
     for each in lengths:
         body = rat.with_parameters(tail_length=each)
-        plan = st.plan(body, **task, guess=plan, tolerance=None)
+        plan = st.plan(body, **task, guess=plan, tolerances=st.Tolerances(attitude=None))
         efforts[1e3 * each] = 1e6 * plan.report["objective"]
 
 plt.style.use("seaborn-v0_8-colorblind")

@@ -19,7 +19,7 @@ VARIED = ("torso_mass", "torso_inertia", "tail_mass", "tail_length")
 PITCHES = (-50.0, -30.0, -10.0, 10.0, 20.0)  # deg, at the landing: where the one wanted is not true
 TORQUE = 0.02  # N m
 GAMMA, DELTA = radians(210), radians(-15)
-QUICK = {"track": False, "retries": 2}
+QUICK = st.Solver(track=False, retries=2, time_limit=60.0)
 KICK = {"at": 0.4, "delta": radians(-75), "rate": 70.0}
 SOURCES = ("codegen", "runtime", "examples/studies")
 
@@ -76,10 +76,7 @@ def planned(tail: Tail, pitch: float) -> st.Phase:
     """Return a flight that is planned to end at this pitch (deg), or at one near it."""
     pitches = [pitch, *sorted(PITCHES, key=lambda other: abs(other - pitch))]
     bounds = st.Bounds(angle=tail.angle, torque=TORQUE)
-    plans = [
-        {"goal": goal(tail, each), "bounds": bounds, "time_limit": 60.0, **QUICK}
-        for each in pitches
-    ]
+    plans = [{"goal": goal(tail, each), "bounds": bounds, "solver": QUICK} for each in pitches]
     moves = [{"before_landing": 0.2} | LANDING]
     return st.Phase("right", 1.5, until="landing", plan=plans, moves=moves)
 

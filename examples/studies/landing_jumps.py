@@ -78,7 +78,7 @@ def plan_to(pitch: float) -> dict:
         tail_rate=np.zeros(6),
     )
     bounds = st.Bounds(angle=ANGLE, torque=TORQUE)
-    return {"goal": goal, "bounds": bounds, "time_limit": 120.0, "track": False}
+    return {"goal": goal, "bounds": bounds, "solver": st.Solver(time_limit=120.0, track=False)}
 
 
 def told(found: dict) -> str:

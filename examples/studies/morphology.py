@@ -89,11 +89,9 @@ def right(point: dict) -> dict:
         goal=st.Goal(torso_rate=None),
         bounds=righting.bounds(model),
         duration=(SHORTEST, righting.FLIGHT),
-        intervals=INTERVALS,
-        tolerance=None,
-        retries=0,
-        track=False,
-        options={"fatrop.max_iter": ITERATIONS},
+        mesh=st.Mesh(intervals=INTERVALS),
+        tolerances=st.Tolerances(attitude=None),
+        solver=st.Solver(retries=0, track=False, options={"fatrop.max_iter": ITERATIONS}),
     )
     told = plan.report
     off = told["open_loop_attitude_error_deg"]

@@ -54,9 +54,8 @@ def examples() -> dict[str, tuple]:
     parts = {}
     for frequency in FREQUENCIES:
         steps = round(frequency * righting.FLIGHT)
-        ours = {"intervals": max(2, steps // 3), "tolerance": None, "retries": 0}
         makes = {"paper": partial(plans.paper_example, steps + 1)}
-        makes["ours"] = partial(plans.example, ours)
+        makes["ours"] = partial(plans.example, max(2, steps // 3))
         for way, make in makes.items():
             parts[f"Fig. 11 {way} {frequency} Hz"] = RAT, {"frequency": frequency}, make
     return parts

@@ -19,7 +19,7 @@ BLOCK = 10  # random starts that are kept together
 PAPER = "paper"
 WAYS: dict[str, dict] = {
     "auto": {"track": False},
-    "IPOPT": {"solver": "ipopt", "track": False},
+    "IPOPT": {"name": "ipopt", "track": False},
     PAPER: {},
 }
 LIMIT = 120.0  # s a plan
@@ -118,8 +118,9 @@ def row_of(kind: Kind, way: str, model: st.Model, start: tuple, limits: st.Bound
         plan = righting_paper.planned(model, *task, at_rest=rest, time_limit=LIMIT)
         return righting_paper.row(model, plan)
     goal = {"goal": st.Goal(torso_rate=None)} if kind.any_rate else {}
-    given = {"start": start, "bounds": limits, "time_limit": LIMIT} | goal | settings
-    return righting.row(st.plan(model, **given, **WAYS[way]))
+    given = {"start": start, "bounds": limits} | goal | settings
+    solver = st.Solver(**WAYS[way], time_limit=LIMIT)
+    return righting.row(st.plan(model, solver=solver, **given))
 
 
 def animal(kind: Kind) -> st.Model:

@@ -32,7 +32,7 @@ def section_4_2() -> dict:
     model = rat(*RAT)
     start, limits = righting.kicked(model), righting.bounds(model)
     given = {"start": start, "bounds": limits, "duration": (0.3, righting.FLIGHT)}
-    plan = st.plan(model, retries=8, time_limit=LIMIT, **given)
+    plan = st.plan(model, solver=st.Solver(retries=8, time_limit=LIMIT), **given)
     flights = {"planned": plan.trajectory, "tracked": righting.tracked(model, plan)}
     flights["passive"] = righting.passive(model, start, plan.duration)
     at = np.clip(plan.trajectory.t, 0, flights["tracked"].t[-1])
@@ -44,13 +44,19 @@ def section_4_2() -> dict:
     return {"row": row, "flights": {kind: as_lists(flight) for kind, flight in flights.items()}}
 
 
-def example(settings: dict) -> dict:
+def example(intervals: int) -> dict:
     """Fig. 11: plan from one random start."""
     model = rat(*RAT)
-    common = {"start": righting.tumbling(model, EXAMPLE), "bounds": righting.bounds(model)}
-    return righting.row(
-        st.plan(model, duration=righting.FLIGHT, time_limit=LIMIT, **common, **settings)
+    plan = st.plan(
+        model,
+        start=righting.tumbling(model, EXAMPLE),
+        bounds=righting.bounds(model),
+        duration=righting.FLIGHT,
+        mesh=st.Mesh(intervals=intervals),
+        tolerances=st.Tolerances(attitude=None),
+        solver=st.Solver(retries=0, time_limit=LIMIT),
     )
+    return righting.row(plan)
 
 
 def paper_example(nodes: int) -> dict:
@@ -66,7 +72,7 @@ def true(size: tuple) -> dict:
     model = rat(*size)
     start, limits = righting.kicked(model), righting.bounds(model, 2 * np.pi)
     given = {"start": start, "bounds": limits, "duration": (0.3, righting.FLIGHT)}
-    plan = st.plan(model, retries=8, time_limit=LIMIT, **given)
+    plan = st.plan(model, solver=st.Solver(retries=8, time_limit=LIMIT), **given)
     return {"row": righting.row(plan), "flight": as_lists(plan.trajectory)}
 
 

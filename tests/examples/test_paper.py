@@ -101,7 +101,7 @@ def test_ends_are_upright_and_at_rest_within_the_bounds():
 def test_the_optimum_is_that_of_st_plan():
     """Where both find the same; on a fine mesh, and from the paper's flight, to many digits."""
     here = start(rat(), 6)
-    task = {"start": here, "duration": DURATION, "bounds": LIMITS, "track": False}
+    task = {"start": here, "duration": DURATION, "bounds": LIMITS, "solver": st.Solver(track=False)}
     for settings, near in (({}, 0.02), ({"smoothing": 0.0}, 2e-3)):
         ours = st.plan(rat(), **task, **settings).report["effort"]
         for rule in RULES:
@@ -236,7 +236,7 @@ def test_rows_have_the_true_flight():
             assert found["duration_s"] == pytest.approx(DURATION)
     task = {"start": plan.start, "duration": DURATION, "bounds": LIMITS, "smoothing": 0.0}
     flight = st.simulate(rat(), *plan.start, controller=plan.law, t_span=DURATION)
-    ours = st.plan(rat(), **task, guess=flight, track=False).report
+    ours = st.plan(rat(), **task, guess=flight, solver=st.Solver(track=False)).report
     assert found["energy_J"] == pytest.approx(ours["energy_J"], rel=1e-3)
     assert found["peak_power_W"] == pytest.approx(ours["peak_power_W"], rel=0.02)
 

@@ -136,7 +136,8 @@ def test_what_the_function_raises_ends_long_work():
 
 
 def test_a_plan_tells_its_rounds():
-    settings = {"duration": 0.3, "intervals": 6, "rounds": 2, "track": False, "start": TUMBLE}
+    settings = {"duration": 0.3, "mesh": st.Mesh(intervals=6, rounds=2), "start": TUMBLE}
+    settings["solver"] = st.Solver(track=False)
     told = []
     with st.progress(told.append):
         plan = st.plan(zoo.model("m1_n3"), goal=st.Goal(attitude=None), **settings)
@@ -167,8 +168,9 @@ def tired(t, q, v):
 def test_what_the_package_gives_fills_no_screen_and_says_what_it_is_and_how_it_ended(tmp_path):
     rat, motion, runs = zoo.model("feet"), flown(output_step=0.001), flown(300)
     still = np.array([0, 0, 0, 1, 0.1, 0, 0, 0, 0]), np.zeros(8)
-    settings = {"goal": st.Goal(attitude=None, torso_rate=None), "tolerance": None}
-    settings |= {"duration": 0.1, "intervals": 4, "track": False}
+    settings = {"goal": st.Goal(attitude=None, torso_rate=None), "solver": st.Solver(track=False)}
+    settings |= {"tolerances": st.Tolerances(attitude=None), "mesh": st.Mesh(intervals=4)}
+    settings["duration"] = 0.1
     plan = st.plan(zoo.model("m1_n3"), start=still, **settings)
     times = np.linspace(0, 1, 500)
     table = st.TorqueTable(times, np.zeros((500, 2)))

@@ -250,8 +250,9 @@ def test_models_and_plans_that_do_not_fit_are_refused(plan):
 
 
 def test_a_phase_of_a_sequence_is_controlled_predictively():
-    right = {"intervals": 11, "duration": 0.3, "goal": st.Goal(torso_rate=None)}
-    right |= {"tolerance": None, "track": False, "bounds": NO_ANGLE}
+    right = {"duration": 0.3, "goal": st.Goal(torso_rate=None), "bounds": NO_ANGLE}
+    right |= {"mesh": st.Mesh(intervals=11), "tolerances": st.Tolerances(attitude=None)}
+    right["solver"] = st.Solver(track=False)
     tracking = st.Tracking(mpc={"rate": 50, "intervals": 4})
     phases = [st.Phase("fall", 0.05), st.Phase("right", 0.3, plan=right, tracking=tracking)]
     run = st.Sequence(rat(), [*phases, st.Phase("after", 0.01)]).simulate(*start(rat(), 1))

@@ -29,7 +29,7 @@ from serpentail.scenes.plan import planned as planned_by
 from tests.support import zoo
 from tests.support.rows import row
 from tests.support.told import besides_progress
-from tests.support.tumbling import AGAIN, DURATION, planned, rat, start
+from tests.support.tumbling import AGAIN, DURATION, plan_by_keys, planned, rat, start
 
 ENDLESS = {
     "ipopt": {"ipopt.tol": 1e-300, "ipopt.acceptable_iter": 0, "ipopt.max_iter": 10**6},
@@ -38,7 +38,7 @@ ENDLESS = {
 
 
 def again(model=None, **settings) -> st.Plan:
-    return st.plan(model or rat(), **AGAIN | {"start": start(rat())} | settings)
+    return plan_by_keys(model or rat(), **AGAIN | {"start": start(rat())} | settings)
 
 
 def numbers(plan: st.Plan) -> np.ndarray:
@@ -170,7 +170,7 @@ TABLE = tomllib.loads(SCENE.read_text())["plan"]
 def test_scene_has_the_arguments_of_plan_and_errors_name_the_key(tmp_path):
     goal = {"attitude": "free", "tail": ["free", 0.1]}
     arguments = plan_arguments(TABLE | {"tolerance": "free", "goal": goal})
-    assert arguments["tolerance"] is None
+    assert arguments["tolerances"] == st.Tolerances(attitude=None)
     assert arguments["goal"] == st.Goal(attitude=None, tail=(None, 0.1))
     assert np.linalg.norm(arguments["start"][0][3:7]) == pytest.approx(1, abs=1e-15)
     for words, changes in {

@@ -19,7 +19,7 @@ from serpentail.planning.result.truth import planned_torques
 from tests.references.flight_program import FlightProblem, solved
 from tests.support import zoo
 from tests.support.rows import row
-from tests.support.tumbling import AGAIN, DURATION, integrated, rat, start
+from tests.support.tumbling import AGAIN, DURATION, integrated, plan_by_keys, rat, start
 
 PROBLEMS = {
     "upright": {},
@@ -55,7 +55,7 @@ RICHER = {
 def planned(problem: dict, seed: int = 0, model: st.Model | None = None, **settings) -> st.Plan:
     model = model or rat()
     given = AGAIN | {"solver": "fatrop", "intervals": 12, "start": start(model, seed)}
-    return st.plan(model, **given | problem | settings)
+    return plan_by_keys(model, **given | problem | settings)
 
 
 def turned(seed: int) -> dict:
@@ -152,7 +152,6 @@ def test_torques_have_a_coarser_mesh_than_states():
 
 
 def test_first_meshes_are_finer_for_longer_tails():
-    nothing = dict.fromkeys(("guess", "intervals", "controls", "most_intervals"))
     for segments, given, intervals, controls in (
         (1, {}, [12, 144], 12),
         (1, {"intervals": 6}, [6], 6),
@@ -162,7 +161,7 @@ def test_first_meshes_are_finer_for_longer_tails():
         (4, {"controls": 5}, [20, 60], 5),
         (5, {}, [144], 12),
     ):
-        settings = SimpleNamespace(**nothing | given)
+        settings = SimpleNamespace(mesh=st.Mesh(**given), guess=st.Guess())
         model = SimpleNamespace(segments=segments)
         meshes = Attempts(model, settings, collocation_rule()).meshes()
         with row(segments, given):

@@ -10,11 +10,12 @@ import pytest
 
 import serpentail as st
 from serpentail.planning.paths_at_start import refuse_violated
+from serpentail.planning.settings import PLACES
 from tests.support import zoo
 from tests.support.models import model_folder
 from tests.support.posed import posed
 from tests.support.rows import row
-from tests.support.tumbling import AGAIN, DURATION, rat, start
+from tests.support.tumbling import AGAIN, DURATION, plan_by_keys, rat, start
 
 NAN, INF = float("nan"), float("inf")
 Goal, Bounds = st.Goal, st.Bounds
@@ -70,9 +71,11 @@ PROBLEM = {
     "degree: value 0": {"degree": 0},
     "degree: value 6": {"degree": 6},  # one too many
     "degree: value 2.0": {"degree": 2.0},
-    "setting: value 'num_nodes': .*'intervals'": {"num_nodes": 59},
-    "setting: value 'interval': .*'intervals'": {"interval": 20},
-    "solver: value 'ipotp': .*'ipopt'": {"solver": "ipotp"},
+    r"setting: value 'num_nodes': .*mesh=st.Mesh\(intervals=...\)": {"num_nodes": 59},
+    r"setting: value 'interval': .*mesh=st.Mesh\(intervals=...\)": {"interval": 20},
+    "setting: value 'initial_guess': .*'guess'": {"initial_guess": 3},
+    "mesh: value 3: needs st.Mesh": {"mesh": 3},
+    "solver.name: value 'ipotp': .*'ipopt'": {"solver": "ipotp"},
     "options: .*'ipopt.no_such'": {"options": {"ipopt.no_such": 1}, "solver": "ipopt"},
     "options: 'max_iter': .*begins with 'fatrop.' or 'ipopt.'": {"options": {"max_iter": 5}},
     "options: 'knitro.x': ": {"options": {"knitro.x": 5}},
@@ -112,12 +115,13 @@ def refused(words, model=None, **changes):
     model = model or rat()
     given = {"start": start(model), "duration": DURATION} | changes
     with row(words), pytest.raises(st.PlanningError, match=words):
-        st.plan(model, **given)
+        plan_by_keys(model, **given)
 
 
 def test_what_is_wrong_is_named():
     for name, value in VALUES.items():
-        refused(re.escape(f"{name}: value {value!r}"), **{name: value})
+        place = ".".join(PLACES.get(name, (name,)))
+        refused(re.escape(f"{place}: value {value!r}"), **{name: value})
     for name, value in GOALS.items():
         refused(re.escape(f"goal.{name}: value {value!r}"), goal=Goal(**{name: value}))
     for name, value in BOUNDS.items():
@@ -148,9 +152,9 @@ def test_parameters_that_do_nothing_are_refused_and_errors_of_the_users_own_are_
     value, upright = model.parameters[name], np.r_[0, 0, 1, 1, np.zeros(model.nq - 4)]
     given = {"start": (upright, 5 * np.eye(model.nv)[3]), "duration": DURATION}
     with pytest.raises(st.PlanningError, match=f"design: value '{name}'"):
-        st.plan(model, design={name: (value, 2 * value)}, **given)
+        plan_by_keys(model, design={name: (value, 2 * value)}, **given)
     with pytest.raises(AttributeError, match="'NoneType' object has no attribute 'torque'"):
-        st.plan(model, objective=lambda p: None.torque, **given)
+        plan_by_keys(model, objective=lambda p: None.torque, **given)
 
 
 def test_path_constraints_that_a_start_may_meet_are_not_refused():
@@ -198,13 +202,13 @@ def test_models_that_lack_functions_are_refused():
     names = ["mass_matrix", "inverse_dynamics", "forward_dynamics", "rollout", "energy", "momentum"]
     model = st.load(model_folder(1, 1, functions=names))  # the list of functions is the point
     given = AGAIN | {"start": start(model), "intervals": 4, "track": True}
-    plan, whole = (st.plan(each, **given).report for each in (model, zoo.model("m1_n1")))
+    plan, whole = (plan_by_keys(each, **given).report for each in (model, zoo.model("m1_n1")))
     assert plan["dynamics"] == "symbolic" and plan["converged"]
     assert plan["objective"] == pytest.approx(whole["objective"], rel=1e-6)
     for name, most in (("tracked_tail_error_rad", 1e-4), ("tracked_attitude_error_deg", 1e-3)):
         assert plan[name] == pytest.approx(whole[name], abs=most), name  # whose PFL is compiled
     given["track"] = False
-    plan = st.plan(model, **given)
+    plan = plan_by_keys(model, **given)
     path = ((lambda point: point.tip, 0, 1),)
     for body, error, words, changes in (
         (zoo.model("bare"), st.ModelError, "'mass_matrix'", {}),
@@ -212,7 +216,7 @@ def test_models_that_lack_functions_are_refused():
         (model, st.PlanningError, "'tip'", {"path": path}),
     ):
         with row(words), pytest.raises(error, match=words):
-            st.plan(body, **given | changes)
+            plan_by_keys(body, **given | changes)
     with pytest.raises(st.ModelError, match="without 'airborne_rates', 'airborne_rates_deriv"):
         st.Mpc(model, plan)
 
@@ -222,7 +226,7 @@ def test_goal_that_cannot_be_reached_is_flagged():
     v[3] = 60.0  # rad/s, far too fast for the time and torques given
     settings = {"retries": 0, "options": {"fatrop.max_iter": 60}, "duration": 0.1}
     settings["bounds"] = Bounds(angle=np.pi / 3, torque=1e-4)
-    plan = st.plan(rat(), start=(q, v), **settings)
+    plan = plan_by_keys(rat(), start=(q, v), **settings)
     assert not plan.success and not plan.report["converged"]
     assert plan.report["status"] != "Solve_Succeeded"
     json.dumps(plan.report, allow_nan=False)

@@ -24,7 +24,8 @@ from joblib.externals.loky import ProcessPoolExecutor as LokyExecutor
 import serpentail as st
 
 STATES = 2400  # more than both threads take, and enough for vectors
-AGAIN = {"duration": 0.4, "bounds": st.Bounds(angle=np.pi / 3), "tolerance": None, "track": False}
+AGAIN = {"duration": 0.4, "bounds": st.Bounds(angle=np.pi / 3)}
+AGAIN["tolerances"] = st.Tolerances(attitude=None)
 LIMIT = 30.0  # s a job: some take one where processors are busy, a job that hangs for ever
 TWICE = 2  # of each job: both workers of a pool, or both threads, at the same time
 
@@ -80,8 +81,8 @@ def plan(model) -> str:
     """Plan a motion: FATROP, IPOPT from there, its linear algebra, and the truth of its end."""
     batch(model)  # from then on nodes are evaluated in lanes, whose last digits are their own
     settings = {"start": start(model), **AGAIN}
-    found = st.plan(model, **settings)
-    other = st.plan(model, **settings, guess=found, solver="ipopt")
+    found = st.plan(model, **settings, solver=st.Solver(track=False))
+    other = st.plan(model, **settings, guess=found, solver=st.Solver("ipopt", track=False))
     assert found.report["converged"] and other.report["converged"], (found.report, other.report)
     return _digest(found.solution.samples.states, other.solution.samples.states, found.trajectory.q)
 

@@ -67,7 +67,7 @@ def test_a_plan_with_units_is_that_in_si():
     found = plan_arguments(table)
     q, v = found["start"]
     assert q == [0, 0, 0.34, 1, 0, 0, 0, -0.5585053606381855, 0] and v == [0, 0, 2.385, pi / 2]
-    assert found["duration"] == [0.3, 0.58] and found["tolerance"] == 0.01
+    assert found["duration"] == [0.3, 0.58] and found["tolerances"] == st.Tolerances(attitude=0.01)
     assert found["goal"] == st.Goal(tail=(None, radians(10)), torso_rate=None)
     assert found["bounds"] == st.Bounds(angle=pi, torque=0.02) and found["damping"] == 0.001
     assert plan_arguments({"start": start, "duration": 1, "goal": "upright"})["goal"] == "upright"

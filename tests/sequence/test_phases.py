@@ -46,7 +46,7 @@ def goal():
 def plan(**changes):
     """Arguments of a plan that lands."""
     bounds = st.Bounds(angle=pi / 3, torque=0.02)
-    return {"goal": goal(), "bounds": bounds, "track": False} | changes
+    return {"goal": goal(), "bounds": bounds, "solver": st.Solver(track=False)} | changes
 
 
 def kick(**changes):
@@ -189,14 +189,14 @@ def check_planned(landed):
 
 
 def test_of_several_plans_the_first_true_one_is_taken():
-    hopeless = plan(duration=0.05, retries=0, rounds=0)
+    hopeless = plan(duration=0.05, solver=st.Solver(retries=0), mesh=st.Mesh(rounds=0))
     run = sequence(kick(), st.Phase("right", 0.05, plan=[hopeless, plan()])).simulate(*settled())
     assert run.phases[1].plan.success and run.phases[1].plan.duration > 0.5
     run = sequence(kick(), st.Phase("right", 0.02, plan=hopeless)).simulate(*settled())
     assert not run.phases[1].plan.success
     assert "plan of phase 'right' did not succeed" in str(run.trajectory.warnings)
-    wrong = st.Phase("right", 1.0, plan=plan(intervals=-3))
-    with pytest.raises(st.PlanningError, match="phase 'right': intervals: value -3"):
+    wrong = st.Phase("right", 1.0, plan=plan(mesh=st.Mesh(intervals=-3)))
+    with pytest.raises(st.PlanningError, match=r"phase 'right': mesh\.intervals: value -3"):
         sequence(kick(), wrong).simulate(*settled())
 
 

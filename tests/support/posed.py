@@ -2,11 +2,11 @@
 
 from unittest.mock import patch
 
-import serpentail as st
 from serpentail.planning import planner
+from tests.support.tumbling import plan_by_keys
 
 
 def posed(model, **arguments):
     """The problem and the settings of a plan."""
     with patch.object(planner, "best_plan", lambda model, problem, settings: (problem, settings)):
-        return st.plan(model, **arguments)
+        return plan_by_keys(model, **arguments)

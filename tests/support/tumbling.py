@@ -6,6 +6,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import serpentail as st
+from serpentail.planning.settings import joined
 from serpentail_scene.signatures.table import EXACT_DERIVATIVES
 from tests.support import zoo
 from tests.support.models import model_folder
@@ -43,11 +44,16 @@ def start(model: st.Model, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
     return q, v
 
 
+def plan_by_keys(model: st.Model, **asked) -> st.Plan:
+    """Return a plan whose settings have the names of a scene's keys, which tests combine."""
+    return st.plan(model, **joined(asked, {}))
+
+
 @cache
 def planned(**settings) -> st.Plan:
     """Return a plan for the first start, made once in a process."""
     model = rat()
-    return st.plan(model, start=start(model), duration=DURATION, **TIGHT, **settings)
+    return plan_by_keys(model, start=start(model), duration=DURATION, **TIGHT, **settings)
 
 
 def rate(model, plan):

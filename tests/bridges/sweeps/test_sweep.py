@@ -180,10 +180,12 @@ def test_functions_are_run_with_and_without_a_model_and_tell_progress(worker, tm
 
 def test_plans_are_rows(worker):
     settings = {"q0": Q0, "v0": [0, 0, 1, 2, 0, 0, 0, 0], "goal": st.Goal(torso_rate=None)}
-    settings |= {"track": False, "tolerance": None, "intervals": 4}
-    axes = {"duration": st.grid([0.4, 0.5])}
+    settings |= {"solver": st.Solver(track=False), "tolerances": st.Tolerances(attitude=None)}
+    settings["mesh"] = st.Mesh(rounds=0)
+    axes = {"duration": st.grid([0.4, 0.5]), "intervals": st.grid([4])}  # a field of a mesh
     found = st.sweep(model(), axes, "plan", settings=settings, executor=worker)
     assert [row["duration_s"] for row in found.rows()] == [0.4, 0.5]
+    assert {row["intervals"] for row in found.rows()} == {4}
     assert all(row["error"] is None and "success" in row for row in found.rows())
 
 
@@ -197,6 +199,7 @@ def test_what_cannot_be_is_refused_in_one_line():
         "run: value .*simulate": {"run": lambda point: {}, "settings": None},
         "settings: no v0: ": {"settings": {"q0": Q0}},
         "settings: watch": {"settings": {"watch": print}},
+        "settings: watch: ": {"settings": {"solver": st.Solver(watch=print)}, "run": "plan"},
         "settings: q0: value .*nan": {"settings": {"q0": float("nan")}},
         "outputs: value 'height'": {"outputs": ["height"]},
         "outputs: value 'end_s'": {"outputs": "end_s"},

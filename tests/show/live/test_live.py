@@ -75,7 +75,8 @@ def test_a_run_is_shown_where_it_has_come_to(view):
 
 def test_a_plan_is_shown_at_nine_moments_without_legs_or_ground(view, capfd):
     q, v = np.r_[0, 0, 0.3, 1, 0.2, [0] * 4], np.r_[0, 0, 1, 1, [0] * 4]
-    rough = {"intervals": 4, "tolerance": None, "solver": "fatrop", "track": False}
+    rough = {"mesh": st.Mesh(intervals=4), "tolerances": st.Tolerances(attitude=None)}
+    rough["solver"] = st.Solver("fatrop", track=False)
     limits = {"duration": 0.2, "bounds": st.Bounds(angle=1.0)}
     plan = st.plan(zoo.model("m1_n3"), start=(q, v), **limits, **rough)
     with served("m1_n3") as alone:

@@ -39,5 +39,6 @@ def plan():
     """A plan that straightens a tail while the torso turns as it likes."""
     q = np.array([0, 0, 0, 1, 0, 0, 0, 0.4, 0])
     goal = st.Goal(attitude=None, tail=(0.0, 0.0))
-    settings = {"duration": 0.2, "tolerance": None, "intervals": 4, "rounds": 0}
+    settings = {"duration": 0.2, "mesh": st.Mesh(intervals=4, rounds=0)}
+    settings["tolerances"] = st.Tolerances(attitude=None)
     return st.plan(zoo.model("m1_n3"), start=(q, np.zeros(8)), goal=goal, **settings)
