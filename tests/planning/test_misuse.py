@@ -111,11 +111,11 @@ STOPS = {
 }
 
 
-def refused(words, model=None, **changes):
+def refused(words, model=None, ask=plan_by_keys, **changes):
     model = model or rat()
     given = {"start": start(model), "duration": DURATION} | changes
     with row(words), pytest.raises(st.PlanningError, match=words):
-        plan_by_keys(model, **given)
+        ask(model, **given)
 
 
 def test_what_is_wrong_is_named():
@@ -130,6 +130,45 @@ def test_what_is_wrong_is_named():
         refused(words, **changes)
     for name, value in OPTIONS.items():
         refused(f"'{name}'|{name}: value {value!r}", options={name: value})
+
+
+OLD = {  # keywords of earlier versions: a value, and its new place
+    "degree": (5, "mesh", st.Mesh(degree=5)),
+    "intervals": (7, "mesh", st.Mesh(intervals=7)),
+    "most_intervals": (8, "mesh", st.Mesh(most_intervals=8)),
+    "controls": (6, "mesh", st.Mesh(controls=6)),
+    "rounds": (2, "mesh", st.Mesh(rounds=2)),
+    "tolerance": (0.5, "tolerances", st.Tolerances(attitude="0.5 deg")),
+    "tail_tolerance": (None, "tolerances", st.Tolerances(tail=None)),
+    "rate_tolerance": (2.0, "tolerances", st.Tolerances(rate="2 rad/s")),
+    "through_torso": (True, "tolerances", st.Tolerances(through_torso=True)),
+    "options": ({"ipopt.tol": 1}, "solver", st.Solver(options={"ipopt.tol": 1})),
+    "time_limit": (1.5, "solver", st.Solver(time_limit="1500 ms")),
+    "multi_start": (2, "solver", st.Solver(multi_start=2)),
+    "retries": (0, "solver", st.Solver(retries=0)),
+    "seed": (3, "solver", st.Solver(seed=3)),
+    "track": (False, "solver", st.Solver(track=False)),
+    "watch": (print, "solver", st.Solver(watch=print)),
+    "guess_damping": (1e-4, "guess", st.Guess(damping="0.1 mN m s")),
+}
+
+
+def test_old_keywords_are_fields_of_objects_with_one_note_each():
+    def asked(**settings):
+        return posed(rat(), st.plan, start=start(rat()), duration=DURATION, **settings)[1]
+
+    for name, (value, home, made) in OLD.items():
+        with row(name), pytest.warns(DeprecationWarning) as notes:
+            old = asked(**{name: value})
+        (note,), kind = notes, type(made).__name__
+        with row(name, str(note.message)), pytest.warns(DeprecationWarning):
+            assert re.fullmatch(rf"{name}= is now {home}=st.{kind}\(\w+=...\)", str(note.message))
+            assert note.filename.endswith("posed.py")  # which calls plan
+            assert old == asked(**{home: made}) != asked()
+            refused(f"{name}: value .*: beside {home}: ", ask=st.plan, **{name: value, home: made})
+    with pytest.warns(DeprecationWarning):  # beside a name and a motion, which are no objects
+        old = asked(solver="ipopt", track=False, guess=None, guess_damping=1e-4)
+    assert old.solver == st.Solver("ipopt", track=False) and old.guess.damping == 1e-4
 
 
 def test_wrong_ranges_are_named():

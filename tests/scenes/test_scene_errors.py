@@ -144,10 +144,7 @@ def test_what_no_plan_can_be_is_one_line_and_none_writes_files_or_runs_code():
         ({"bounds": {"torque": 1e308}}, r"bounds.torque: value 1e\+308"),
         ({"options": 3}, "options: value 3: needs a table"),
         ({"intervals": 10**9}, "intervals: value 1000000000: .*10000"),
-        *(
-            ({"solver": name}, f"solver.name: value '{name}'")
-            for name in ("../solver", "sqpmethod")
-        ),
+        *(({"solver": name}, f"name: value '{name}'") for name in ("../solver", "sqpmethod")),
     ]
     rows += [
         (change, r"to serpentail\.plan")

@@ -6,7 +6,7 @@ from serpentail.planning import planner
 from tests.support.tumbling import plan_by_keys
 
 
-def posed(model, **arguments):
-    """The problem and the settings of a plan."""
+def posed(model, ask=plan_by_keys, **arguments):
+    """The problem and the settings of a plan; ask: st.plan for its own arguments alone."""
     with patch.object(planner, "best_plan", lambda model, problem, settings: (problem, settings)):
-        return plan_by_keys(model, **arguments)
+        return ask(model, **arguments)

@@ -136,7 +136,7 @@ class Solver:
         return {k: v for k, v in self.options.items() if str(k).startswith(f"{solver}.")}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Guess:
     """Where the search for a plan begins.
 
