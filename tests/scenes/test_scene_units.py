@@ -11,7 +11,7 @@ import serpentail as st
 from serpentail.basics.checks import Refusals
 from serpentail.cli import cli
 from serpentail.planning.problem import SETTINGS as PROBLEM_SETTINGS
-from serpentail.planning.settings import PlanSettings
+from serpentail.planning.settings import PLACES
 from serpentail.scenes.keys import read
 from serpentail.scenes.plan import BOUNDS, CODE_ONLY, GOAL, PLAN, plan_arguments
 from serpentail.scenes.simulate_keys import SIMULATE
@@ -157,7 +157,7 @@ def test_all_that_is_wrong_with_a_plan_is_told_at_once():
 
 def test_the_keys_of_a_plan_are_what_plan_takes():
     arguments = {"start", "goal", "duration", "bounds", "design", "free_start", *PROBLEM_SETTINGS}
-    arguments |= {entry.name for entry in fields(PlanSettings)}
+    arguments |= PLACES.keys()
     assert set(PLAN.keys) == arguments - set(CODE_ONLY)
     assert set(GOAL) == {entry.name for entry in fields(st.Goal)}
     assert set(BOUNDS) == {entry.name for entry in fields(st.Bounds)}

@@ -138,7 +138,7 @@ class Attempts:
         quick: with few iterations, to see whether that leads anywhere.
         """
         begin = samples_of(motion, program)
-        options = self.settings.solver.options_of(solver)
+        options = self.settings.options_of(solver)
         threads = self.model.batch_library.threads
         if solver == "ipopt":
             found = ipopt.solve(program.optimal, begin, guess, options, threads, quick)

@@ -86,7 +86,7 @@ def kept_off(
         mesh=replace(settings.mesh, rounds=AROUND_ROUNDS, most_intervals=most),
         solver=replace(
             solver,
-            name=solver.first,
+            name=settings.first_solver,
             retries=0,
             multi_start=1,
             options=AROUND_OPTIONS | solver.options,

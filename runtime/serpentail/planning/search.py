@@ -50,7 +50,7 @@ class Search:
         spent_before = None if before is None else before.attempts
         self.attempts: Attempts = Attempts(model, settings, self.rule, spent_before)
         self.softening = softening_of(problem, settings.guess.motion)
-        self.solver = settings.solver.first
+        self.solver = settings.first_solver
         self.led: Led | None = None
         self.advice: str | None = None
 
@@ -192,7 +192,7 @@ class Search:
 
     def _off(self, found: Round) -> float:
         """Return the largest true error relative to its tolerance."""
-        allowed = self.settings.tolerances.allowed
+        allowed = self.settings.allowed
         return max((found.errors[name] / most for name, most in allowed.items()), default=0.0)
 
     def _wrong(self, found: Round) -> float:

@@ -75,12 +75,6 @@ class Tolerances:
     rate: Any = 0.1
     through_torso: bool = False
 
-    @property
-    def allowed(self) -> dict[str, float]:
-        """Largest true errors at the end: attitude and tail (deg), rates (rad/s)."""
-        named = {name: getattr(self, name) for name in ("attitude", "tail", "rate")}
-        return {name: most for name, most in named.items() if most is not None}
-
 
 @dataclass(frozen=True)
 class Solver:
@@ -126,15 +120,6 @@ class Solver:
     track: bool = True
     watch: Callable[[Plan], object] | None = None
 
-    @property
-    def first(self) -> str:
-        """The solver that is tried first."""
-        return "ipopt" if self.name == "ipopt" else "fatrop"
-
-    def options_of(self, solver: str) -> dict[str, Any]:
-        """Options whose names begin with a solver's."""
-        return {k: v for k, v in self.options.items() if str(k).startswith(f"{solver}.")}
-
 
 @dataclass(frozen=True)
 class Guess:
@@ -169,9 +154,24 @@ class PlanSettings:
     solver: Solver
     guess: Guess
 
+    @property
+    def allowed(self) -> dict[str, float]:
+        """Largest true errors at the end: attitude and tail (deg), rates (rad/s)."""
+        named = {name: getattr(self.tolerances, name) for name in ("attitude", "tail", "rate")}
+        return {name: most for name, most in named.items() if most is not None}
+
+    @property
+    def first_solver(self) -> str:
+        """The solver that is tried first."""
+        return "ipopt" if self.solver.name == "ipopt" else "fatrop"
+
+    def options_of(self, solver: str) -> dict[str, Any]:
+        """Options whose names begin with a solver's."""
+        return {k: v for k, v in self.solver.options.items() if str(k).startswith(f"{solver}.")}
+
     def roughly(self, motion: Any) -> "PlanSettings":
         """Return settings of a search that shows whether a problem has a plan, from a guess."""
-        rougher: Any = {n: ROUGHLY * most for n, most in self.tolerances.allowed.items()}
+        rougher: Any = {n: ROUGHLY * most for n, most in self.allowed.items()}
         return replace(
             self,
             tolerances=replace(self.tolerances, **rougher),

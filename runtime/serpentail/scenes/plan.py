@@ -96,7 +96,7 @@ PLAN = Key(
     needs=("start", "duration"),
 )
 ELSEWHERE = "programs can give others, to serpentail.plan"
-CODE_ONLY = ("guess", "path", "legs")  # values that no file can hold
+CODE_ONLY = ("guess", "path", "legs", "watch")  # values that no file can hold
 
 
 def planned(path: str, folder: str | None = None) -> Plan:
