@@ -49,7 +49,7 @@ class Mesh:
 class Tolerances:
     """What makes a plan true: largest errors at the end of its simulation; None demands nothing.
 
-    Each is a number, or text with a unit, such as "0.2 mrad".
+    Each is a number, or text with a unit, such as "0.0002 rad".
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class Tolerances:
     Examples
     --------
     >>> import serpentail as st
-    >>> st.Tolerances(attitude="1 mrad").tail
+    >>> st.Tolerances(attitude="0.001 rad").tail
     0.1
     """
 
