@@ -21,7 +21,7 @@ from serpentail.optimal.rules import MOST_DEGREE, collocation_rule
 from tests.support import zoo
 from tests.support.rows import row
 from tests.support.stages import whole_program
-from tests.support.tumbling import AGAIN, plan_by_keys, rat, start
+from tests.support.tumbling import AGAIN, keyed, rat, start
 
 DURATIONS = {"duration": (0.3, 0.5)}
 INERTIA = ((6e-5, 3.6e-5, 7e-5), (7e-5, 4e-5, 8e-5))
@@ -163,7 +163,7 @@ def test_plans_have_as_many_threads_as_the_model_allows_and_do_not_depend_on_the
     given = AGAIN | {"start": start(rat()), "solver": "fatrop"}
     for count, intervals, used in ((1, 30, 1), (3, 30, 3), (3, 6, 1)):
         monkeypatch.setattr(rat().batch_library, "threads", count)
-        found.append(plan_by_keys(rat(), **given, intervals=intervals))
+        found.append(keyed(rat(), **given, intervals=intervals))
         assert seen == {before + used - 1}
         seen.clear()
     assert threading.active_count() == before

@@ -29,7 +29,7 @@ from serpentail.scenes.plan import planned as planned_by
 from tests.support import zoo
 from tests.support.rows import row
 from tests.support.told import besides_progress
-from tests.support.tumbling import AGAIN, DURATION, plan_by_keys, planned, rat, start
+from tests.support.tumbling import AGAIN, DURATION, keyed, planned, rat, start
 
 ENDLESS = {
     "ipopt": {"ipopt.tol": 1e-300, "ipopt.acceptable_iter": 0, "ipopt.max_iter": 10**6},
@@ -38,7 +38,7 @@ ENDLESS = {
 
 
 def again(model=None, **settings) -> st.Plan:
-    return plan_by_keys(model or rat(), **AGAIN | {"start": start(rat())} | settings)
+    return keyed(model or rat(), **AGAIN | {"start": start(rat())} | settings)
 
 
 def numbers(plan: st.Plan) -> np.ndarray:

@@ -14,7 +14,7 @@ from serpentail.planning.design import checked_design
 from serpentail.planning.program.body import BodyFunctions
 from tests.support import zoo
 from tests.support.rows import row
-from tests.support.tumbling import AGAIN, integrated, plan_by_keys, rat, start
+from tests.support.tumbling import AGAIN, integrated, keyed, rat, start
 
 RANGE, RATES = (0.08, 0.25), 6.0  # m, rad/s
 LENGTH = {"design": {"tail_length": RANGE}}
@@ -24,12 +24,12 @@ SETTINGS = {"tolerance": 0.01, "intervals": 12}  # of plans that are true enough
 
 @cache
 def planned() -> st.Plan:
-    return plan_by_keys(rat(), start=start(rat()), **AGAIN, intervals=12)
+    return keyed(rat(), start=start(rat()), **AGAIN, intervals=12)
 
 
 def again(model=None, **settings) -> st.Plan:
     given = AGAIN | {"start": start(rat()), "guess": planned()} | settings
-    return plan_by_keys(model or rat(), **given)
+    return keyed(model or rat(), **given)
 
 
 def ordinary(plan, **parameters):

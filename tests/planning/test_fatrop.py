@@ -19,7 +19,7 @@ from serpentail.planning.result.truth import planned_torques
 from tests.references.flight_program import FlightProblem, solved
 from tests.support import zoo
 from tests.support.rows import row
-from tests.support.tumbling import AGAIN, DURATION, integrated, plan_by_keys, rat, start
+from tests.support.tumbling import AGAIN, DURATION, integrated, keyed, rat, start
 
 PROBLEMS = {
     "upright": {},
@@ -55,7 +55,7 @@ RICHER = {
 def planned(problem: dict, seed: int = 0, model: st.Model | None = None, **settings) -> st.Plan:
     model = model or rat()
     given = AGAIN | {"solver": "fatrop", "intervals": 12, "start": start(model, seed)}
-    return plan_by_keys(model, **given | problem | settings)
+    return keyed(model, **given | problem | settings)
 
 
 def turned(seed: int) -> dict:

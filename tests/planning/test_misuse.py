@@ -15,7 +15,7 @@ from tests.support import zoo
 from tests.support.models import model_folder
 from tests.support.posed import posed
 from tests.support.rows import row
-from tests.support.tumbling import AGAIN, DURATION, plan_by_keys, rat, start
+from tests.support.tumbling import AGAIN, DURATION, keyed, rat, start
 
 NAN, INF = float("nan"), float("inf")
 Goal, Bounds = st.Goal, st.Bounds
@@ -111,7 +111,7 @@ STOPS = {
 }
 
 
-def refused(words, model=None, ask=plan_by_keys, **changes):
+def refused(words, model=None, ask=keyed, **changes):
     model = model or rat()
     given = {"start": start(model), "duration": DURATION} | changes
     with row(words), pytest.raises(st.PlanningError, match=words):
@@ -132,40 +132,33 @@ def test_what_is_wrong_is_named():
         refused(f"'{name}'|{name}: value {value!r}", options={name: value})
 
 
-OLD = {  # keywords of earlier versions: a value, and its new place
-    "degree": (5, "mesh", st.Mesh(degree=5)),
-    "intervals": (7, "mesh", st.Mesh(intervals=7)),
-    "most_intervals": (8, "mesh", st.Mesh(most_intervals=8)),
-    "controls": (6, "mesh", st.Mesh(controls=6)),
-    "rounds": (2, "mesh", st.Mesh(rounds=2)),
-    "tolerance": (0.5, "tolerances", st.Tolerances(attitude="0.5 deg")),
-    "tail_tolerance": (None, "tolerances", st.Tolerances(tail=None)),
-    "rate_tolerance": (2.0, "tolerances", st.Tolerances(rate="2 rad/s")),
-    "through_torso": (True, "tolerances", st.Tolerances(through_torso=True)),
-    "options": ({"ipopt.tol": 1}, "solver", st.Solver(options={"ipopt.tol": 1})),
-    "time_limit": (1.5, "solver", st.Solver(time_limit="1500 ms")),
-    "multi_start": (2, "solver", st.Solver(multi_start=2)),
-    "retries": (0, "solver", st.Solver(retries=0)),
-    "seed": (3, "solver", st.Solver(seed=3)),
-    "track": (False, "solver", st.Solver(track=False)),
-    "watch": (print, "solver", st.Solver(watch=print)),
-    "guess_damping": (1e-4, "guess", st.Guess(damping="0.1 mN m s")),
-}
+MESH = {"degree": 5, "intervals": 7, "most_intervals": 8, "controls": 6, "rounds": 2}
+SOLVER = {"options": {"ipopt.tol": 1}, "time_limit": 1.5, "multi_start": 2, "retries": 0}
+SOLVER |= {"seed": 3, "track": False, "watch": print}
+NEAR = {"tolerance": 0.5, "tail_tolerance": None, "rate_tolerance": 2, "through_torso": True}
+OLD = (  # keywords of earlier versions, and their new place
+    (MESH, "mesh", st.Mesh(**MESH)),
+    (SOLVER, "solver", st.Solver(**SOLVER | {"time_limit": "1500 ms"})),
+    (NEAR, "tolerances", st.Tolerances("0.5 deg", None, "2 rad/s", True)),
+    ({"guess_damping": 2.0}, "guess", st.Guess(damping="2 N m s")),
+)
 
 
 def test_old_keywords_are_fields_of_objects_with_one_note_each():
     def asked(**settings):
         return posed(rat(), st.plan, start=start(rat()), duration=DURATION, **settings)[1]
 
-    for name, (value, home, made) in OLD.items():
-        with row(name), pytest.warns(DeprecationWarning) as notes:
-            old = asked(**{name: value})
-        (note,), kind = notes, type(made).__name__
-        with row(name, str(note.message)), pytest.warns(DeprecationWarning):
-            assert re.fullmatch(rf"{name}= is now {home}=st.{kind}\(\w+=...\)", str(note.message))
-            assert note.filename.endswith("posed.py")  # which calls plan
-            assert old == asked(**{home: made}) != asked()
-            refused(f"{name}: value .*: beside {home}: ", ask=st.plan, **{name: value, home: made})
+    for given, home, made in OLD:
+        with row(home), pytest.warns(DeprecationWarning) as notes:
+            old = asked(**given)
+        assert old == asked(**{home: made}) != asked()
+        place = rf"{home}=st\.{type(made).__name__}\(\w+=\.\.\.\)"
+        for name, note in zip(given, notes, strict=True):
+            with row(name), pytest.warns(DeprecationWarning):
+                assert re.fullmatch(f"{name}= is now {place}", str(note.message))
+                assert note.filename.endswith("posed.py")  # which calls plan
+                words = f"{name}: value .*: beside {home}: "
+                refused(words, ask=st.plan, **{name: given[name], home: made})
     with pytest.warns(DeprecationWarning):  # beside a name and a motion, which are no objects
         old = asked(solver="ipopt", track=False, guess=None, guess_damping=1e-4)
     assert old.solver == st.Solver("ipopt", track=False) and old.guess.damping == 1e-4
@@ -191,9 +184,9 @@ def test_parameters_that_do_nothing_are_refused_and_errors_of_the_users_own_are_
     value, upright = model.parameters[name], np.r_[0, 0, 1, 1, np.zeros(model.nq - 4)]
     given = {"start": (upright, 5 * np.eye(model.nv)[3]), "duration": DURATION}
     with pytest.raises(st.PlanningError, match=f"design: value '{name}'"):
-        plan_by_keys(model, design={name: (value, 2 * value)}, **given)
+        keyed(model, design={name: (value, 2 * value)}, **given)
     with pytest.raises(AttributeError, match="'NoneType' object has no attribute 'torque'"):
-        plan_by_keys(model, objective=lambda p: None.torque, **given)
+        keyed(model, objective=lambda p: None.torque, **given)
 
 
 def test_path_constraints_that_a_start_may_meet_are_not_refused():
@@ -241,13 +234,13 @@ def test_models_that_lack_functions_are_refused():
     names = ["mass_matrix", "inverse_dynamics", "forward_dynamics", "rollout", "energy", "momentum"]
     model = st.load(model_folder(1, 1, functions=names))  # the list of functions is the point
     given = AGAIN | {"start": start(model), "intervals": 4, "track": True}
-    plan, whole = (plan_by_keys(each, **given).report for each in (model, zoo.model("m1_n1")))
+    plan, whole = (keyed(each, **given).report for each in (model, zoo.model("m1_n1")))
     assert plan["dynamics"] == "symbolic" and plan["converged"]
     assert plan["objective"] == pytest.approx(whole["objective"], rel=1e-6)
     for name, most in (("tracked_tail_error_rad", 1e-4), ("tracked_attitude_error_deg", 1e-3)):
         assert plan[name] == pytest.approx(whole[name], abs=most), name  # whose PFL is compiled
     given["track"] = False
-    plan = plan_by_keys(model, **given)
+    plan = keyed(model, **given)
     path = ((lambda point: point.tip, 0, 1),)
     for body, error, words, changes in (
         (zoo.model("bare"), st.ModelError, "'mass_matrix'", {}),
@@ -255,7 +248,7 @@ def test_models_that_lack_functions_are_refused():
         (model, st.PlanningError, "'tip'", {"path": path}),
     ):
         with row(words), pytest.raises(error, match=words):
-            plan_by_keys(body, **given | changes)
+            keyed(body, **given | changes)
     with pytest.raises(st.ModelError, match="without 'airborne_rates', 'airborne_rates_deriv"):
         st.Mpc(model, plan)
 
@@ -265,7 +258,7 @@ def test_goal_that_cannot_be_reached_is_flagged():
     v[3] = 60.0  # rad/s, far too fast for the time and torques given
     settings = {"retries": 0, "options": {"fatrop.max_iter": 60}, "duration": 0.1}
     settings["bounds"] = Bounds(angle=np.pi / 3, torque=1e-4)
-    plan = plan_by_keys(rat(), start=(q, v), **settings)
+    plan = keyed(rat(), start=(q, v), **settings)
     assert not plan.success and not plan.report["converged"]
     assert plan.report["status"] != "Solve_Succeeded"
     json.dumps(plan.report, allow_nan=False)

@@ -15,7 +15,7 @@ from serpentail.planning.result.full_state import com_at_start, full_state
 from tests.support import zoo
 from tests.support.posed import posed
 from tests.support.rows import row
-from tests.support.tumbling import AGAIN, DURATION, integrated, plan_by_keys, planned, rat, start
+from tests.support.tumbling import AGAIN, DURATION, integrated, keyed, planned, rat, start
 
 COARSE = {"tolerance": None, "intervals": 8}
 LEGS = st.Legs.fixed(3.6, -0.3)
@@ -32,7 +32,7 @@ def test_damping_is_part_of_the_motion():
 def test_plans_of_least_time_and_energy_from_passive_flight():
     settings = {"start": start(rat()), "duration": (0.1, DURATION), "track": False}
     settings["bounds"] = st.Bounds(angle=np.pi / 3, torque=0.005)
-    plan, calm = (plan_by_keys(rat(), objective=name, **settings) for name in ("time", "effort"))
+    plan, calm = (keyed(rat(), objective=name, **settings) for name in ("time", "effort"))
     assert plan.success and plan.duration < 0.95 * calm.duration
     assert plan.report["objective"] == plan.duration
     assert np.abs(plan.trajectory.tau).max() > 0.9 * 0.005
@@ -44,7 +44,7 @@ def test_plans_of_least_time_and_energy_from_passive_flight():
     # |power| has a kink: its rounding is lowered from round to round
     settings |= {"start": start(rat(), 2), "duration": (0.3, 0.5), "intervals": 36}
     settings["bounds"] = st.Bounds(angle=np.pi / 3)
-    plan, calm = (plan_by_keys(rat(), objective=name, **settings) for name in ("energy", "effort"))
+    plan, calm = (keyed(rat(), objective=name, **settings) for name in ("energy", "effort"))
     assert plan.success and calm.success
     energy = plan.report["energy_J"]
     assert energy < 0.95 * calm.report["energy_J"]
@@ -54,7 +54,7 @@ def test_plans_of_least_time_and_energy_from_passive_flight():
 def test_rate_bounds_hold_at_the_nodes():
     given = AGAIN | COARSE | {"goal": st.Goal(torso_rate=None), "guess": planned(**COARSE)}
     given |= {"bounds": st.Bounds(angle=np.pi / 3, rate=2.5)}
-    plan = plan_by_keys(rat(), start=start(rat()), **given)
+    plan = keyed(rat(), start=start(rat()), **given)
     assert plan.report["converged"]
     assert 2.45 < np.abs(plan.curve.at(plan.curve.ends)["tail_rate"]).max() <= 2.5 + 1e-6
 
@@ -62,7 +62,7 @@ def test_rate_bounds_hold_at_the_nodes():
 def test_goals_of_the_tail_and_of_a_whole_attitude():
     wanted = from_angles(np.array([0.1, -0.05, 0.2]))
     goal = st.Goal(attitude=wanted, torso_rate=None, tail=(0.1, None), tail_rate=(None, 0.0))
-    plan = plan_by_keys(rat(), goal=goal, **AGAIN | COARSE | {"start": start(rat())})
+    plan = keyed(rat(), goal=goal, **AGAIN | COARSE | {"start": start(rat())})
     end = plan.trajectory
     assert plan.report["converged"] and angle_deg(end.attitude[-1], wanted) < 1e-5
     assert end.tail[-1, 0] == pytest.approx(0.1, abs=1e-7)
@@ -134,7 +134,7 @@ def seen(point):
 def test_points_are_the_models(free):
     """Of a scaled quaternion, too: a solver's iterates have any norm."""
     few = COARSE | {"duration": DURATION, "path": ((seen, -500.0, 500.0),), "track": False}
-    plan = plan_by_keys(rat(), start=start(rat()), **few | free)
+    plan = keyed(rat(), start=start(rat()), **few | free)
     program = plan_program(rat(), plan.problem, plan.mesh, plan.rule, 0.0)
     model, state, times = plan.model, plan.start, np.linspace(0, DURATION, 7)
     blocks = plan.curve.at(times)
@@ -167,9 +167,9 @@ def test_goals_that_the_conserved_momentum_forbids_are_refused_and_no_others():
 
     (q, v), goal = start(rat()), st.Goal(tail_rate=(0.0, 0.0))
     with pytest.raises(st.PlanningError, match="torso and tail at rest"):
-        plan_by_keys(rat(), start=(q, v), goal=goal, duration=DURATION)
+        keyed(rat(), start=(q, v), goal=goal, duration=DURATION)
     few = AGAIN | {"intervals": 6}
-    assert plan_by_keys(rat(), start=(q, 0 * v), goal=goal, **few).report["converged"]
+    assert keyed(rat(), start=(q, 0 * v), goal=goal, **few).report["converged"]
 
     model, random, tilted = rat(), np.random.default_rng(3), (0.8, 0.6, 0.0, 0.0)
     h = model.momentum(*start(model))[1]
@@ -214,7 +214,7 @@ def heights(model, plan, first=0):
 
 def test_a_flight_of_a_model_with_feet_is_that_of_its_twin_without_contacts():
     model, settings = footed(0.01)  # in the ground after some ms
-    one, other = (plan_by_keys(each, **settings) for each in (rat(), model))
+    one, other = (keyed(each, **settings) for each in (rat(), model))
     assert one.success and other.success
     for name in ("effort", "energy_J", "peak_power_W", "duration_s"):
         assert other.report[name] == pytest.approx(one.report[name], rel=1e-5), name
@@ -233,17 +233,17 @@ def test_paths_and_clearance_keep_points_above_the_ground():
         return point.contact_points[:, 2] + ramp
 
     model, settings = footed(0.15, track=False)
-    free = plan_by_keys(model, **settings)
+    free = keyed(model, **settings)
     late = slice(len(free.trajectory.t) // 2, None)
     floor = heights(model, free)[late].min() + 0.002
-    plan = plan_by_keys(model, path=((above, floor, np.inf),), legs=LEGS, guess=free, **settings)
+    plan = keyed(model, path=((above, floor, np.inf),), legs=LEGS, guess=free, **settings)
     assert plan.success and heights(model, plan)[late].min() >= floor - 1e-4
 
     model, settings = footed(0.3, 0.93, track=False)
-    free = plan_by_keys(model, **settings)
+    free = keyed(model, **settings)
     least = heights(model, free, FEET)[0] - 0.001
     assert free.success and heights(model, free, FEET).min() < least - 0.002
-    plan = plan_by_keys(model, clearance=least, guess=free, **settings)
+    plan = keyed(model, clearance=least, guess=free, **settings)
     assert plan.success and heights(model, plan, FEET).min() >= least - 1e-4
 
     model, settings = footed(0.05)  # where the points cannot be, they are refused
@@ -256,4 +256,4 @@ def test_paths_and_clearance_keep_points_above_the_ground():
         ("clearance: value 0.1: .* lowest point", model, {"clearance": 0.1}),
     ):
         with row(words), pytest.raises(st.PlanningError, match=words):
-            plan_by_keys(body, **settings | changes)
+            keyed(body, **settings | changes)

@@ -15,7 +15,7 @@ from serpentail.planning import continuation
 from serpentail.planning.attempts import Attempts
 from serpentail.planning.continuation import with_bound
 from tests.support.rows import row
-from tests.support.tumbling import DURATION, plan_by_keys, rat, start
+from tests.support.tumbling import DURATION, keyed, rat, start
 
 FREE_ANGLES = {
     "bounds": st.Bounds(angle=None),
@@ -50,12 +50,12 @@ def wanted(program) -> bool:
 def test_an_easier_problem_is_led_back_to_the_wanted_one(monkeypatch):
     model = rat()
     tried = failing(monkeypatch, lambda program, guess, _: wanted(program) and guess == "far")
-    plan = plan_by_keys(model, start=start(model), **FREE_ANGLES)
+    plan = keyed(model, start=start(model), **FREE_ANGLES)
     assert plan.success and plan.report["advice"] is None
     torques = [float(np.max(found.samples.controls)) for *_, found in tried]
     assert len(tried) == 3 and tried[-1][0] == "close", torques  # wanted, easier, wanted
     monkeypatch.undo()
-    alone = plan_by_keys(model, start=start(model), **FREE_ANGLES)
+    alone = keyed(model, start=start(model), **FREE_ANGLES)
     assert plan.report["objective"] == pytest.approx(alone.report["objective"], rel=1e-5)
 
 
@@ -63,7 +63,7 @@ def test_a_search_that_finds_nothing_says_which_bound_suffices_and_a_plan_has_it
     model, begin, weak = rat(), start(rat(), 1), st.Bounds(torque=0.002)
     given = {"start": begin, "duration": DURATION, "bounds": weak, "track": False}
     for tolerance in (0.01, None):  # a plan that is true has another bound all the same
-        plan = plan_by_keys(model, **given, tolerance=tolerance)
+        plan = keyed(model, **given, tolerance=tolerance)
         report = plan.report
         with row(tolerance):
             assert not plan.success and not report["converged"]
@@ -76,12 +76,12 @@ def test_a_search_that_finds_nothing_says_which_bound_suffices_and_a_plan_has_it
         given["bounds"] = st.Bounds(torque=1.02 * enough)
     else:
         given["duration"] = 1.02 * enough
-    assert plan_by_keys(model, guess=plan, **given).success
+    assert keyed(model, guess=plan, **given).success
 
 
 def test_larger_bounds_are_larger_by_their_factor():
     model = rat()
-    problem = plan_by_keys(model, start=start(model), **FREE_ANGLES).problem
+    problem = keyed(model, start=start(model), **FREE_ANGLES).problem
     free = replace(problem, duration=(0.3, 0.5))
     assert with_bound(problem, "bounds.torque", 1.0) is problem
     for factor in (1.5, 8.0):
@@ -98,13 +98,13 @@ def test_larger_bounds_are_larger_by_their_factor():
 def test_ipopt_tries_where_fatrop_finds_nothing(monkeypatch):
     model = rat()
     tried = failing(monkeypatch, lambda _, __, solver: solver == "fatrop")
-    plan = plan_by_keys(model, start=start(model), retries=1, **FREE_ANGLES)
+    plan = keyed(model, start=start(model), retries=1, **FREE_ANGLES)
     assert plan.success and plan.report["solver"] == "ipopt"
     assert [solver for _, solver, _ in tried].count("ipopt") == 1
     for solver in ("fatrop", "ipopt"):
         with row(solver):
             tried.clear()
-            plan_by_keys(model, start=start(model), retries=1, solver=solver, **FREE_ANGLES)
+            keyed(model, start=start(model), retries=1, solver=solver, **FREE_ANGLES)
             assert {each for _, each, _ in tried} == {solver}
 
 
@@ -119,7 +119,7 @@ def test_a_failed_search_returns_what_violates_least(monkeypatch):
 
     monkeypatch.setattr(fatrop, "solve", few)
     monkeypatch.setattr(continuation, "EASIER", ())
-    plan = plan_by_keys(model, start=start(model), solver="fatrop", retries=3, **FREE_ANGLES)
+    plan = keyed(model, start=start(model), solver="fatrop", retries=3, **FREE_ANGLES)
     assert not plan.success and len(seen) == 4
     least = min(seen, key=lambda pair: violation(pair[0], pair[1].samples))[1]
     assert isinstance(least, Solution)
@@ -128,17 +128,17 @@ def test_a_failed_search_returns_what_violates_least(monkeypatch):
 
 def test_the_nearest_stored_plan_is_the_second_guess(monkeypatch):
     model = rat()
-    stored = [plan_by_keys(model, start=start(model, k), **FREE_ANGLES) for k in (0, 1, 2)]
+    stored = [keyed(model, start=start(model, k), **FREE_ANGLES) for k in (0, 1, 2)]
     tried = failing(monkeypatch, lambda program, guess, _: wanted(program) and guess == "far")
     q, v = start(model)
     q[7] += 1e-3
-    plan = plan_by_keys(model, start=(q, v), guess=stored, tolerance=None, **FREE_ANGLES)
+    plan = keyed(model, start=(q, v), guess=stored, tolerance=None, **FREE_ANGLES)
     assert plan.success and [guess for guess, *_ in tried] == ["far", "close"]
     near = stored[0].report["objective"]
     assert plan.report["objective"] == pytest.approx(near, rel=0.05)
     monkeypatch.undo()
     tried = failing(monkeypatch, lambda *_: False)
-    plan_by_keys(model, start=(q, v), guess=stored, tolerance=None, **FREE_ANGLES)
+    keyed(model, start=(q, v), guess=stored, tolerance=None, **FREE_ANGLES)
     assert [guess for guess, *_ in tried] == ["far"]  # not asked for
 
 
@@ -154,7 +154,7 @@ def test_angles_are_within_half_a_turn_unless_start_or_goal_ask_for_more():
         q[7] = tail
         with row(angle, tail):
             bounds = st.Bounds(angle=angle)
-            plan = plan_by_keys(model, start=(q, v), duration=DURATION, bounds=bounds, track=False)
+            plan = keyed(model, start=(q, v), duration=DURATION, bounds=bounds, track=False)
             found = plan.problem.bounds.angle
             if most is None:
                 assert found is None
@@ -179,9 +179,9 @@ def test_a_plan_through_the_torso_is_made_again_around_it():
         "objective": bending,
         "track": False,
     }
-    free = plan_by_keys(model, through_torso=True, **problem)
+    free = keyed(model, through_torso=True, **problem)
     assert depth_in_torso(model, free.trajectory.q).max() > SUNK  # else the test shows nothing
-    plan = plan_by_keys(model, **problem)
+    plan = keyed(model, **problem)
     assert plan.success and not any("torso" in doubt for doubt in plan.warnings)
     assert depth_in_torso(model, plan.trajectory.q).max() <= SUNK
     assert plan.report["objective"] > free.report["objective"]

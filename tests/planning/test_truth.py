@@ -15,17 +15,7 @@ from serpentail.planning.result.full_state import full_state
 from serpentail.planning.result.truth import local_errors, open_loop
 from tests.support import zoo
 from tests.support.rows import row
-from tests.support.tumbling import (
-    AGAIN,
-    DURATION,
-    TIGHT,
-    integrated,
-    plan_by_keys,
-    planned,
-    rat,
-    rate,
-    start,
-)
+from tests.support.tumbling import AGAIN, DURATION, integrated, keyed, planned, rat, rate, start
 
 
 def dense(plan, count=4001):
@@ -40,8 +30,8 @@ def test_plans_reach_the_goal_in_truth():
     tail = start(rat())[0][7:]
     free = {"free_start": {"tail": (tail - 1e-6, tail + 1e-6)}}
     for solver, asked in (("fatrop", {}), ("ipopt", {}), ("fatrop", free)):
-        given = {"start": start(rat()), "duration": DURATION, **TIGHT, "guess": planned()}
-        plan = plan_by_keys(rat(), **given, solver=solver, **asked)
+        given = AGAIN | {"start": start(rat()), "tolerance": 0.01, "guess": planned()}
+        plan = keyed(rat(), **given, solver=solver, **asked)
         report, end, (q, v) = plan.report, plan.trajectory, integrated(rat(), plan)
         with row(solver, *asked):
             assert plan.success and report["converged"] and report["solver"] == solver
@@ -107,12 +97,12 @@ def test_errors_of_tracking_are_those_of_a_simulation_that_tracks(monkeypatch):
     # so weak that tracking needs more, on a coarse mesh
     given = {"bounds": st.Bounds(np.pi / 3, torque=2e-3), "goal": st.Goal(torso_rate=None)}
     given = AGAIN | {"start": start(model), "intervals": 4, "track": True} | given
-    told = plan_by_keys(model, **given).report
+    told = keyed(model, **given).report
     assert told["solve_cpu_s"] < told["call_cpu_s"]
     flight = result_report.flight
     by_scipy = {"method": "dop853"}
     monkeypatch.setattr(result_report, "flight", lambda *of, **how: flight(*of, **how | by_scipy))
-    plan = plan_by_keys(model, **given)
+    plan = keyed(model, **given)
     assert spent[0] < 0.2 * spent[1]
     for name in ("tracked_attitude_error_deg", "tracked_tail_error_rad", "dyn_err"):
         assert told[name] == pytest.approx(plan.report[name], rel=0.03), name
@@ -130,7 +120,7 @@ def test_bounds_and_paths_hold_between_nodes():
     # an eighth of the torque that the plan would like
     weak = {"bounds": st.Bounds(np.pi / 3, torque=1.5e-3), "goal": st.Goal(torso_rate=None)}
     for rounds in (0, 6):
-        plan = plan_by_keys(rat(), **given | weak, rounds=rounds)
+        plan = keyed(rat(), **given | weak, rounds=rounds)
         largest = np.abs(dense(plan)[1]).max() / 1.5e-3 - 1
         assert plan.report["converged"] and -1e-3 < largest <= 1e-6
 
@@ -147,7 +137,7 @@ def test_bounds_and_paths_hold_between_nodes():
         ),
         ("path", path, lambda plan: (-3.7 - rate(plan).min()) / 9),
     ):
-        first, plan = (plan_by_keys(rat(), **given | asked | more) for more in ({"rounds": 0}, {}))
+        first, plan = (keyed(rat(), **given | asked | more) for more in ({"rounds": 0}, {}))
         off, report = beyond(first), first.report
         with row(name):
             assert off > 1e-3 and not first.success and report["bound_excess_of"] == name
@@ -161,7 +151,7 @@ def test_torques_are_never_steeper_than_their_bound():
     given = AGAIN | {"start": start(rat())}
     given |= {"bounds": st.Bounds(angle=np.pi / 3, torque_rate=0.04)}
     for degree, intervals in ((3, 12), (1, 30), (2, 20)):
-        plan = plan_by_keys(rat(), **given, degree=degree, intervals=intervals)
+        plan = keyed(rat(), **given, degree=degree, intervals=intervals)
         times, torques = dense(plan)
         if degree == 1:  # steps, each over an interval
             times, torques = plan.curve.ends[1:], plan.curve.nodes["torque"][:, 0]
@@ -225,5 +215,5 @@ def test_a_guess_that_leaves_the_range_of_arcs_serves_until_there():
     with pytest.raises(st.SimulationError, match="bend_range"):
         st.simulate(model, q, v, t_span=0.4, controller=st.Damping(damping))
     settings = {"bounds": st.Bounds(angle=0.7 * most, torque=0.05), "guess_damping": damping}
-    plan = plan_by_keys(model, start=(q, v), duration=(0.3, 1.0), track=False, **settings)
+    plan = keyed(model, start=(q, v), duration=(0.3, 1.0), track=False, **settings)
     assert plan.success and np.hypot(*plan.trajectory.tail.T).max() < most

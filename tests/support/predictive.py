@@ -11,7 +11,7 @@ from scipy.optimize import minimize
 
 import serpentail as st
 from serpentail.mpc import task as weights
-from tests.support.tumbling import DURATION, plan_by_keys, rat, start
+from tests.support.tumbling import DURATION, keyed, rat, start
 
 TORQUE = 0.02  # N m
 
@@ -21,7 +21,7 @@ def plan_of(seed: int = 0, **settings) -> st.Plan:
     model = rat()
     common = {"duration": DURATION, "intervals": 11, "tolerance": None, "track": False}
     common |= {"goal": st.Goal(torso_rate=None), "bounds": st.Bounds(angle=np.pi / 3)}
-    return plan_by_keys(model, start=start(model, seed), **(common | settings))
+    return keyed(model, start=start(model, seed), **(common | settings))
 
 
 @cache

@@ -44,7 +44,7 @@ def start(model: st.Model, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
     return q, v
 
 
-def plan_by_keys(model: st.Model, **asked) -> st.Plan:
+def keyed(model: st.Model, **asked) -> st.Plan:
     """Return a plan whose settings have the names of a scene's keys, which tests combine."""
     return st.plan(model, **joined(asked, {}))
 
@@ -53,7 +53,7 @@ def plan_by_keys(model: st.Model, **asked) -> st.Plan:
 def planned(**settings) -> st.Plan:
     """Return a plan for the first start, made once in a process."""
     model = rat()
-    return plan_by_keys(model, start=start(model), duration=DURATION, **TIGHT, **settings)
+    return keyed(model, start=start(model), duration=DURATION, **TIGHT, **settings)
 
 
 def rate(model, plan):

@@ -37,11 +37,10 @@ def best_plan(model: Model, problem: PlanningProblem, settings: PlanSettings) ->
             if problem.objective in SOFTENING and settings.guess.motion is None:
                 # these objectives are seldom solved from passive flight
                 calm = replace(problem, objective="effort")
-                alone = replace(settings.solver, track=False, watch=None)
-                easier = Search(model, calm, replace(settings, solver=alone))
+                easier = Search(model, calm, settings.changed(track=False, watch=None))
                 found = rounds_of(easier, stage)
                 guess = easier.plan(easier.best(found), len(found), begun)
-                settings = replace(settings, guess=replace(settings.guess, motion=guess))
+                settings = settings.changed(guess=guess)
             search = Search(model, problem, settings, easier)
             rounds = rounds_of(search, stage, begun)
             best, tried = search.best(rounds), search
@@ -80,18 +79,14 @@ def kept_off(
         return best, search
     motion = search.motion(best.program, best.solution)
     settings = search.settings
-    most, solver = 2 * best.program.mesh.intervals, settings.solver
-    nearby = replace(
-        settings,
-        mesh=replace(settings.mesh, rounds=AROUND_ROUNDS, most_intervals=most),
-        solver=replace(
-            solver,
-            name=settings.first_solver,
-            retries=0,
-            multi_start=1,
-            options=AROUND_OPTIONS | solver.options,
-        ),
-        guess=replace(settings.guess, motion=motion),
+    nearby = settings.changed(
+        guess=motion,
+        retries=0,
+        multi_start=1,
+        solver=settings.first_solver,
+        rounds=AROUND_ROUNDS,
+        most_intervals=2 * best.program.mesh.intervals,
+        options=AROUND_OPTIONS | settings.solver.options,
     )
     return searched_on(search, problem, nearby, stage, begun) or (best, search)
 

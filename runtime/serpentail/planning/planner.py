@@ -17,8 +17,7 @@ from .best import best_plan
 from .goal import Bounds, Goal
 from .problem import SMOOTHING, PathConstraint, checked_problem
 from .result.plan import Plan
-from .settings import PLACES, Guess, Mesh, Solver, Tolerances, spelled
-from .settings_checks import checked_settings
+from .settings import PLACES, Guess, Mesh, Solver, Tolerances, checked_settings, spelled
 
 
 def plan(  # noqa: PLR0913 - the public face names all that it takes
@@ -137,12 +136,10 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     model.refuse_fixed("plan")
     refused = Refusals(PlanningError)
     known: dict[str, Any] = {name: old[name] for name in old if name in PLACES}
-    for name in old:
-        if name in known:
-            told = f"{name}= is now {spelled(name)}"
-            warnings.warn(told, DeprecationWarning, stacklevel=2)
-        else:
-            refused.add(name, f"setting: value {name!r}: {_meant(name)}")
+    for name in known:
+        warnings.warn(f"{name}= is now {spelled(name)}", DeprecationWarning, stacklevel=2)
+    for name in [name for name in old if name not in known]:
+        refused.add(name, f"setting: value {name!r}: {_meant(name)}")
     given = {"mesh": mesh, "tolerances": tolerances, "solver": solver, "guess": guess}
     settings = checked_settings(model, given, known, refused)
     of_problem = {

@@ -1,16 +1,40 @@
-"""How to search for a plan: mesh, tolerances, solver, guess, and the keys of [plan] for these."""
+"""How to search for a plan: mesh, tolerances, solver, guess; keys of [plan] for these; checks."""
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
+import numpy as np
+
+from ..basics.checks import Refusals, needed, number, one_of, refusal, shown, whole_number
+from ..basics.errors import PlanningError
 from ..basics.short_repr import brief
+from ..model.model import Model
+from ..motion.trajectory import Trajectory
+from ..optimal.rules import collocation_rule
+from .magnitudes import HUGE
 from .result.plan import Plan
 
 ROUGHLY = 10.0  # times the tolerances
+CHOSEN = ("intervals", "controls")  # None: the planner chooses
+WHOLE_NUMBERS = {  # least and most of each; beyond the most a search would not end
+    **dict.fromkeys((*CHOSEN, "most_intervals"), (1, 10_000)),
+    "rounds": (0, 1000),
+    "multi_start": (1, 10_000),
+    "retries": (0, 10_000),
+    "seed": (0, 2**63 - 1),
+}
+SOLVERS = ("auto", "fatrop", "ipopt")
+SWITCH = bool | np.bool_, "True or False"
+WATCH = Callable | None, "a function of a Plan, or None"
+OF_KIND = {"track": SWITCH, "through_torso": SWITCH, "watch": WATCH}
+# of numbers above 0, or None
+UNITS = {"tolerance": "deg", "tail_tolerance": "deg", "rate_tolerance": "rad/s", "time_limit": "s"}
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Mesh:
     """The mesh of a plan: where it begins, and how often it is refined.
 
@@ -30,12 +54,6 @@ class Mesh:
         ``intervals`` if that is less.
     rounds : int, default 6
         Largest number of refinements.
-
-    Examples
-    --------
-    >>> import serpentail as st
-    >>> st.Mesh(intervals=24).rounds
-    6
     """
 
     degree: int | None = None
@@ -45,7 +63,7 @@ class Mesh:
     rounds: int = 6
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Tolerances:
     """What makes a plan true: largest errors at the end of its simulation; None demands nothing.
 
@@ -62,12 +80,6 @@ class Tolerances:
     through_torso : bool, default False
         Whether the tail may go through the torso. Otherwise a plan in which it does is made again
         with a constraint; if that finds none, ``plan.warnings`` tells.
-
-    Examples
-    --------
-    >>> import serpentail as st
-    >>> st.Tolerances(attitude="0.001 rad").tail
-    0.1
     """
 
     attitude: Any = 0.01
@@ -103,12 +115,6 @@ class Solver:
     watch : callable, optional
         Function that receives the Plan of each round when it is found. An exception that it
         raises ends the search.
-
-    Examples
-    --------
-    >>> import serpentail as st
-    >>> st.Solver("ipopt", time_limit="20 s").retries
-    4
     """
 
     name: str = "auto"
@@ -132,12 +138,6 @@ class Guess:
         is tried if passive flight leads to none.
     damping : float or str, default 1e-3
         Damping of that passive flight (N m s, or text with a unit).
-
-    Examples
-    --------
-    >>> import serpentail as st
-    >>> st.Guess(damping=2e-3).motion is None
-    True
     """
 
     motion: Any = None
@@ -172,12 +172,12 @@ class PlanSettings:
     def roughly(self, motion: Any) -> "PlanSettings":
         """Return settings of a search that shows whether a problem has a plan, from a guess."""
         rougher: Any = {n: ROUGHLY * most for n, most in self.allowed.items()}
-        return replace(
-            self,
-            tolerances=replace(self.tolerances, **rougher),
-            solver=replace(self.solver, retries=0, multi_start=1, track=False, watch=None),
-            guess=replace(self.guess, motion=motion),
-        )
+        tolerances, alone = replace(self.tolerances, **rougher), {"track": False, "watch": None}
+        return self.changed(guess=motion, retries=0, multi_start=1, tolerances=tolerances, **alone)
+
+    def changed(self, **fields: Any) -> "PlanSettings":
+        """Return settings with other fields, by the keys of [plan]."""
+        return PlanSettings(**joined(fields, vars(self)))
 
 
 KINDS: dict[str, Any] = {"mesh": Mesh, "tolerances": Tolerances, "solver": Solver, "guess": Guess}
@@ -208,3 +208,77 @@ def spelled(name: str) -> str:
     """Return how a field that a key of [plan] names is given to ``plan``."""
     home, part = PLACES[name]
     return f"{home}=st.{KINDS[home].__name__}({part}=...)"
+
+
+def checked_settings(
+    model: Model, given: Mapping[str, Any], old: Mapping[str, Any], refused: Refusals
+) -> PlanSettings:
+    """Return settings with numbers in their units; add each wrong one to ``refused``.
+
+    given: mesh, tolerances, solver and guess as ``plan`` takes them; old: keywords in PLACES.
+    """
+    for home, kind in KINDS.items():
+        value = given[home]
+        if type(value) is not kind:
+            if home not in PLACES and value is not None:
+                refused.add(home, needed(home, value, f"st.{kind.__name__}(...), or None"))
+            continue
+        for name in old:
+            if PLACES[name][0] == home:
+                remedy = f"beside {home}: needs {spelled(name)} alone"
+                refused.add(name, f"{name}: value {shown(old[name])}: {remedy}")
+    known = {n: each for n, each in given.items() if each is not None and n not in refused.lines}
+    usual = {home: kind() for home, kind in KINDS.items()}
+    settings = PlanSettings(**joined({**known, **old}, usual))
+
+    def check(name: str, make: Callable[..., Any], free: bool = False, **rule: Any) -> Any:
+        home, part = PLACES[name]
+        where, value = f"{home}.{part}", getattr(getattr(settings, home), part)
+        if free and value is None:
+            return None
+        return refused.attempt(where, partial(make, where, value, **rule))
+
+    wrong: Any = {"error": PlanningError}
+    for name, (least, most) in WHOLE_NUMBERS.items():
+        check(name, whole_number, name in CHOSEN, least=least, most=most, **wrong)
+    for name, (of, needs) in OF_KIND.items():
+        check(name, _check_kind, kind=of, needs=needs)
+    check("degree", lambda _, degree: collocation_rule(degree), free=True)
+    check("options", _check_options)
+    check("solver", one_of, names=SOLVERS, **wrong)
+    check("guess", _check_guess, free=True, model=model)
+    numbers = {n: check(n, number, True, unit=unit, above=0, **wrong) for n, unit in UNITS.items()}
+    damping: Any = {"unit": "N m s", "least": 0, "most": HUGE}
+    numbers["guess_damping"] = check("guess_damping", number, **damping, **wrong)
+    return settings.changed(**numbers)
+
+
+def _check_kind(name: str, value: Any, kind: Any, needs: str) -> None:
+    """PlanningError unless a value is of a kind."""
+    if not isinstance(value, kind):
+        raise refusal(name, value, needs, PlanningError)
+
+
+def _check_options(name: str, options: Any) -> None:
+    """PlanningError unless options are a dict of settings of FATROP and IPOPT."""
+    needs = "a dict, such as {'fatrop.max_iter': 500, 'ipopt.max_iter': 500}"
+    _check_kind(name, options, dict, needs)
+    for option in options:
+        if not re.fullmatch(r"(ipopt|fatrop)\.\w+", str(option)):
+            needs = "a name that begins with 'fatrop.' or 'ipopt.'"
+            raise PlanningError(f"{name}: {shown(option)}: needs {needs}")
+
+
+def _check_guess(name: str, guess: Any, model: Model) -> None:
+    """PlanningError unless a guess is a motion of such a model, or plans of it."""
+    if isinstance(guess, tuple | list):
+        for k, each in enumerate(guess):
+            if not hasattr(each, "trajectory"):
+                raise refusal(f"{name}[{k}]", each, "a Plan", PlanningError)
+            _check_guess(f"{name}[{k}]", each, model)
+        return
+    motion = getattr(guess, "trajectory", guess)
+    _check_kind(name, motion, Trajectory, "a Plan or a Trajectory")
+    if motion.q.shape[1] != model.nq or len(motion.t) < 2:
+        needs = f"at least two samples of {model.nq}"
+        raise PlanningError(f"{name}: q has shape {motion.q.shape}: needs {needs}")

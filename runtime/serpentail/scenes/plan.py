@@ -16,8 +16,7 @@ from ..planning.goal import GOALS, HALF_TURN, Bounds, Goal
 from ..planning.planner import plan
 from ..planning.problem import OBJECTIVES
 from ..planning.result.plan import Plan
-from ..planning.settings import joined
-from ..planning.settings_checks import CHOSEN, SOLVERS, WHOLE_NUMBERS
+from ..planning.settings import SOLVERS, WHOLE_NUMBERS, joined
 from .file import UNSIZED, model_of, read_scene, size_of, subtable, values_of
 from .keys import sized
 
@@ -81,7 +80,7 @@ PLAN = Key(
         "design": Key(form=RANGES),
         "free_start": Key(keys=FREE_START),
         # of the search
-        **{name: _whole(*bounds) for name, bounds in (WHOLE_NUMBERS | CHOSEN).items()},
+        **{name: _whole(*bounds) for name, bounds in WHOLE_NUMBERS.items()},
         "degree": _whole(1, MOST_DEGREE),
         "tolerance": Key("deg", words=(FREE,)),
         "tail_tolerance": Key("deg", words=(FREE,)),
