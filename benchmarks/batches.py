@@ -19,7 +19,7 @@ from serpentail.model.memory import aligned
 from serpentail_scene.signatures.table import AIRBORNE
 
 PER_PROCESSOR = True
-RUNS = 3
+PROCESSES = 3
 STATES, ROUNDS = 512, 100  # a batch that stays in the cache
 MANY = 20  # factor: that many more in a call from Python
 SIZES = {

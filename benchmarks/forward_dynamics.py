@@ -17,7 +17,7 @@ from benchmarks.peers import casadi, mujoco, pinocchio
 from benchmarks.timing import compared, random_states
 
 PER_PROCESSOR = True
-RUNS = 3
+PROCESSES = 3
 SIZES = ((1, 3), (3, 4), (6, 6), (8, 16))
 IN_MUJOCO, IN_CASADI = SIZES[:3], SIZES[:2]  # compilers take minutes for longer tails
 

@@ -15,7 +15,7 @@ from benchmarks.peers import casadi
 from benchmarks.timing import States, compared, random_states
 
 PER_PROCESSOR = True
-RUNS = 3
+PROCESSES = 3
 SIZES = ((1, 3), (3, 4))
 ROUNDS, CALLS = 200, 64
 

@@ -18,7 +18,7 @@ from benchmarks.peers import casadi, pinocchio
 from benchmarks.timing import States, compared, random_states
 
 PER_PROCESSOR = True
-RUNS = 3
+PROCESSES = 3
 SIZES = ((1, 3), (3, 4), (6, 6))
 ROUNDS, CALLS = 200, 64
 

@@ -2,7 +2,7 @@
 
 A measure has a docstring, which says what it measures, with units and conditions, and a function
 ``measured`` of a scratch folder that returns the rows of its table. ``PER_PROCESSOR`` is there and
-true if its result depends on the width of vectors, ``RUNS`` if it is repeated in processes of its
+true if its result depends on the width of vectors, ``PROCESSES`` if it is repeated in processes of its
 own: then times are the least of all runs, and ratios have a span.
 """
 
@@ -83,7 +83,7 @@ def state() -> str:
 
 def on(processor: Processor, names: list[str], kept: Path) -> dict[str, dict]:
     """Return what measures found on a processor; each run has a process of its own."""
-    counts = {name: getattr(module(name), "RUNS", 1) for name in names}
+    counts = {name: getattr(module(name), "PROCESSES", 1) for name in names}
     for run in range(max(counts.values(), default=0)):
         folder = kept / f"run_{run}"
         folder.mkdir(parents=True, exist_ok=True)
