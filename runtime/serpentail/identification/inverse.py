@@ -16,6 +16,7 @@ from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V,
 from ..basics.attitude import sign_continuous
 from ..basics.checks import number
 from ..basics.errors import IdentificationError
+from ..basics.near_names import NearNames
 from ..model.model import Model
 from ..model.state_space import product_matrix
 from ..motion.trajectory import Trajectory
@@ -31,7 +32,7 @@ ROUGH = 3  # the derivative whose square is penalised
 
 
 @dataclass(frozen=True, eq=False)
-class JointTorques:
+class JointTorques(NearNames):
     """Inverse dynamics at the F frames of marker tracks.
 
     Attributes

@@ -11,6 +11,7 @@ from serpentail_scene.layout import TAIL_V
 
 from ..basics.checks import refusal
 from ..basics.errors import IdentificationError
+from ..basics.near_names import NearNames
 from ..basics.short_repr import brief
 from ..model.model import Model
 from ..motion.archive import origin
@@ -99,7 +100,7 @@ class IdentifiedTrial:
 
 
 @dataclass(frozen=True, eq=False)
-class Identification:
+class Identification(NearNames):
     """Parameters, motions and torques that fit marker tracks best, and how certain they are.
 
     ``identification["tail_mass"]`` is the Estimate of that name.

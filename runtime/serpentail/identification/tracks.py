@@ -15,6 +15,7 @@ from serpentail_scene.units import MEASURES, plain
 
 from ..basics.checks import finite_array, needed, one_of, real_array, refusal, shown
 from ..basics.errors import IdentificationError, UnusualSize
+from ..basics.near_names import NearNames
 from ..basics.plausible_values import LARGEST
 from ..motion.text import framed
 
@@ -27,7 +28,7 @@ LATEST = 1e12  # s: times since 1970, and more
 
 
 @dataclass(frozen=True, eq=False)
-class MarkerTracks:
+class MarkerTracks(NearNames):
     """Positions of M markers at F times; ``marker_tracks`` and ``read_markers`` make them.
 
     Attributes

@@ -15,6 +15,7 @@ from serpentail_scene.layout import Layout
 
 from ..basics.errors import SerpentailError
 from ..basics.extras import needed
+from ..basics.near_names import NearNames
 from ..compiling.cache import cache_folder
 from .growth import Grow, take_over
 from .lazy import lazy_property
@@ -51,7 +52,7 @@ def _unpickled(
     return model_from(restored(manifest_hash, folder), parameters, grow, profile, *options)
 
 
-class Model(ModelMethods, ModelStates):
+class Model(ModelMethods, ModelStates, NearNames):
     """Equations of motion of a body with a tail, compiled: H v_dot + C = [0; tau] + J^T f (Eq. 1).
 
     ``load`` and ``build`` make models. All quantities are in SI units and radians. The world's

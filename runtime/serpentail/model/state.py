@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -15,12 +15,15 @@ from serpentail_scene.messages import one_line
 from ..basics.attitude import Array, from_angles
 from ..basics.checks import finite_array, none_of, number, real_array, refusal
 from ..basics.errors import StateError
+from ..basics.near_names import NearNames
 from .names import Names
 
 if TYPE_CHECKING:
     from .model import Model
 
 SPAN = (0.0, 1.0)  # s, of a run that names none
+Quantity = float | str  # a number in SI, or a text with its unit
+Span = Quantity | Sequence[Quantity] | np.ndarray
 WIDTH = 96  # characters of a line in a REPL
 ANGLES = ("pitch", "roll", "yaw")
 START = {  # the words, with the units of their numbers
@@ -38,7 +41,7 @@ OF_TAIL = ("bend", "bend_rate")
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class State(NearNames):
     """A configuration and a velocity of a model, or a row of each for many times.
 
     ``q, v = state`` takes it apart; ``state["alpha_1"]`` is a number by its name. It stands in

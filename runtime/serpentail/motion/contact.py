@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 from serpentail_scene.keys import GROUPS
 
 from ..basics.checks import shown
+from ..basics.near_names import NearNames
 from ..basics.short_repr import brief
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Contact:
+class Contact(NearNames):
     """Points of a motion that can touch the ground, and the ground's forces on them.
 
     There are K samples of P points: A, M and T of the right foot, then of the left; the tail's;

@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..basics.near_names import NearNames
 from ..model.model import Model
 
 if TYPE_CHECKING:
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
     import xarray
 
 
-class Exports:
+class Exports(NearNames):
     """Conversions of trajectories and rollouts.
 
     Coordinates have names such as x, qw, alpha_1; everything is in SI units. Runs that failed or

@@ -12,6 +12,7 @@ from serpentail_scene.layout import TAIL_V
 
 from ..basics.checks import refusal
 from ..basics.errors import SimulationError
+from ..basics.near_names import NearNames
 from ..model.memory import aligned
 from ..model.model import Model
 from ..planning.result.plan import Plan
@@ -53,7 +54,7 @@ class MpcFlag(IntFlag):
     SECOND, LIMIT, BOUND, MISS, KEPT, OPEN = (1 << bit for bit in range(6))
 
 
-class Mpc:
+class Mpc(NearNames):
     """Model-predictive control of a planned flight: a controller for ``simulate``.
 
     At each tick it measures the state and computes a correction of the plan's torques by a

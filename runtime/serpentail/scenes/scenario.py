@@ -6,6 +6,7 @@ from typing import Any, overload
 import numpy as np
 
 from ..basics.errors import SimulationError
+from ..basics.near_names import NearNames
 from ..basics.short_repr import brief
 from ..model.model import Model
 from ..motion.summary import Summary, summary
@@ -23,7 +24,7 @@ OF_PHASES = ("method", *NUMBERS)  # settings of all phases
 
 
 @dataclass(frozen=True, eq=False)
-class Scenario:
+class Scenario(NearNames):
     """A motion to simulate: a model, its start, and further arguments of ``simulate``.
 
     Attributes

@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
+from ..basics.near_names import NearNames
 from ..basics.short_repr import brief
 from ..motion.derived import AGAIN
 from ..motion.joined import JoinedAgain, joined
@@ -13,7 +14,7 @@ from .phase import Phase
 
 
 @dataclass(frozen=True, eq=False)
-class PhaseRun:
+class PhaseRun(NearNames):
     """Outcome of a phase.
 
     Attributes
@@ -42,7 +43,7 @@ class PhaseRun:
 
 
 @dataclass(frozen=True, eq=False)
-class SequenceRun:
+class SequenceRun(NearNames):
     """The motion of a sequence, and the outcome of each phase.
 
     Attributes

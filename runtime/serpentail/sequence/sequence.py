@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..basics.checks import number, refusal
 from ..basics.errors import PlanningError, SimulationError
+from ..basics.near_names import NearNames
 from ..basics.short_repr import brief
 from ..model.model import Model
 from ..model.state import State, parted
@@ -36,7 +37,7 @@ class PhaseStart:
 
 
 @dataclass(frozen=True, eq=False)
-class Sequence:
+class Sequence(NearNames):
     """A motion of several phases, such as a jump, a planned flight and a landing.
 
     Each phase has its own clock and begins in the state in which the one before ends; plans are

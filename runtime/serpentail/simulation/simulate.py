@@ -3,43 +3,75 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..basics.errors import SimulationError
 from ..basics.plausible_values import warn_of_degrees
-from ..basics.progress import Stage
 from ..compiling.threads import checked_threads
 from ..model.model import Model
-from ..model.state import SPAN, State, parted
+from ..model.state import SPAN, Quantity, Span, State, parted
 from ..motion.derived import AGAIN
 from ..motion.trajectory import Trajectory
-from .callback import Watch, Watched, checked_watch
-from .controllers.actuation import RunActuations
+from .callback import checked_watch
 from .controllers.controller import Controller, remembers
 from .energies import trajectory_or_error
-from .ground import GroundSettings
-from .methods import SCIPY, IntegrationMethod
+from .one_run import RunAgain, integrate
 from .prepare import prepared
-from .records import Records
 from .rollouts import Rollouts
 from .runs.batch import run_batch
-from .runs.outcomes import Samples
-from .runs.single import CompiledRun, RunSet
+from .settings import OfMany, OfOne, OfVaried
 from .start import Start
+
+Row = Sequence[float]
+Rows = Sequence[Row | np.ndarray]
+
+
+# What types tell of the result: of a State or numbers in a row, one motion; of several rows, or of
+# ``parameters``, many. An array's type does not tell its dimensions: then it is Any.
+@overload
+def simulate(
+    model: Model, q0: Any, v0: Any = None, t_span: Span = SPAN, **settings: Unpack[OfVaried]
+) -> Rollouts: ...
+
+
+@overload
+def simulate(
+    model: Model,
+    q0: State | Row | tuple[Row, Row],
+    v0: Row | Quantity | None = None,
+    t_span: Span = SPAN,
+    **settings: Unpack[OfOne],
+) -> Trajectory: ...
+
+
+@overload
+def simulate(
+    model: Model, q0: Rows, v0: Row | Rows, t_span: Span = SPAN, **settings: Unpack[OfMany]
+) -> Rollouts: ...
+
+
+@overload
+def simulate(
+    model: Model,
+    q0: np.ndarray | Row | Rows,
+    v0: np.ndarray | Row | Rows | Quantity | None = None,
+    t_span: Span = SPAN,
+    **settings: Unpack[OfMany],
+) -> Any: ...
 
 
 def simulate(
     model: Model,
-    q0: ArrayLike | State,
-    v0: ArrayLike | None = None,
+    q0: Any,
+    v0: Any = None,
     t_span: Any = SPAN,
     *,
-    controller: Controller = None,
+    controller: Any = None,
     method: str = "auto",
     **settings: Any,
 ) -> Trajectory | Rollouts:
@@ -176,55 +208,6 @@ def simulate(
     return motion
 
 
-@dataclass(frozen=True, eq=False)
-class RunAgain:
-    """All that a run was made of."""
-
-    start: Start
-    ground: GroundSettings
-    controller: Controller
-    method: IntegrationMethod
-
-    def coarser(self, coarse: int, last: Trajectory | None = None) -> Trajectory:
-        """Return the run made again, less exactly; of a sequence from the end of the last part.
-
-        SimulationError if it fails, or the last part ends too late.
-        """
-        start, ground = self.start, self.ground
-        if last is not None:
-            start = replace(start, q0=last.q[-1:], v0=last.v[-1:], start=float(last.t[-1]))
-            if last.contact is not None:
-                ground = replace(ground, bristles=last.contact.bristles[-1:])
-            if start.start >= start.end:
-                raise SimulationError(f"at t = {start.start:.6g} s a phase ends after the next one")
-        method = self.method.coarser(coarse, start.interval)
-        samples = self._made(start, ground, method)
-        info = samples.info | method.info
-        return trajectory_or_error(start.model, replace(samples, info=info), ground)
-
-    def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return q (n, nq) and v (n, nv) at times (n,) of the run, by the polynomials of its steps.
-
-        Its own samples are made, too: adaptive steps do not depend on samples, and others are cut
-        at each.
-        """
-        real = self.start.model.parameter_vector.dtype
-        wanted = times.astype(real).astype(float)
-        sampled = np.concatenate([self.start.times.astype(real), wanted])
-        samples = self._made(self.start.sampled_at(np.unique(sampled)), self.ground, self.method)
-        if samples.failure is not None:
-            raise samples.failure
-        rows = np.minimum(np.searchsorted(samples.t, wanted), len(samples.t) - 1)
-        return samples.q[rows], samples.v[rows]
-
-    def _made(self, start: Start, ground: GroundSettings, method: IntegrationMethod) -> Samples:
-        """Return the samples of a run."""
-        model = start.model
-        actuations = RunActuations(Records(model), self.controller, start, ground.leg_curve)
-        parameters = model.parameters_of_runs(None, 1)
-        return integrate(RunSet(actuations, start, ground, parameters, method))
-
-
 def _doubt(start: Start) -> None:
     """Warn the caller of ``simulate`` of a tail that starts at degrees."""
     if start.model.manifest["scene"]["coordinates"] != "polar":
@@ -271,27 +254,3 @@ def end_state(
     if samples.failure is not None:
         raise samples.failure
     return samples.q[-1], samples.v[-1]
-
-
-def integrate(runs: RunSet, watch: Watch | None = None) -> Samples:
-    """Return the samples of a single run; a function may watch them."""
-    run = CompiledRun(runs)
-    watched = None if watch is None else Watched(watch, runs.model, runs.ground)
-    with Stage("simulate", runs.model.name) as stage:
-        if runs.method.name in SCIPY:
-            from .runs.scipy_methods import integrate_by_scipy
-
-            samples = integrate_by_scipy(run, watched)
-        else:
-            samples = run.samples(run.go(look=partial(_look, run, stage, watched)))
-    if watched is not None:
-        watched.end(samples)
-    return samples
-
-
-def _look(run: CompiledRun, stage: Stage, watched: Watched | None) -> None:
-    """Report the progress of a run in C, and its new samples."""
-    done = run.record.done
-    stage.tell(done / len(run.runs.start.times))
-    if watched is not None:
-        watched.look(done, lambda first: run.runs.part(run.k, first, done))

@@ -14,6 +14,7 @@ from serpentail_scene.messages import one_line
 
 from ...basics.errors import SweepError
 from ...basics.extras import needed
+from ...basics.near_names import NearNames
 from ...basics.short_repr import brief
 from .points import Axes, checked_row
 from .pose import Posed
@@ -58,7 +59,7 @@ class Spent:
 
 
 @dataclass(frozen=True, eq=False)
-class Sweep:
+class Sweep(NearNames):
     """The rows of a sweep; ``sweep[k]`` is the row of point k, and ``len(sweep)`` their number.
 
     A row is a dict of the point's values and the run's outputs. Rows are read when they are asked

@@ -16,6 +16,7 @@ from serpentail_scene.layout import TAIL_V
 
 from ...basics.checks import number, one_of, refusal, whole_number
 from ...basics.errors import PlanningError, SimulationError
+from ...basics.near_names import NearNames
 from ...model.model import Model
 from ...simulation.controllers.parts import ControllerState, NativeTorque, Parts
 from ...simulation.controllers.piecewise import Piecewise
@@ -31,7 +32,7 @@ RATE = 1000.0  # Hz
 MOST_TICKS = 100_000
 
 
-class Gains:
+class Gains(NearNames):
     """Riccati gains along a plan: a controller for ``simulate``.
 
     At each tick it measures the state and adds K e to the plan's torques, within their bounds. e is

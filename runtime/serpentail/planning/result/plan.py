@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from serpentail_scene.layout import TAIL_V
 
 from ...basics.errors import PlanningError, SimulationError
+from ...basics.near_names import NearNames
 from ...model.model import Model
 from ...motion.archive import origin
 from ...motion.text import SI, framed
@@ -36,7 +37,7 @@ TRUTH = ("open_loop_attitude_error_deg", "open_loop_goal_error_deg")
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class Plan(NearNames):
     """A planned motion, its torques, and a report on the motion that these cause.
 
     Attributes

@@ -1,0 +1,48 @@
+"""What ``simulate`` takes by name, for editors and type checkers; its docstring describes it."""
+
+from collections.abc import Mapping, Sequence
+from typing import Required, TypedDict
+
+from numpy.typing import ArrayLike
+
+from ..model.state import Quantity
+from .callback import Watch
+from .controllers.controller import Controller
+from .controllers.schedules import Legs
+
+
+class RunSettings(TypedDict, total=False):
+    """Settings of one run and of many."""
+
+    method: str
+    output_step: Quantity
+    rtol: float
+    atol: float
+    first_step: Quantity
+    least_step: Quantity
+    most_step: Quantity
+    most_steps: float
+    step: Quantity
+    legs: Legs
+    bristles0: ArrayLike
+    stop_at: Sequence[tuple[str, str]]
+
+
+class OfOne(RunSettings, total=False):
+    """Those of a run from one start."""
+
+    controller: Controller
+    watch: Watch
+
+
+class OfMany(RunSettings, total=False):
+    """Those of runs from k starts."""
+
+    controller: Controller | Sequence[Controller]
+    threads: int
+
+
+class OfVaried(OfMany):
+    """Those of runs with parameters of their own."""
+
+    parameters: Required[Mapping[str, ArrayLike]]
