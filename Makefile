@@ -103,7 +103,8 @@ wheels: $(READY)
 	$(PY) -m tests.packaging.wheels
 #> make golden                            accept what the generator emits now as the golden models
 golden: $(READY)
-	$(PY) -m pytest tests/house/test_golden.py tests/house/test_model_functions.py tests/docs/test_names.py --update-golden
+	$(PY) -m pytest tests/house/test_golden.py tests/house/test_model_functions.py tests/house/test_face.py \
+	  tests/docs/test_names.py --update-golden
 #> make clean                             remove what was generated, and output/
 clean:
 	rm -rf output .build docs/api docs/gallery

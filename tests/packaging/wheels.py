@@ -18,7 +18,7 @@ PAGE = "serpentail/show/page/page.html"
 PARTS = {  # where the sources of a wheel's folders are, and which files of them it has
     "serpentail_codegen": (ROOT / "codegen" / "serpentail_codegen", ("*.py", "*.jinja", "*.typed")),
     "serpentail_scene": (ROOT / "codegen" / "serpentail_scene", ("*.py", "*.typed")),
-    "serpentail": (ROOT / "runtime" / "serpentail", ("*.py", "*.[ch]", "*.cc", "*.typed")),
+    "serpentail": (ROOT / "runtime" / "serpentail", ("*.py", "*.pyi", "*.[ch]", "*.cc", "*.typed")),
     "serpentail/examples": (ROOT / "scenes", ("*.toml",)),
 }
 LICENCES = ("MIT License", "three.js authors", "Leon Sorokin")  # ours, and of the page's libraries

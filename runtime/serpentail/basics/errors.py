@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ..motion.trajectory import Trajectory
 
 
 class SerpentailError(Exception):
@@ -52,7 +55,7 @@ class SimulationError(SerpentailError):
         The motion up to the failure; None if it never began.
     """
 
-    trajectory: Any = None  # a Trajectory
+    trajectory: Trajectory | None = None
 
 
 class PlanningError(SerpentailError, ValueError):

@@ -5,9 +5,7 @@ from typing import Any, TypedDict
 
 from ..basics.checks import did_you_mean, shown
 from ..basics.errors import ModelError
-
-Three = Sequence[float]
-OneOrEach = float | Sequence[float]  # of all tail coordinates, or of each
+from ..model.state import Quantities, Quantity
 
 
 class ParameterOptions(TypedDict, total=False):
@@ -16,41 +14,41 @@ class ParameterOptions(TypedDict, total=False):
     docs/theory.md describes them; not every tail has all of them.
     """
 
-    gravity: float
-    torso_mass: float
-    torso_inertia: Three
-    tail_mount: Three
-    mount_angles: Three
-    tail_mass: float
-    tail_length: float
-    link_radius: float
-    link_inertia: Three
-    link_masses: Sequence[float]
-    link_lengths: Sequence[float]
-    link_centers: Sequence[float]
-    link_inertias: Sequence[Three]
-    arc_masses: Sequence[float]
-    arc_lengths: Sequence[float]
-    K_n: float
-    D_n: float
-    K_f: float
-    D_f: float
-    mu: float
-    L_h2d: float
-    L_d2k: float
-    L_k2a: float
-    L_a2m: float
-    L_m2t: float
-    delta_m: float
-    hip: Three
-    torso_semi_axes: Three
-    tail_stiffness: OneOrEach
-    tail_rest: OneOrEach
-    tail_damping: OneOrEach
-    tail_stop_lower: OneOrEach
-    tail_stop_upper: OneOrEach
-    tail_stop_stiffness: OneOrEach
-    tail_stop_width: OneOrEach
+    gravity: Quantity
+    torso_mass: Quantity
+    torso_inertia: Quantities
+    tail_mount: Quantities
+    mount_angles: Quantities
+    tail_mass: Quantity
+    tail_length: Quantity
+    link_radius: Quantity
+    link_inertia: Quantities
+    link_masses: Quantities
+    link_lengths: Quantities
+    link_centers: Quantities
+    link_inertias: Quantities
+    arc_masses: Quantities
+    arc_lengths: Quantities
+    K_n: Quantity
+    D_n: Quantity
+    K_f: Quantity
+    D_f: Quantity
+    mu: Quantity
+    L_h2d: Quantity
+    L_d2k: Quantity
+    L_k2a: Quantity
+    L_a2m: Quantity
+    L_m2t: Quantity
+    delta_m: Quantity
+    hip: Quantities
+    torso_semi_axes: Quantities
+    tail_stiffness: Quantities
+    tail_rest: Quantities
+    tail_damping: Quantities
+    tail_stop_lower: Quantities
+    tail_stop_upper: Quantities
+    tail_stop_stiffness: Quantities
+    tail_stop_width: Quantities
 
 
 class SceneKeys(TypedDict, total=False):
@@ -67,7 +65,7 @@ class SceneKeys(TypedDict, total=False):
     contacts: Sequence[str]
     friction: str
     coordinates: str
-    bend_range: float
+    bend_range: Quantity
     real: str
     emission: str
     profile: str

@@ -8,6 +8,7 @@ import numpy as np
 from ..basics.checks import finite_array, number, refusal
 from ..basics.errors import IdentificationError
 from ..model.model import Model
+from ..model.state import Quantity
 from ..motion.trajectory import Trajectory
 from .certainty import Combination, certainty
 from .identify import check_model
@@ -71,8 +72,8 @@ def fisher_information(
     markers: Mapping[str, Marker],
     estimate: Sequence[str] | Mapping[str, float | None],
     *,
-    noise: float,
-    rate: float,
+    noise: Quantity,
+    rate: Quantity,
 ) -> Information:
     """Compute what markers on a motion in flight would tell about parameters.
 

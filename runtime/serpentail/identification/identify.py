@@ -11,6 +11,7 @@ from ..basics.checks import number, refusal
 from ..basics.errors import IdentificationError, ModelError
 from ..basics.progress import Stage
 from ..model.model import Model
+from ..model.state import Quantity
 from .data_checks import refuse_scale, refuse_too_few, warn_of_swaps
 from .marker_files import read_markers
 from .outcome import identification_of
@@ -37,7 +38,7 @@ class IdentifySettings(TypedDict, total=False):
     """Settings of ``identify`` besides the model, the data, the markers and the unknowns."""
 
     torques: Any
-    noise: float | Mapping[str, float] | None
+    noise: Quantity | Mapping[str, Quantity] | None
     confidence: float
     unit: str | None
     axes: str

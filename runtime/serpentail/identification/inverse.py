@@ -18,6 +18,7 @@ from ..basics.checks import number
 from ..basics.errors import IdentificationError
 from ..basics.near_names import NearNames
 from ..model.model import Model
+from ..model.state import Quantity
 from ..model.state_space import product_matrix
 from ..motion.trajectory import Trajectory
 from .data_checks import refuse_scale, refuse_too_few, warn_of_residuals
@@ -64,7 +65,7 @@ class JointTorques(NearNames):
 
 
 def joint_torques(
-    model: Model, tracks: MarkerTracks, markers: Mapping[str, Marker], *, cutoff: float
+    model: Model, tracks: MarkerTracks, markers: Mapping[str, Marker], *, cutoff: Quantity
 ) -> JointTorques:
     """Compute joint torques and powers of a motion from marker tracks, by inverse dynamics.
 

@@ -7,7 +7,7 @@ it bent by x times as much. Only the axes of offsets are turned here. Derivative
 differences.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -22,6 +22,7 @@ from ..basics.checks import finite_array, measured, number, numbers, refusal
 from ..basics.errors import IdentificationError
 from ..model.model import Model
 from ..model.polar import polar_to_bend
+from ..model.state import Quantities
 
 TORSO = -1  # the piece of a marker on the torso
 NOWHERE = (0.0, 0.0, 0.0)
@@ -57,9 +58,9 @@ class Marker:
     (0.0, 0.0, 0.0)
     """
 
-    torso: Sequence[float] | None = None
+    torso: Quantities | None = None
     tail: float | None = None
-    offset: Sequence[float] = NOWHERE
+    offset: Quantities = NOWHERE
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from ..motion.trajectory import Trajectory
 from .certainty import Combination
 from .placement import Placements
 from .tracks import MarkerTracks
+
+if TYPE_CHECKING:
+    from ..show.pictures.plot import Figure
 
 
 @dataclass(frozen=True)
@@ -203,7 +206,7 @@ class Identification(NearNames):
         lines = [*map(str, self.parameters), *(f"undetermined: {x}" for x in self.undetermined)]
         return "\n  ".join([head, *lines]) + ">"
 
-    def plot(self, path: str | PathLike[str] | None = None, trial: int = 0) -> Any:
+    def plot(self, path: str | PathLike[str] | None = None, trial: int = 0) -> tuple["Figure", Any]:
         """Draw residuals, torques and power of a trial over time; needs the extra "plot".
 
         Parameters

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from serpentail_scene.layout import Layout
 
@@ -32,6 +31,7 @@ from .parameters import (
     resolve,
     warn_of_parameters,
 )
+from .state import Quantities
 from .states import ModelStates
 
 if TYPE_CHECKING:
@@ -189,7 +189,7 @@ class Model(ModelMethods, ModelStates, NearNames):
         each = (f"{n} links" if n else "an arc" for n in self.links)
         return f"{self.segments} segments: {', '.join(each)}"
 
-    def with_parameters(self, **changes: ArrayLike) -> Model:
+    def with_parameters(self, **changes: Quantities) -> Model:
         """Return this model with other parameters; nothing is compiled.
 
         Parameters

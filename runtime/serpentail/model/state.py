@@ -22,8 +22,9 @@ if TYPE_CHECKING:
     from .model import Model
 
 SPAN = (0.0, 1.0)  # s, of a run that names none
-Quantity = float | str  # a number in SI, or a text with its unit
-Span = Quantity | Sequence[Quantity] | np.ndarray
+Quantity = float | np.number | str  # a number in SI, or a text with its unit
+Quantities = Quantity | Sequence[Any] | np.ndarray  # also rows of these
+Span = Quantity | Sequence[Quantity] | np.ndarray  # s
 WIDTH = 96  # characters of a line in a REPL
 ANGLES = ("pitch", "roll", "yaw")
 START = {  # the words, with the units of their numbers

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
+    from ..show.pictures.plot import Figure
+
 
 class Exports(NearNames):
     """Conversions of trajectories and rollouts.
@@ -135,7 +137,9 @@ class Showable:
 
         return film(self, path, **options)  # type: ignore[arg-type]
 
-    def filmstrip(self, path: str | os.PathLike[str] | None = None, **options: Any) -> Any:
+    def filmstrip(
+        self, path: str | os.PathLike[str] | None = None, **options: Any
+    ) -> tuple["Figure", Any]:
         """Draw moments of the motion side by side; return Matplotlib's figure and its axes.
 
         With a path the figure is written, too. Options and errors are those of
@@ -145,7 +149,7 @@ class Showable:
 
         return filmstrip(self, path, **options)  # type: ignore[arg-type]
 
-    def plot(self, *panels: str, **options: Any) -> Any:
+    def plot(self, *panels: str, **options: Any) -> tuple["Figure", Any]:
         """Draw panels over time, by default all that do not stay zero; return figure and axes.
 
         Names of panels, options and errors are those of ``serpentail.plot``.

@@ -15,6 +15,7 @@ from ..basics.errors import SimulationError
 from ..basics.near_names import NearNames
 from ..model.memory import aligned
 from ..model.model import Model
+from ..model.state import Quantity
 from ..planning.result.plan import Plan
 from ..simulation.controllers.parts import ControllerState, NativeTorque, Parts
 from .emission import write_c
@@ -118,8 +119,8 @@ class Mpc(NearNames):
         model: Model,
         plan: Plan,
         *,
-        rate: float = RATE,
-        horizon: float | None = None,
+        rate: Quantity = RATE,
+        horizon: Quantity | None = None,
         **settings: Any,
     ):
         refuse_unable(model, plan)

@@ -11,6 +11,7 @@ from ..basics import extras
 from ..basics.checks import Refusals
 from ..basics.errors import PlanningError
 from ..model.model import Model
+from ..model.state import Quantities, Quantity, State
 from ..motion.trajectory import Trajectory
 from ..simulation.controllers.schedules import Legs
 from .best import best_plan
@@ -23,16 +24,16 @@ from .settings import PLACES, Guess, Mesh, Solver, Tolerances, checked_settings,
 def plan(  # noqa: PLR0913 - the public face names all that it takes
     model: Model,
     *,
-    start: Any,
+    start: State | tuple[Quantities, Quantities],
     goal: Goal | str | None = None,
-    duration: float | tuple[float, float],
+    duration: Quantity | tuple[Quantity, Quantity],
     bounds: Bounds | None = None,
     # the problem
     objective: str | Callable[[Any], Any] = "effort",
-    smoothing: float = SMOOTHING,
-    damping: float = 0.0,
+    smoothing: Quantity = SMOOTHING,
+    damping: Quantity = 0.0,
     path: Sequence[PathConstraint] = (),
-    clearance: float | None = None,
+    clearance: Quantity | None = None,
     legs: Legs | None = None,
     design: Mapping[str, Any] | None = None,
     free_start: Mapping[str, Any] | None = None,

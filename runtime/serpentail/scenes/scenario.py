@@ -1,7 +1,7 @@
 """``Scenario``: a motion to simulate, as a scene describes it."""
 
 from dataclasses import dataclass, field, replace
-from typing import Any, overload
+from typing import Any, Unpack, overload
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from ..sequence.sequence import Sequence
 from ..simulation.controllers.controller import Controller
 from ..simulation.controllers.schedules import Legs
 from ..simulation.rollouts import Rollouts
+from ..simulation.settings import OfOther, OfScenario
 from ..simulation.simulate import simulate
 from .simulate_keys import NUMBERS
 
@@ -56,10 +57,10 @@ class Scenario(NearNames):
     __repr__ = brief
 
     @overload
-    def simulate(self) -> Trajectory: ...
+    def simulate(self, **changes: Unpack[OfScenario]) -> Trajectory: ...
 
     @overload
-    def simulate(self, **changes: Any) -> Trajectory | Rollouts: ...
+    def simulate(self, **changes: Unpack[OfOther]) -> Trajectory | Rollouts: ...
 
     def simulate(self, **changes: Any) -> Trajectory | Rollouts:
         """Make the motion.

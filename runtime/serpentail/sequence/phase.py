@@ -47,9 +47,9 @@ class Tracking:
         A number is negative or not finite.
     """
 
-    kp: float = KP
-    kd: float = KD
-    early: float = EARLY
+    kp: Any = KP  # numbers or texts; then numbers
+    kd: Any = KD
+    early: Any = EARLY
     mpc: Mapping[str, Any] | None = None
 
     def __post_init__(self) -> None:
@@ -105,9 +105,9 @@ class Phase:
     """
 
     name: str
-    duration: float
+    duration: Any  # a number or a text; then a number
     until: Any = None
-    clearance: float = 0.0
+    clearance: Any = 0.0
     controller: Controller = None
     plan: Any = None
     tracking: Tracking = field(default_factory=Tracking)

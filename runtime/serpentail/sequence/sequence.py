@@ -70,8 +70,8 @@ class Sequence(NearNames):
 
     model: Model
     phases: list[Phase] | tuple[Phase, ...]
-    gamma: float | None = None
-    delta: float | None = None
+    gamma: Any = None  # numbers or texts; then numbers
+    delta: Any = None
     settings: Mapping[str, Any] = field(default_factory=dict)
     __repr__ = brief
 

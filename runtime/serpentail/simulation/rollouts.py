@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -175,7 +175,7 @@ class Rollouts(Exports):
             return self[k]
         if error.trajectory is None:
             raise error
-        return cast(Trajectory, error.trajectory)
+        return error.trajectory
 
     def __getitem__(self, k: int) -> Trajectory:
         """Return the trajectory of run k, or raise its error."""

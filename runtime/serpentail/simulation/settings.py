@@ -1,11 +1,9 @@
 """What ``simulate`` takes by name, for editors and type checkers; its docstring describes it."""
 
 from collections.abc import Mapping, Sequence
-from typing import Required, TypedDict
+from typing import Any, Required, TypedDict
 
-from numpy.typing import ArrayLike
-
-from ..model.state import Quantity
+from ..model.state import Quantities, Quantity, Span
 from .callback import Watch
 from .controllers.controller import Controller
 from .controllers.schedules import Legs
@@ -24,7 +22,7 @@ class RunSettings(TypedDict, total=False):
     most_steps: float
     step: Quantity
     legs: Legs
-    bristles0: ArrayLike
+    bristles0: Quantities
     stop_at: Sequence[tuple[str, str]]
 
 
@@ -45,4 +43,19 @@ class OfMany(RunSettings, total=False):
 class OfVaried(OfMany):
     """Those of runs with parameters of their own."""
 
-    parameters: Required[Mapping[str, ArrayLike]]
+    parameters: Required[Mapping[str, Quantities]]
+
+
+class OfScenario(OfOne, total=False):
+    """Those that a scenario's own start leaves open."""
+
+    t_span: Span
+
+
+class OfOther(OfMany, total=False):
+    """Those of a scenario from another start, or from many."""
+
+    q0: Any
+    v0: Any
+    t_span: Span
+    parameters: Mapping[str, Quantities]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike
 from ..basics.checks import number, whole_number
 from ..basics.errors import SimulationError, StateError
 from ..model.model import Model
-from ..model.state import State
+from ..model.state import Quantity, State
 from ..motion.trajectory import Trajectory
 from .controllers.controller import Controller
+from .settings import RunSettings
 from .simulate import simulate
 
 MOST_ROUNDS = 100
@@ -23,10 +24,10 @@ def settle(
     q0: ArrayLike | State,
     *,
     rounds: int = 1,
-    duration: float | str = 1.5,
+    duration: Quantity = 1.5,
     controller: Controller = None,
-    at: float | str = 0.0,
-    **settings: Any,
+    at: Quantity = 0.0,
+    **settings: Unpack[RunSettings],
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Simulate a model on the ground until it is at rest; return that state.
 
@@ -78,10 +79,10 @@ def settle(
     duration = check_settling(model, rounds, duration)
     at = number("at", at, SimulationError, unit="s")
     q, v = np.asarray(q0), np.zeros(model.nv)
-    bristles = settings.pop("bristles0", None)
-    span: dict[str, Any] = {"output_step": duration, "t_span": (at - duration, at)}
+    given: dict[str, Any] = {"output_step": duration, "t_span": (at - duration, at), **settings}
+    bristles = given.pop("bristles0", None)
     for _ in range(rounds):
-        motion = simulate(model, q, v, controller=controller, bristles0=bristles, **span | settings)
+        motion = simulate(model, q, v, controller=controller, bristles0=bristles, **given)
         assert isinstance(motion, Trajectory) and motion.contact is not None  # one start, on ground
         q, bristles = motion.q[-1], motion.contact.bristles[-1]
     return q, v, bristles

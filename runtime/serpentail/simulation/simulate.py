@@ -31,8 +31,6 @@ Row = Sequence[float]
 Rows = Sequence[Row | np.ndarray]
 
 
-# What types tell of the result: of a State or numbers in a row, one motion; of several rows, or of
-# ``parameters``, many. An array's type does not tell its dimensions: then it is Any.
 @overload
 def simulate(
     model: Model, q0: Any, v0: Any = None, t_span: Span = SPAN, **settings: Unpack[OfVaried]
@@ -40,7 +38,7 @@ def simulate(
 
 
 @overload
-def simulate(
+def simulate(  # type: ignore[overload-overlap]  # a pair of rows, and a span, look like starts
     model: Model,
     q0: State | Row | tuple[Row, Row],
     v0: Row | Quantity | None = None,
@@ -106,7 +104,8 @@ def simulate(
     Returns
     -------
     Trajectory or Rollouts
-        The motion; for k starts their ``Rollouts``.
+        The motion; for k starts their ``Rollouts``. Type checkers tell which by a State, by numbers
+        in a list, and by ``parameters``; an array may be either, so they say Any.
 
     Other Parameters
     ----------------

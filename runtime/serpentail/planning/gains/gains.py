@@ -18,6 +18,7 @@ from ...basics.checks import number, one_of, refusal, whole_number
 from ...basics.errors import PlanningError, SimulationError
 from ...basics.near_names import NearNames
 from ...model.model import Model
+from ...model.state import Quantity
 from ...simulation.controllers.parts import ControllerState, NativeTorque, Parts
 from ...simulation.controllers.piecewise import Piecewise
 from ..c_text import write_texts
@@ -85,9 +86,9 @@ class Gains(NearNames):
         plan: Plan,
         *,
         model: Model | None = None,
-        rate: float = RATE,
+        rate: Quantity = RATE,
         knots: int = 40,
-        within: float | None = 3.0,
+        within: Quantity | None = 3.0,
         flights: int = 64,
         seed: int = 0,
     ):

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -188,7 +188,7 @@ class Plan(NearNames):
         except SimulationError as error:
             if error.trajectory is None:
                 raise
-            return cast(Trajectory, error.trajectory)
+            return error.trajectory
 
     def torque(self, times: ArrayLike) -> np.ndarray:
         """Evaluate the planned torques, without damping.

@@ -8,11 +8,11 @@ from itertools import repeat
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ...basics.checks import finite_array, numbers, numbers_in, refusal
 from ...basics.errors import SimulationError
 from ...basics.short_repr import brief
+from ...model.state import Quantities
 from .parts import NativeTorque, Parts, TorqueFunction
 from .pfl import Pfl
 from .piecewise import Piecewise, checked_nodes, linear
@@ -40,7 +40,7 @@ class Damping:
     Damping(damping=0.0001)
     """
 
-    damping: float | tuple[float, ...] = 1e-3
+    damping: Quantities = 1e-3
 
     def parts(self, nt: int) -> Parts:
         """Return its parts for 2m tail coordinates."""
@@ -66,9 +66,9 @@ class TorqueTable:
     >>> law = st.TorqueTable([0.0, 0.1], [[0.0, 0.0], [0.01, 0.0]])
     """
 
-    times: ArrayLike
-    torques: ArrayLike
-    damping: float | tuple[float, ...] = 0.0
+    times: Quantities
+    torques: Quantities
+    damping: Quantities = 0.0
     __repr__ = brief
 
     def parts(self, nt: int) -> Parts:
@@ -90,7 +90,7 @@ class TorqueCurve:
     """
 
     torques: Piecewise
-    damping: float | tuple[float, ...] = 0.0
+    damping: Quantities = 0.0
 
     def parts(self, nt: int) -> Parts:
         """Return its parts for 2m tail coordinates."""
@@ -215,6 +215,6 @@ def parts_of(controller: Controller, nt: int) -> Parts:
     raise refusal("controller", controller, CHOICES, SimulationError)
 
 
-def _damping(damping: float | tuple[float, ...], nt: int) -> np.ndarray:
+def _damping(damping: Quantities, nt: int) -> np.ndarray:
     """Return joint damping (2m,), N m s."""
     return numbers("damping", damping, nt, SimulationError, unit="N m s", least=0)

@@ -13,6 +13,7 @@ from serpentail_scene.layout import TORSO_V
 from ...basics.checks import number, numbers, refusal
 from ...basics.errors import SimulationError
 from ...model.model import Model
+from ...model.state import Quantity
 from .parts import Parts
 from .piecewise import Piecewise, checked_nodes, spline
 from .schedules import Reference
@@ -62,8 +63,8 @@ class Pfl:
         self,
         model: Model,
         reference: Any,
-        kp: float = KP,
-        kd: float = KD,
+        kp: Quantity = KP,
+        kd: Quantity = KD,
         feedforward: bool = True,
         torque: Any = None,
     ):

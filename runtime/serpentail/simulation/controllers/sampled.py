@@ -53,8 +53,8 @@ class Sampled:
     """
 
     function: Callable[[float, np.ndarray, np.ndarray], ArrayLike]
-    rate: float
-    delay: float = 0.0
+    rate: Any  # numbers or texts; then numbers
+    delay: Any = 0.0
     __repr__ = brief
 
     def __post_init__(self) -> None:

@@ -5,17 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ...basics.checks import finite_array, number, one_of, refusal, shown
 from ...basics.errors import SimulationError
 from ...basics.plausible_values import warn_of_degrees
 from ...basics.short_repr import brief
 from ...model.model import Model
-from ...model.state import shared_among_links
+from ...model.state import Quantities, Quantity, shared_among_links
 from .piecewise import Piecewise, blends, checked_nodes, linear, spline
 
 BLENDS = {"linear": linear, "quintic": blends, "spline": spline}
@@ -53,8 +52,8 @@ class Reference:
     [0.25, 0.0]
     """
 
-    times: ArrayLike
-    angles: ArrayLike
+    times: Quantities
+    angles: Quantities
     blend: str = "quintic"
     curve: Piecewise = field(init=False)
     __repr__ = brief
@@ -71,7 +70,7 @@ class Reference:
 
     @classmethod
     def of_bends(
-        cls, model: Model, times: ArrayLike, bends: ArrayLike, blend: str = "quintic"
+        cls, model: Model, times: Quantities, bends: Quantities, blend: str = "quintic"
     ) -> Self:
         """Make the reference of a tail from the bends of its segments.
 
@@ -147,9 +146,9 @@ class Legs:
     [3.67, -0.26, 3.67, -0.26]
     """
 
-    times: ArrayLike
-    gamma: ArrayLike
-    delta: ArrayLike
+    times: Quantities
+    gamma: Quantities
+    delta: Quantities
     curve: Piecewise = field(init=False)
     __repr__ = brief
 
@@ -179,7 +178,7 @@ class Legs:
         return cls([0.0], gamma, delta)
 
     @classmethod
-    def ramp(cls, gamma: float, delta: tuple[float, float], at: float, rate: float) -> Self:
+    def ramp(cls, gamma: Quantity, delta: Quantities, at: Quantity, rate: Quantity) -> Self:
         """Make legs whose delta goes from one angle to another at a constant rate: a kick (Eq. 48).
 
         Parameters
@@ -214,7 +213,7 @@ class Legs:
         return cls.moves(gamma, angles[0], [move | {"rate": math.fabs(speed)}])
 
     @classmethod
-    def moves(cls, gamma: float, delta: float, moves: Iterable[Mapping[str, float]]) -> Self:
+    def moves(cls, gamma: Quantity, delta: Quantity, moves: Iterable[Mapping[str, Any]]) -> Self:
         """Make legs that move from time to time, both alike, and are held between the moves.
 
         Parameters
@@ -245,7 +244,7 @@ class Legs:
         return cls(times, *np.array(angles, float).T)
 
 
-def _both_legs(name: str, value: ArrayLike, times: np.ndarray) -> np.ndarray:
+def _both_legs(name: str, value: Quantities, times: np.ndarray) -> np.ndarray:
     """Return angles (K, 2)."""
     angles = finite_array(f"Legs: {name}", value, SimulationError, "rad")
     if angles.shape not in ((), (len(times),), (len(times), 2)):
