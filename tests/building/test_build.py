@@ -74,7 +74,7 @@ REFUSED = [
     (None, {"m": 2}, "m: value 2.*'segments'"),
     (None, {**TINY, "torso_mas": 1}, "torso_mas: .*'torso_mass'"),
     (None, {**TINY, "mu": 1}, "mu: value 1: nothing touches the ground by it"),
-    (None, {"tail": "articulatd", "segments": 0}, "(?s)kind: .*segments: .*links: "),
+    (None, {"tail": "articulatd", "segments": 0}, "(?s)tail: .*segments: .*links: "),
     (None, {**TINY, "links": 10**30}, "links: value 1000.*64 bits"),
     (None, {**TINY, "contacts": {1j}}, "contacts: value {1j}"),
     (None, {**TINY, "name": "../x"}, "name: value '../x'"),

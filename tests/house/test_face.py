@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import serpentail as st
-from serpentail.simulation.settings import OfMany, OfOne, OfVaried
+from serpentail.simulation.settings import VariedRuns
 from tests.support import zoo
 from tests.support.rows import row
 
@@ -79,8 +79,7 @@ def test_mypy_finds_a_users_mistakes_and_no_others(tmp_path):
 def test_types_know_every_argument_of_simulate():
     told = st.simulate.__doc__.split("See Also")[0]
     told = ", ".join(re.findall(r"^    ([a-z]\w*(?:, \w+)*) : ", told, re.MULTILINE))
-    typed = {*OfOne.__annotations__, *OfMany.__annotations__, *OfVaried.__annotations__}
-    assert typed == {*told.split(", ")} - {"model", "q0", "v0", "t_span"}
+    assert {*VariedRuns.__annotations__} == {*told.split(", ")} - {"model", "q0", "v0", "t_span"}
 
 
 def test_a_name_that_does_not_exist_tells_the_nearest_three():

@@ -6,10 +6,8 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import Any, Unpack
 
-from serpentail_scene.keys import KINDS
 from serpentail_scene.purposes import functions_of
 
-from ..basics.checks import one_of
 from ..basics.errors import ModelError
 from ..model.load import model_from
 from ..model.manifest import CheckedFolder
@@ -100,10 +98,12 @@ def build(
     >>> heavy = st.build("righting_m1_n3", torso_mass=0.06)  # doctest: +SKIP
     """
     keys, parameters = separated(options)
-    if scene is None or "kind" in keys:
-        one_of("tail", keys.get("kind"), KINDS, ModelError)
     if scene is None:
-        chosen = built(keys, _name(keys), parameters)
+        try:
+            chosen = built(keys, _name(keys), parameters)
+        except ModelError as error:
+            error.args = (re.sub(r"(: |\n)kind: ", r"\1tail: ", str(error)),)  # our word
+            raise
     else:
         tables, path = tables_of_scene(scene)
         if "contacts" in keys:

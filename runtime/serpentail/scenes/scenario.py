@@ -17,7 +17,7 @@ from ..sequence.sequence import Sequence
 from ..simulation.controllers.controller import Controller
 from ..simulation.controllers.schedules import Legs
 from ..simulation.rollouts import Rollouts
-from ..simulation.settings import OfOther, OfScenario
+from ..simulation.settings import RunSettings
 from ..simulation.simulate import simulate
 from .simulate_keys import NUMBERS
 
@@ -57,10 +57,10 @@ class Scenario(NearNames):
     __repr__ = brief
 
     @overload
-    def simulate(self, **changes: Unpack[OfScenario]) -> Trajectory: ...
+    def simulate(self, **changes: Unpack[RunSettings]) -> Trajectory: ...
 
     @overload
-    def simulate(self, **changes: Unpack[OfOther]) -> Trajectory | Rollouts: ...
+    def simulate(self, **changes: Any) -> Trajectory | Rollouts: ...
 
     def simulate(self, **changes: Any) -> Trajectory | Rollouts:
         """Make the motion.

@@ -12,7 +12,6 @@ from ..basics.errors import SimulationError, StateError
 from ..model.model import Model
 from ..model.state import Quantity, State
 from ..motion.trajectory import Trajectory
-from .controllers.controller import Controller
 from .settings import RunSettings
 from .simulate import simulate
 
@@ -25,7 +24,6 @@ def settle(
     *,
     rounds: int = 1,
     duration: Quantity = 1.5,
-    controller: Controller = None,
     at: Quantity = 0.0,
     **settings: Unpack[RunSettings],
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -42,13 +40,11 @@ def settle(
         runs damp the motion faster.
     duration : float or str, default 1.5
         Duration of a run (s).
-    controller : controller or callable, optional
-        As of ``simulate``.
     at : float or str, default 0
         Time (s) at which the later motion begins. Controller and legs act as before this time,
         where schedules hold their first values.
     **settings
-        Other arguments of ``simulate``, such as ``legs``.
+        Other arguments of ``simulate``, such as ``controller`` and ``legs``.
 
     Returns
     -------
@@ -82,7 +78,7 @@ def settle(
     given: dict[str, Any] = {"output_step": duration, "t_span": (at - duration, at), **settings}
     bristles = given.pop("bristles0", None)
     for _ in range(rounds):
-        motion = simulate(model, q, v, controller=controller, bristles0=bristles, **given)
+        motion = simulate(model, q, v, bristles0=bristles, **given)
         assert isinstance(motion, Trajectory) and motion.contact is not None  # one start, on ground
         q, bristles = motion.q[-1], motion.contact.bristles[-1]
     return q, v, bristles

@@ -24,7 +24,7 @@ from .one_run import RunAgain, integrate
 from .prepare import prepared
 from .rollouts import Rollouts
 from .runs.batch import run_batch
-from .settings import OfMany, OfOne, OfVaried
+from .settings import RunSettings, VariedRuns
 from .start import Start
 
 Row = Sequence[float]
@@ -33,7 +33,7 @@ Rows = Sequence[Row | np.ndarray]
 
 @overload
 def simulate(
-    model: Model, q0: Any, v0: Any = None, t_span: Span = SPAN, **settings: Unpack[OfVaried]
+    model: Model, q0: Any, v0: Any = None, t_span: Span = SPAN, **settings: Unpack[VariedRuns]
 ) -> Rollouts: ...
 
 
@@ -43,13 +43,13 @@ def simulate(  # type: ignore[overload-overlap]  # a pair of rows, and a span, l
     q0: State | Row | tuple[Row, Row],
     v0: Row | Quantity | None = None,
     t_span: Span = SPAN,
-    **settings: Unpack[OfOne],
+    **settings: Unpack[RunSettings],
 ) -> Trajectory: ...
 
 
 @overload
 def simulate(
-    model: Model, q0: Rows, v0: Row | Rows, t_span: Span = SPAN, **settings: Unpack[OfMany]
+    model: Model, q0: Rows, v0: Row | Rows, t_span: Span = SPAN, **settings: Unpack[RunSettings]
 ) -> Rollouts: ...
 
 
@@ -59,7 +59,7 @@ def simulate(
     q0: np.ndarray | Row | Rows,
     v0: np.ndarray | Row | Rows | Quantity | None = None,
     t_span: Span = SPAN,
-    **settings: Unpack[OfMany],
+    **settings: Unpack[RunSettings],
 ) -> Any: ...
 
 
