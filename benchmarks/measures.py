@@ -2,8 +2,8 @@
 
 A measure has a docstring, which says what it measures, with units and conditions, and a function
 ``measured`` of a scratch folder that returns the rows of its table. ``PER_PROCESSOR`` is there and
-true if its result depends on the width of vectors, ``PROCESSES`` if it is repeated in processes of its
-own: then times are the least of all runs, and ratios have a span.
+true if its result depends on the width of vectors, ``PROCESSES`` if it is repeated in as many
+processes: then times are the least of all runs, and ratios have a span.
 """
 
 import hashlib

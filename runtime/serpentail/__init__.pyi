@@ -24,6 +24,8 @@ from .simulation.controllers.schedules import Reference as Reference
 from .motion.contact import Contact as Contact
 from .motion.trajectory import Trajectory as Trajectory
 from .motion.summary import summary as summary
+from .show.compare import compare as compare
+from .show.compare import Comparison as Comparison
 from .basics.attitude import pitch_roll_yaw as pitch_roll_yaw
 from .basics.attitude import rotation_matrix as rotation_matrix
 from .model.polar import polar_to_bend as polar_to_bend
@@ -31,6 +33,10 @@ from .model.polar import bend_to_polar as bend_to_polar
 from .planning.planner import plan as plan
 from .planning.goal import Goal as Goal
 from .planning.goal import Bounds as Bounds
+from .planning.settings import Mesh as Mesh
+from .planning.settings import Tolerances as Tolerances
+from .planning.settings import Solver as Solver
+from .planning.settings import Guess as Guess
 from .planning.result.plan import Plan as Plan
 from .planning.gains.gains import Gains as Gains
 from .mpc.mpc import Mpc as Mpc

@@ -69,7 +69,7 @@ def test_a_scaled_kick_is_the_kick_at_another_scale(tmp_path):
     np.testing.assert_allclose(b.t, np.sqrt(scale) * a.t, rtol=1e-14)
     np.testing.assert_allclose(b.q[:, :3], scale * a.q[:, :3], atol=1e-4 * scale)
     np.testing.assert_allclose(b.q[:, 3:], a.q[:, 3:], atol=1e-3)
-    # at touch-down the torque jumps within a step: there a touch found 10 us later counts as the same
+    # at touch-down the torque jumps within a step: a touch found 10 us later counts as the same
     jump = np.abs(np.gradient(a.tau, axis=0)).max(axis=1, keepdims=True)
     assert (np.abs(b.tau / scale**4 - a.tau) <= 1e-3 * np.abs(a.tau).max() + 0.01 * jump).all()
     assert scene.duration == pytest.approx(scale**0.5 * 1.2)
