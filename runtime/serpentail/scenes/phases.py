@@ -90,7 +90,7 @@ def _phase(where: str, model: Model, table: Mapping, default: Controller, folder
         values["controller"] = controller_of(
             f"{where}.controller", model, values["controller"], reference
         )
-    elif "plan" not in table:
+    else:
         values["controller"] = default
     if isinstance(table.get("plan"), list):
         values["plan"] = [

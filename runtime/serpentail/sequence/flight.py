@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,14 +21,15 @@ from ..simulation.controllers.controller import Controller
 from ..simulation.controllers.pfl import Pfl
 from .phase import BEFORE, Phase
 
+MORE = 2.0  # of the bound of the torque: tried where no plan is true, for the advice
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 State = tuple[np.ndarray, np.ndarray]  # q, v
 
 
 @dataclass(frozen=True, eq=False)
 class PlannedFlight:
-    """A plan, the controller that tracks it, and the time (s) from its start to the landing, if
-    that is needed.
+    """A plan, the controller that tracks it, or the phase's own if the plan is not true, and the
+    time (s) from its start to the landing, if that is needed.
     """
 
     plan: Plan
@@ -37,7 +38,8 @@ class PlannedFlight:
 
 
 def planned_flight(model: Model, phase: Phase, state: State, angles: np.ndarray) -> PlannedFlight:
-    """Return the first successful plan of a phase from a state, else the one that misses least.
+    """Return the first successful plan of a phase from a state, else the one that misses least,
+    whose report's ``advice`` then says what would help.
 
     angles (2,): gamma, delta (rad) of the legs at the landing.
     """
@@ -48,10 +50,34 @@ def planned_flight(model: Model, phase: Phase, state: State, angles: np.ndarray)
             break
     best, landing = min(attempts, key=lambda attempt: _miss(attempt[0]))
     tracking = phase.tracking
+    if not best.success:
+        advice = _advice(model, phase, [found for found, _ in attempts], state, angles)
+        best = replace(best, report=best.report | {"advice": advice})
+        return PlannedFlight(best, phase.controller, landing)
     if tracking.mpc is not None:
         return PlannedFlight(best, Mpc(model, best, **tracking.mpc), landing)
     torque = best.problem.bounds.torque
     return PlannedFlight(best, Pfl(model, best, tracking.kp, tracking.kd, torque=torque), landing)
+
+
+def _advice(
+    model: Model, phase: Phase, failed: list[Plan], state: State, angles: np.ndarray
+) -> str:
+    """Return which torque suffices: what a search has told, or what one more of the last goal tells
+    that may use more. Of a longer duration, which only a higher jump gives, nothing is said.
+    """
+    for k, found in enumerate(failed):
+        if "torque" in (found.report["advice"] or ""):
+            return f"plan[{k}].{found.report['advice']}"
+    bounds, words = failed[-1].problem.bounds, "give it further goals, or change its jump"
+    if bounds.torque is None or failed[-1].report["stopped"]:
+        return words
+    more = replace(bounds, torque=MORE * np.asarray(bounds.torque))
+    told = f"plan[{len(failed) - 1}].bounds.torque: {np.max(more.torque):.3g} N m"
+    wider = {**phase.plan[-1], "bounds": more}
+    if _attempt(model, phase, wider, state, angles)[0].success:
+        return f"{told} suffices"
+    return f"{told} does not suffice either: {words}"
 
 
 def _attempt(

@@ -81,11 +81,12 @@ class Phase:
     clearance : float, default 0
         Height (m) for "airborne".
     controller : controller or callable, optional
-        As of ``simulate``.
+        As of ``simulate``. Beside a plan it acts if no plan is true.
     plan : mapping or sequence of mapping, optional
-        Arguments of ``plan``, in place of a controller. The plan starts at the state in which
-        the phase begins. Of several, the first successful one is used. Without a ``duration``
-        the plan ends where the body would land in the goal's posture.
+        Arguments of ``plan``, which is tracked. The plan starts at the state in which the phase
+        begins. Of several, the first successful one is used; if there is none, a warning says
+        which bound to raise. Without a ``duration`` the plan ends where the body would land in
+        the goal's posture.
     tracking : Tracking, optional
         How the plan is tracked.
     moves : iterable of mapping, optional
@@ -129,7 +130,7 @@ class Phase:
             raise SimulationError(f"{where}: clearance: value {self.clearance}: {remedy}")
         object.__setattr__(self, "plan", _plans(where, self.plan))
         object.__setattr__(self, "moves", _moves(where, self.moves, bool(self.plan)))
-        _check_acting(where, self.controller, bool(self.plan))
+        _check_controller(where, self.controller)
 
     @property
     def words(self) -> str:
@@ -196,12 +197,8 @@ def _plans(where: str, plan: Any) -> tuple[Mapping[str, Any], ...]:
     return tuple(plans)
 
 
-def _check_acting(where: str, controller: Any, planned: bool) -> None:
-    """SimulationError for a wrong controller, or for both a controller and a plan."""
-    if planned and controller is not None:
-        raise SimulationError(
-            f"{where}: has a controller and a plan: the plan is tracked: leave one out"
-        )
+def _check_controller(where: str, controller: Any) -> None:
+    """SimulationError for what is no controller of one phase."""
     if isinstance(controller, Phases):
         raise SimulationError(
             f"{where}: controller is Phases: give each of its controllers a phase of the sequence"

@@ -1,16 +1,17 @@
 """``SequenceRun``: the motion of a sequence, and the outcome of each phase."""
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from ..basics.near_names import NearNames
 from ..basics.short_repr import brief
 from ..motion.derived import AGAIN
+from ..motion.landing import Landing
 from ..motion.joined import JoinedAgain, joined
 from ..motion.trajectory import Trajectory
 from ..planning.result.plan import Plan
-from .phase import Phase
+from .phase import LANDING, Phase
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,17 +64,21 @@ class SequenceRun(NearNames):
     __repr__ = brief
 
 
-def whole(parts: list[Trajectory], runs: list[PhaseRun], phases: Iterable[Phase]) -> Trajectory:
+def whole(parts: list[Trajectory], runs: list[PhaseRun], phases: Sequence[Phase]) -> Trajectory:
     """Return the motion of all phases as one, with their outcomes and warnings in its info."""
     motion = joined(parts)
     warnings = list(motion.info.get("warnings", []))
     for run, phase in zip(runs, phases, strict=False):
         if run.plan is not None and not run.plan.success:
-            warnings.append(f"the plan of phase {run.name!r} did not succeed: see its report")
+            warnings.append(_without_plan(run, phase))
         if phase.until is not None and run.ended_by == "duration":
             warnings.append(
                 f"phase {run.name!r} ended without {phase.words} within {phase.duration:.6g} s"
             )
+    told = all(run.plan is None or run.plan.success for run in runs)
+    for k, run in enumerate(runs[:-1]):
+        if told and phases[k].until == LANDING and run.ended_by != "duration":
+            warnings += _fall(motion, run, runs[-1])
     outcomes = {"phases": [run.info() for run in runs], "warnings": warnings}
     motion = replace(motion, info=motion.info | outcomes)
     repeats = [vars(part).get(AGAIN) for part in parts]
@@ -82,6 +87,33 @@ def whole(parts: list[Trajectory], runs: list[PhaseRun], phases: Iterable[Phase]
             repeats, [run.end for run in runs], (motion.q.shape[1], motion.v.shape[1])
         )
     return motion
+
+
+def _fall(motion: Trajectory, flight: PhaseRun, last: PhaseRun) -> list[str]:
+    """Return the warning of a motion that lands after a flight and then does not stand."""
+    assert motion.model is not None
+    landing = Landing(motion.model, motion)
+    if landing.landed() is not False:
+        return []
+    return [
+        f"phase {last.name!r}, at t = {last.end:.4g} s: after the landing at {flight.end:.4g} s "
+        f"({flight.ended_by}) it does not stand, or was on its back (its torso's z axis is down to "
+        f"{landing.least_upright():.2g}, 1 is level): let phase {flight.name!r} end in another "
+        "attitude or turn less, or damp the tail more"
+    ]
+
+
+def _without_plan(run: PhaseRun, phase: Phase) -> str:
+    """Return the warning of a phase whose plans all fail."""
+    assert run.plan is not None
+    told = run.plan.report
+    off, tried = told["open_loop_goal_error_deg"], len(phase.plan)
+    acts = "nothing" if phase.controller is None else "its controller"
+    return (
+        f"phase {run.name!r}, at t = {run.begin:.4g} s: no true plan for any of its {tried} goals: "
+        f"{acts} moves the tail; the nearest plan ends {'far' if off is None else f'{off:.3g} deg'} "
+        f"from its goal ({told['status']}); {told['advice']}"
+    )
 
 
 def motion_until(parts: list[Trajectory], last: Trajectory | None) -> Trajectory | None:
