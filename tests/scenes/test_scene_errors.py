@@ -223,6 +223,25 @@ def test_one_command_makes_the_landing_and_phases_can_be_changed(capsys):
         scene.simulate(t_span=0.1)
 
 
+@pytest.mark.slow
+def test_the_landing_survives_other_tails_or_says_in_one_message_why_not():
+    """Feet first, then upright and at rest on them; else one warning names the phase and time."""
+    landed = 0
+    for length in (100, 137.5, 175, 212.5, 250):
+        for mass in (2, 3.6, 5.2, 6.8, 8.4, 10):
+            changes = {"tail_length": f"{length} mm", "tail_mass": f"{mass} g"}
+            scene = st.scenario(KICK, zoo.folder("ground"), changes)
+            motion = scene.simulate()
+            told = st.summary(scene.model, motion)
+            lands = told["landed"] and told["landing_group"] == "feet"
+            why = [words for words in motion.warnings if words.startswith("phase")]
+            landed += lands
+            with row(length, mass, why):
+                assert motion.info["phases"][1]["plan"]["success"] or "tried" in why[0]
+                assert len(why) == (not lands) and all(" at t = " in words for words in why)
+    assert landed >= 27
+
+
 def test_what_a_phase_cannot_be_is_named_all_at_once(tmp_path):
     rows = {
         'name = "kick"': ('nam = "kick"', r"phase\[0\]: key: value 'nam': .*'name'"),
@@ -230,8 +249,8 @@ def test_what_a_phase_cannot_be_is_named_all_at_once(tmp_path):
         "duration = 1.5": ("", r"phase\[1\].duration: no value"),
         'until = "airborne"': ("until = 3", "until"),
         'clearance = "10 mm"': ('clearance = "10 s"', r"phase\[0\].clearance: value '10 s'"),
-        'torso_rate = "free"': ('torso_rat = 1', r"phase\[1\].plan.goal: key: value 'torso_rat'"),
-        "[phase.plan]": ("[phase.plan]\nstart = {}", "'right': plan.start: value {}"),
+        '_rate = "free"': ('_rat = 1', r"phase\[1\].plan\[0\].goal: key: value 'torso_rat'"),
+        "[[phase.plan]]": ("[[phase.plan]]\nstart = {}", "'right': plan.start: value {}"),
         'name = "land"': ('name = "kick"', "'kick'"),
         "rtol = 1e-5": ("duration = 2.0", r"simulate.duration: .*\[\[phase\]\]"),
         'delta = "-15 deg"': ('delta = "-15 deg"\nmoves = []', r"simulate.legs.moves: .*phase"),

@@ -166,6 +166,7 @@ def test_a_kick_lands_as_planned_and_a_passive_tail_falls_over():
     passive = sequence(kick(), fly, land).simulate(*settled())
     found = st.summary(rat(), passive.trajectory)
     assert not (found["landed"] and found["landing_group"] == "feet")
+    assert "phase 'land', at t = " in str(passive.trajectory.warnings)
 
 
 def check_planned(landed):
@@ -194,10 +195,25 @@ def test_of_several_plans_the_first_true_one_is_taken():
     assert run.phases[1].plan.success and run.phases[1].plan.duration > 0.5
     run = sequence(kick(), st.Phase("right", 0.02, plan=hopeless)).simulate(*settled())
     assert not run.phases[1].plan.success
-    assert "plan of phase 'right' did not succeed" in str(run.trajectory.warnings)
-    wrong = st.Phase("right", 1.0, plan=plan(mesh=st.Mesh(intervals=-3)))
-    with pytest.raises(st.PlanningError, match=r"phase 'right': mesh\.intervals: value -3"):
+    assert "'right', at t = 0.46 s: no true plan (1 tried)" in str(run.trajectory.warnings)
+    wrong = st.Phase("right", 1.0, plan=plan(intervals=-3))
+    with pytest.raises(st.PlanningError, match="phase 'right': intervals: value -3"):
         sequence(kick(), wrong).simulate(*settled())
+
+
+def test_a_plan_that_fails_is_not_tracked_and_a_torque_that_suffices_is_told():
+    """The phase's own controller acts; with the torque of the message there is a plan."""
+    weak = [
+        plan(bounds=st.Bounds(angle=pi / 3, torque=torque), retries=0) for torque in (4e-3, 8e-3)
+    ]
+    right = st.Phase("right", 0.02, controller=DAMPING, plan=weak[:1])
+    run = sequence(kick(), right).simulate(*settled())
+    motion = run.trajectory
+    inside = motion.t > run.phases[1].begin
+    np.testing.assert_allclose(motion.tau[inside], -1e-3 * motion.v[inside, 6:], atol=1e-12)
+    assert "plan[0].bounds.torque: 0.008 N m suffices" in str(motion.warnings)
+    right = replace(right, plan=weak)
+    assert sequence(kick(), right).simulate(*settled()).phases[1].plan.success
 
 
 WRONG = [
@@ -212,7 +228,6 @@ WRONG = [
     ({"plan": 3}, "plan: value 3"),
     ({"plan": {"start": 3}}, "plan.start: value 3"),
     *(({"plan": {key: {}}}, f"plan.{key}: value {{}}") for key in ("free_start", "design")),
-    ({"plan": {}, "controller": DAMPING}, "a controller and a plan"),
     ({"moves": [{"delta": 1.0, "rate": 1.0}]}, "needs at"),
     ({"moves": [{"before_landing": 0.1, "delta": 1.0}]}, "key"),
     ({"moves": [{"att": 0.1}]}, "'at'"),

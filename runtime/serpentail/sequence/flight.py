@@ -63,21 +63,20 @@ def planned_flight(model: Model, phase: Phase, state: State, angles: np.ndarray)
 def _advice(
     model: Model, phase: Phase, failed: list[Plan], state: State, angles: np.ndarray
 ) -> str:
-    """Return which torque suffices: what a search has told, or what one more of the last goal tells
-    that may use more. Of a longer duration, which only a higher jump gives, nothing is said.
+    """Return which torque suffices: what a search has told, or what the plans tell with more. Of a
+    longer duration, which only a higher jump gives, nothing is said.
     """
     for k, found in enumerate(failed):
         if "torque" in (found.report["advice"] or ""):
             return f"plan[{k}].{found.report['advice']}"
-    bounds, words = failed[-1].problem.bounds, "give it further goals, or change its jump"
-    if bounds.torque is None or failed[-1].report["stopped"]:
-        return words
-    more = replace(bounds, torque=MORE * np.asarray(bounds.torque))
-    told = f"plan[{len(failed) - 1}].bounds.torque: {np.max(more.torque):.3g} N m"
-    wider = {**phase.plan[-1], "bounds": more}
-    if _attempt(model, phase, wider, state, angles)[0].success:
-        return f"{told} suffices"
-    return f"{told} does not suffice either: {words}"
+    for k, found in enumerate(failed):
+        bounds = found.problem.bounds
+        if bounds.torque is not None and not found.report["stopped"]:
+            more = replace(bounds, torque=MORE * np.asarray(bounds.torque))
+            wider = {**phase.plan[k], "bounds": more}
+            if _attempt(model, phase, wider, state, angles)[0].success:
+                return f"plan[{k}].bounds.torque: {np.max(more.torque):.3g} N m suffices"
+    return f"nor with {MORE:g} times the torque: give it further goals, or change its jump"
 
 
 def _attempt(

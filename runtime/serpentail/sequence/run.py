@@ -7,8 +7,8 @@ from typing import Any
 from ..basics.near_names import NearNames
 from ..basics.short_repr import brief
 from ..motion.derived import AGAIN
-from ..motion.landing import Landing
 from ..motion.joined import JoinedAgain, joined
+from ..motion.landing import Landing
 from ..motion.trajectory import Trajectory
 from ..planning.result.plan import Plan
 from .phase import LANDING, Phase
@@ -75,10 +75,10 @@ def whole(parts: list[Trajectory], runs: list[PhaseRun], phases: Sequence[Phase]
             warnings.append(
                 f"phase {run.name!r} ended without {phase.words} within {phase.duration:.6g} s"
             )
-    told = all(run.plan is None or run.plan.success for run in runs)
-    for k, run in enumerate(runs[:-1]):
-        if told and phases[k].until == LANDING and run.ended_by != "duration":
-            warnings += _fall(motion, run, runs[-1])
+    planned = all(run.plan is None or run.plan.success for run in runs)
+    for flight, phase in zip(runs[:-1], phases, strict=False):
+        if planned and phase.until == LANDING and flight.ended_by != "duration":
+            warnings += _fall(motion, flight, runs[-1])
     outcomes = {"phases": [run.info() for run in runs], "warnings": warnings}
     motion = replace(motion, info=motion.info | outcomes)
     repeats = [vars(part).get(AGAIN) for part in parts]
@@ -96,10 +96,8 @@ def _fall(motion: Trajectory, flight: PhaseRun, last: PhaseRun) -> list[str]:
     if landing.landed() is not False:
         return []
     return [
-        f"phase {last.name!r}, at t = {last.end:.4g} s: after the landing at {flight.end:.4g} s "
-        f"({flight.ended_by}) it does not stand, or was on its back (its torso's z axis is down to "
-        f"{landing.least_upright():.2g}, 1 is level): let phase {flight.name!r} end in another "
-        "attitude or turn less, or damp the tail more"
+        f"phase {last.name!r}, at t = {last.end:.4g} s: after the {flight.ended_by} it does not "
+        f"stand up and keep off its back; let phase {flight.name!r} end in another attitude, or turn less"
     ]
 
 
@@ -107,12 +105,12 @@ def _without_plan(run: PhaseRun, phase: Phase) -> str:
     """Return the warning of a phase whose plans all fail."""
     assert run.plan is not None
     told = run.plan.report
-    off, tried = told["open_loop_goal_error_deg"], len(phase.plan)
-    acts = "nothing" if phase.controller is None else "its controller"
+    off = told["open_loop_goal_error_deg"]
+    acts = "the tail is passive" if phase.controller is None else "its controller moves the tail"
+    far = "far" if off is None else f"{off:.3g} deg"
     return (
-        f"phase {run.name!r}, at t = {run.begin:.4g} s: no true plan for any of its {tried} goals: "
-        f"{acts} moves the tail; the nearest plan ends {'far' if off is None else f'{off:.3g} deg'} "
-        f"from its goal ({told['status']}); {told['advice']}"
+        f"phase {run.name!r}, at t = {run.begin:.4g} s: no true plan ({len(phase.plan)} tried), so "
+        f"{acts}; the nearest ends {far} from its goal ({told['status']}); {told['advice']}"
     )
 
 
