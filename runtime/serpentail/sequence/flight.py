@@ -92,9 +92,11 @@ def _attempt(
 
 
 def _miss(attempt: Plan) -> float:
-    """Return how far (deg) a plan's true motion misses the goal; -1 for a successful plan."""
-    error = attempt.report["open_loop_goal_error_deg"]
-    return -1.0 if attempt.success else np.inf if error is None else float(error)
+    """Return how far (deg) a plan's true motion misses the goal; -1 for a successful plan, inf for
+    one of an easier problem.
+    """
+    error, easier = attempt.report["open_loop_goal_error_deg"], attempt.report["advice"]
+    return -1.0 if attempt.success else np.inf if error is None or easier else float(error)
 
 
 def landing_time(model: Model, state: State, goal: Goal, angles: np.ndarray) -> float:

@@ -97,7 +97,7 @@ def _fall(motion: Trajectory, flight: PhaseRun, last: PhaseRun) -> list[str]:
         return []
     return [
         f"phase {last.name!r}, at t = {last.end:.4g} s: after the {flight.ended_by} it does not "
-        f"stand, or was on its back: let phase {flight.name!r} end in another attitude, or turn less"
+        f"stand, or was on its back: let phase {flight.name!r} end otherwise, or turn less"
     ]
 
 
