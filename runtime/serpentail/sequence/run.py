@@ -70,7 +70,7 @@ def whole(parts: list[Trajectory], runs: list[PhaseRun], phases: Sequence[Phase]
     warnings = list(motion.info.get("warnings", []))
     for run, phase in zip(runs, phases, strict=False):
         if run.plan is not None and not run.plan.success:
-            warnings.append(_without_plan(run, phase))
+            warnings.append(_without_plan(run, phase, run.plan.report))
         if phase.until is not None and run.ended_by == "duration":
             warnings.append(
                 f"phase {run.name!r} ended without {phase.words} within {phase.duration:.6g} s"
@@ -101,10 +101,8 @@ def _fall(motion: Trajectory, flight: PhaseRun, last: PhaseRun) -> list[str]:
     ]
 
 
-def _without_plan(run: PhaseRun, phase: Phase) -> str:
+def _without_plan(run: PhaseRun, phase: Phase, told: dict[str, Any]) -> str:
     """Return the warning of a phase whose plans all fail."""
-    assert run.plan is not None
-    told = run.plan.report
     off = told["open_loop_goal_error_deg"]
     acts = "the tail is passive" if phase.controller is None else "its controller moves the tail"
     far = "far" if off is None else f"{off:.3g} deg"
