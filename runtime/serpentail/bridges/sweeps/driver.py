@@ -1,10 +1,11 @@
-"""Sends the points of a sweep in blocks, and takes notice of their rows."""
+"""Sends the points of a sweep in blocks, and keeps their rows."""
 
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import suppress
+from dataclasses import dataclass, field
 from queue import Empty, SimpleQueue
 from typing import Any, NamedTuple
 
@@ -12,21 +13,60 @@ import numpy as np
 
 from ...basics.errors import SerpentailError, SweepError
 from ...basics.progress import Stage
-from .blocks import Gate, Group
 from .executors import Place, place_of
+from .processes import Block, BlockSettings, run_block
 from .result import Sweep
 from .runs import run_points
-from .supervision import Block, BlockSettings, Result, run_block
-from .worker import model_of
+from .store import Row
+from .worker import Bundle, model_of
 
+LEAST_S = 1.0  # s of work that a block is to have
+MOST_S = 60.0  # s of work that a kill may cost
+TASKS_PER_S = 30  # that blocks are made for
+GROWTH = 8  # times more points than in the block before
+MOST_IN_BLOCK = 50_000
+SHARE = 3  # blocks a worker that what is left is cut into, so that all end at about one time
+SHORTEST = 0.25  # of its usual time that a block has in the end
 AHEAD = 2  # blocks a worker, so that none waits
 TRIES = 4  # of a block whose worker is gone
 LOOK_S = 0.2  # s between looks at the executor
-WAIT_S = 0.02  # s for a block, until more may be sent
 HERE_S = 3.0  # s of work of flights that is not worth other processes
 GONE = (
     "executor: its workers are gone: finished rows are kept, and the same call resumes from there"
 )
+
+
+@dataclass
+class Group:
+    """Points of one model without rows, that are not sent yet; pace: seconds that one takes."""
+
+    bundle: Bundle | None
+    left: np.ndarray
+    pace: float = 0.0
+    largest: int = field(default=0, init=False)  # block that came back
+
+    def take(self, workers: int) -> np.ndarray:
+        """Return the numbers of the points of the next block."""
+        count = block_size(self.pace, self.largest, len(self.left), workers)
+        block, self.left = np.split(self.left, [count])
+        return block
+
+    def learn(self, rows: list[Row]) -> None:
+        """Note how long a block took; in a small one, the start of a worker counts too much."""
+        pace = sum(row.seconds for row in rows) / len(rows)
+        larger = len(rows) >= 2 * self.largest
+        self.pace = pace if larger else 0.9 * self.pace + 0.1 * pace
+        self.largest = max(self.largest, len(rows))
+
+
+def block_size(pace: float, largest: int, left: int, workers: int) -> int:
+    """Return how many points the next block has, of those that are left; one to begin with.
+
+    pace: seconds a point; largest: points of the largest block before.
+    """
+    usual = min(max(LEAST_S, workers / TASKS_PER_S), MOST_S) / max(pace, 1e-9)
+    in_the_end = max(SHORTEST * usual, left / (SHARE * workers))
+    return max(1, round(min(usual, in_the_end, GROWTH * largest, MOST_IN_BLOCK, left)))
 
 
 class Work(NamedTuple):
@@ -43,17 +83,13 @@ class Driver:
     def __init__(self, sweep: Sweep, settings: BlockSettings, name: str):
         self.store, self.posed, self.spent = sweep.store, sweep.posed, sweep.spent
         self.settings, self.name = settings, name
-        models = range(len(self.posed.bundles))
-        self.groups = [Group(self.posed, model, self.store.done) for model in models]
+        missing = np.flatnonzero(~self.store.done)
+        models = self.posed.models(missing)
+        bundles = enumerate(self.posed.bundles)
+        # groups take turns, so that workers make all models at once
+        self.groups = deque(Group(bundle, missing[models == k]) for k, bundle in bundles)
         self.done, self.failed = int(self.store.done.sum()), self.store.failed
-        self.sent: dict[Future, Work] = {}
-        self.ended: SimpleQueue[Future] = SimpleQueue()
         self.lost: deque[Work] = deque()  # blocks whose worker is gone
-
-    @property
-    def left(self) -> bool:
-        """Whether there are points that are not sent yet."""
-        return any(group.left for group in self.groups)
 
     def drive(self, executor: Any) -> None:
         """Run all points; NotWritten if rows cannot be written, SweepError if no worker is left."""
@@ -62,7 +98,7 @@ class Driver:
             self._tell(stage)
             if executor is None and self.settings.limit is None and self.settings.together:
                 self._run_here(stage)
-            if self.left:
+            if any(len(group.left) for group in self.groups):
                 with place_of(executor) as place:
                     self._run_at(place, stage)
             self._tell(stage)
@@ -70,84 +106,78 @@ class Driver:
 
     def _run_here(self, stage: Stage) -> None:
         """Run flights in this process for as long as others would take to begin."""
-        begun = time.perf_counter()
-        for group in self.groups:
-            model = model_of(group.bundle, self.posed.job)
-            while group.left and time.perf_counter() - begun < HERE_S:
-                numbers = group.take(1)
-                points = zip(numbers.tolist(), self.posed.axes.at(numbers), strict=True)
-                parts = run_points(self.posed.job, model, dict(points))
-                rows = [row for part in parts for row in part]
-                self._keep(group, Result.of(rows, len(numbers), self.settings.store))
-                self._tell(stage)
+        begun, job = time.perf_counter(), self.posed.job
+        while time.perf_counter() - begun < HERE_S and (work := self._next()):
+            numbers = work.numbers
+            points = dict(zip(numbers.tolist(), self.posed.axes.at(numbers), strict=True))
+            parts = run_points(job, model_of(work.group.bundle, job), points)
+            self._keep(work, [row for part in parts for row in part])
+            self._tell(stage)
 
     def _run_at(self, place: Place, stage: Stage) -> None:
         """Keep all workers at work until no point is left."""
-        blocks, gate, looked = self._blocks(), Gate(time.perf_counter()), -LOOK_S
+        ended: SimpleQueue[Future] = SimpleQueue()
+        sent: dict[Future, Work] = {}
+        work, looked = self._next(), -LOOK_S
         try:
-            while self.sent or self.lost or self.left:
-                now = time.perf_counter()
-                if now - looked >= LOOK_S:
-                    looked = now
+            while work or sent:
+                if time.perf_counter() - looked >= LOOK_S:
+                    looked = time.perf_counter()
                     self.spent.workers = _asked(place.workers)
                     if not place.alive():
                         raise SweepError(GONE)
                     self._tell(stage)
-                # as many blocks as the workers and the scheduler bear
-                while len(self.sent) < AHEAD * self.spent.workers and gate.passes(now):
-                    work = self.lost.popleft() if self.lost else next(blocks, None)
-                    if work is None:
-                        break
-                    future = _asked(place.submit, run_block, self._block(work))
-                    self.sent[future] = work
-                    future.add_done_callback(self.ended.put)
+                while work and len(sent) < AHEAD * self.spent.workers:
+                    columns = self.posed.axes.columns(work.numbers)
+                    block = Block(self.settings, work.group.bundle, columns, work.numbers)
+                    future = _asked(place.submit, run_block, block)
+                    sent[future] = work
+                    future.add_done_callback(ended.put)
+                    work = self._next()
                 with suppress(Empty):
-                    self._receive(self.ended.get(timeout=WAIT_S), place)
+                    future = ended.get(timeout=LOOK_S)
+                    self._receive(sent.pop(future), future, place)
+                    work = work or self._next()
         finally:
-            for future in self.sent:
+            for future in sent:
                 future.cancel()
 
-    def _receive(self, future: Future, place: Place) -> None:
+    def _next(self) -> Work | None:
+        """Return the next block to send; None if there is none."""
+        if self.lost:
+            return self.lost.popleft()
+        for _ in self.groups:
+            self.groups.rotate(-1)
+            if len(self.groups[0].left):
+                return Work(self.groups[0], self.groups[0].take(self.spent.workers))
+        return None
+
+    def _receive(self, work: Work, future: Future, place: Place) -> None:
         """Keep the rows of a block that has ended; put it back if its worker was lost."""
-        work = self.sent.pop(future)
         try:
-            result = future.result()
+            rows = future.result()
         except SerpentailError:
             raise
         except Exception as reason:  # whatever an executor loses work by
             if work.tries + 1 >= TRIES or not place.alive():
                 raise _gone(reason) from reason
             self.lost.append(work._replace(tries=work.tries + 1))
-        else:
-            self._keep(work.group, result)
+            return
+        if isinstance(rows, str):
+            raise SweepError(rows)
+        self._keep(work, rows)
 
-    def _blocks(self) -> Iterator[Work]:
-        """Yield points of the groups in turn."""
-        while self.left:
-            for group in self.groups:
-                if group.left:
-                    yield Work(group, group.take(self.spent.workers))
-
-    def _block(self, work: Work) -> Block:
-        """Return points as they travel."""
-        axes, places = self.posed.axes.part(work.numbers)
-        return Block(self.settings, work.group.bundle, axes, places, work.numbers)
-
-    def _keep(self, group: Group, result: Result) -> None:
-        """Take notice of the rows of a block."""
-        if result.refusal:
-            raise SweepError(result.refusal)
-        points = 0
-        if result.shard is not None:
-            self.store.accept(result.shard)
-            points = result.shard.size
-            self.done += points
-            self.failed += result.shard.failed
-            group.pace.learn(points, result.seconds)
-        self.spent.points += points
-        self.spent.hung += result.hung
+    def _keep(self, work: Work, rows: list[Row]) -> None:
+        """Keep the rows of a block."""
+        self.store.accept(rows)
+        self.done += len(rows)
+        self.failed += sum(row.error is not None for row in rows)
+        if rows:
+            work.group.learn(rows)
+        self.spent.points += len(rows)
+        self.spent.hung += len(work.numbers) - len(rows)
         self.spent.blocks += 1
-        self.spent.busy_s += result.seconds
+        self.spent.busy_s += sum(row.seconds for row in rows)
 
     def _tell(self, stage: Stage) -> None:
         failed = f", {self.failed} failed" if self.failed else ""

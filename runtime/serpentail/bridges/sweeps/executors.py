@@ -3,16 +3,15 @@
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager
-from dataclasses import dataclass
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ...basics.checks import refusal
 from ...basics.errors import SweepError
 from ...basics.extras import needed
 from ...compiling.threads import checked_threads, threads
-from .supervision import ending
+from .processes import ending
 
 CHOICES = (
     'None, "processes", "processes:4", "dask", "dask:tcp://host:8786", "dask:scheduler.json", or '
@@ -22,8 +21,7 @@ PATIENCE_S = 30  # s to wait for a scheduler
 RETRIES = 3  # by Dask, of a task whose worker is gone
 
 
-@dataclass(frozen=True)
-class Place:
+class Place(NamedTuple):
     """Where blocks are run; ``workers`` returns how many are at work now."""
 
     submit: Callable[..., Future]
@@ -37,10 +35,8 @@ def place_of(executor: Any) -> Iterator[Place]:
     name = executor if isinstance(executor, str) else "processes" if executor is None else ""
     kind, _, rest = name.partition(":")
     if kind == "processes":
-        count = threads()
-        if rest:
-            asked = int(rest) if rest.isdecimal() else rest
-            count = checked_threads("executor: processes", asked, SweepError)
+        asked = int(rest) if rest.isdecimal() else rest or threads()
+        count = checked_threads("executor: processes", asked, SweepError)
         pool = ThreadPoolExecutor(count, "serpentail-sweep")  # each thread controls one process
         try:
             yield Place(pool.submit, lambda: count)
@@ -61,32 +57,28 @@ def place_of(executor: Any) -> Iterator[Place]:
 def _dask(address: str) -> Iterator[Place]:
     """Dask's workers: of a cluster on this machine, or of a scheduler's address or file."""
     distributed = needed("distributed", "dask")
-    cluster = None
-    if not address:
-        # threads of this process, because each block has a process of its own
-        cluster = distributed.LocalCluster(
-            n_workers=1,
-            threads_per_worker=threads(),
-            processes=False,
-            dashboard_address=None,
-            scheduler_kwargs={"dashboard_address": ":0"},  # any port: others may have sweeps
-        )
-    key = "scheduler_file" if Path(address).suffix == ".json" else "address"
-    try:
-        client = distributed.Client(**{key: cluster or address}, timeout=PATIENCE_S)
-    except (OSError, ValueError) as reason:
-        raise SweepError(
-            f"executor: no scheduler of Dask at {address!r} ({reason}): start `dask scheduler`, "
-            "and give its address or its file"
-        ) from None
-    try:
-        pool = client.get_executor(pure=False, retries=RETRIES)
+    where = {"scheduler_file" if Path(address).suffix == ".json" else "address": address}
+    with ExitStack() as closing:
+        try:
+            if not address:
+                # threads of this process, because each block has a process of its own
+                where["address"] = closing.enter_context(
+                    distributed.LocalCluster(
+                        n_workers=1,
+                        threads_per_worker=threads(),
+                        processes=False,
+                        dashboard_address=None,
+                        scheduler_kwargs={"dashboard_address": ":0"},  # others may have sweeps
+                    )
+                )
+            client = closing.enter_context(distributed.Client(**where, timeout=PATIENCE_S))
+        except (OSError, ValueError) as reason:
+            raise SweepError(
+                f"executor: no scheduler of Dask at {address!r} ({reason}): start `dask scheduler`,"
+                " and give its address or its file"
+            ) from None
         yield Place(
-            pool.submit,
+            client.get_executor(pure=False, retries=RETRIES).submit,
             lambda: max(1, sum(client.nthreads().values())),
             lambda: client.status == "running",
         )
-    finally:
-        client.close()
-        if cluster is not None:
-            cluster.close()

@@ -1,12 +1,12 @@
 """The points of a sweep: all combinations of its grids, and of the samples between bounds.
 
-Each point is computed from its number, so that a sweep of millions needs no list of them.
+Each point is taken from the axes by its number, so that a sweep of millions needs no list of them.
 """
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -15,11 +15,9 @@ from ...basics.checks import refusal, shown, whole_number
 from ...basics.errors import SweepError
 from .axis import Grid, Spread, in_units, spread
 
-FEW_VALUES = 1000  # of a grid, which travel with every block
+AT_ONCE = 1000  # points that are made together
 MOST_POINTS = 10_000_000
 MOST_SEED = 2**63 - 1
-PART = 1024  # samples that are drawn together
-ROUNDS = 6  # of the permutation of a Latin hypercube
 Point = dict[str, Any]  # name -> plain data
 Names = tuple[str, ...]
 Units = Mapping[str, str | Sequence[str] | None]  # by name; None: any unit, in SI
@@ -54,8 +52,8 @@ class Axes:
 
     def __iter__(self) -> Iterator[Point]:
         """Yield the points in order."""
-        for first in range(0, len(self), FEW_VALUES):
-            yield from self.at(range(first, min(first + FEW_VALUES, len(self))))
+        for first in range(0, len(self), AT_ONCE):
+            yield from self.at(range(first, min(first + AT_ONCE, len(self))))
 
     def measured(self, units: Units) -> "Axes":
         """Return the axes with texts such as "2 g" as numbers, for the names that have a unit."""
@@ -78,40 +76,33 @@ class Axes:
         """Return the place on each grid, and among the samples, of the points of some numbers."""
         return np.unravel_index(np.asarray(numbers, np.int64), self.sizes)
 
-    def samples(self, places: np.ndarray) -> dict[str, list]:
-        """Return the numbers of each spread at some places among the samples."""
+    @cached_property
+    def samples(self) -> dict[str, np.ndarray]:
+        """Return all samples (points, ...) of each spread."""
         if not self.spreads:
             return {}
-        sizes = [axis.low.size for axis in self.spreads.values()]
+        ends = np.cumsum([axis.low.size for axis in self.spreads.values()])
         kind = next(iter(self.spreads.values())).kind  # which all have
-        unit = drawn(kind, places, sum(sizes), self.seed, self.points)
-        parts = np.split(unit, np.cumsum(sizes)[:-1], axis=1)
+        parts = np.split(drawn(kind, self.points, int(ends[-1]), self.seed), ends[:-1], axis=1)
         pairs = zip(self.spreads.items(), parts, strict=True)
-        return {name: axis.at(part).tolist() for (name, axis), part in pairs}
+        return {name: axis.at(part) for (name, axis), part in pairs}
 
-    def at(self, numbers: Sequence[int] | np.ndarray) -> list[Point]:
-        """Return the points of some numbers: the last axis changes first, spreads together."""
-        places = self.places(numbers)
-        points: dict[str, list] = {}
+    def columns(self, numbers: Sequence[int] | np.ndarray) -> dict[str, list]:
+        """Return the points of some numbers by names: the last axis changes first."""
+        places, found = self.places(numbers), {}
         for (names, columns), where in zip(self.grids.items(), places, strict=False):
             for name, column in zip(names, columns, strict=True):
-                points[name] = [column[k] for k in where]
-        points |= self.samples(places[-1])
-        return [dict(zip(points, row, strict=True)) for row in zip(*points.values(), strict=True)]
+                found[name] = [column[k] for k in where.tolist()]
+        return found | {name: array[places[-1]].tolist() for name, array in self.samples.items()}
 
-    def part(self, numbers: np.ndarray) -> tuple["Axes", np.ndarray]:
-        """Return axes with the values that some points need, and the points' numbers there.
+    def at(self, numbers: Sequence[int] | np.ndarray) -> list[Point]:
+        """Return the points of some numbers."""
+        return points_of(self.columns(numbers))
 
-        Grids of few values stay whole.
-        """
-        if max(self.sizes[: len(self.grids)], default=0) <= FEW_VALUES:
-            return self, numbers
-        places, grids = list(self.places(numbers)), {}
-        for k, (names, columns) in enumerate(self.grids.items()):
-            used, places[k] = np.unique(places[k], return_inverse=True)
-            grids[names] = [[column[i] for i in used] for column in columns]
-        axes = replace(self, grids=grids)
-        return axes, np.ravel_multi_index(tuple(places), axes.sizes)
+
+def points_of(columns: Mapping[str, list]) -> list[Point]:
+    """Return points, given by names."""
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
 def axes_of(over: Any, points: Any, seed: Any) -> Axes:
@@ -189,59 +180,13 @@ def _columns(names: Names, values: Sequence) -> Sequence[Sequence]:
     return list(zip(*values, strict=True))
 
 
-def drawn(kind: str, places: np.ndarray, size: int, seed: int, points: int) -> np.ndarray:
-    """Return numbers (k, size) from 0 to 1 at places (k,) from 0 to points - 1."""
-    parts, inside = np.divmod(places, PART)
-    numbers = np.empty((len(places), size))
-    for part in np.unique(parts):
-        here = parts == part
-        numbers[here] = _part(kind, int(part), size, seed, points)[inside[here]]
-    return numbers
+def drawn(kind: str, points: int, size: int, seed: int) -> np.ndarray:
+    """Return numbers (points, size) from 0 to 1."""
+    rng = np.random.default_rng(seed)
+    if kind == "random":
+        return rng.random((points, size))
+    from scipy.stats import qmc
 
-
-@lru_cache(maxsize=16)
-def _part(kind: str, part: int, size: int, seed: int, points: int) -> np.ndarray:
-    """Return the numbers (PART, size) of one part of the places."""
-    if kind == "sobol":
-        from scipy.stats import qmc
-
-        engine = qmc.Sobol(size, seed=np.random.default_rng(seed))
-        if part:
-            engine.fast_forward(part * PART)
-        return engine.random(PART)
-    bits = np.random.PCG64(seed)
-    bits.advance(part * PART * size)
-    numbers = np.random.Generator(bits).random((PART, size))
     if kind == "latin":
-        places = np.arange(part * PART, min((part + 1) * PART, points))
-        for k in range(size):
-            numbers[: len(places), k] += permuted(places, points, [seed, k])
-        numbers /= points
-    return numbers
-
-
-def permuted(places: np.ndarray, points: int, seed: list[int]) -> np.ndarray:
-    """Return where places go in a permutation of 0 to points - 1 that depends on a seed.
-
-    A Feistel network permutes the numbers below a power of 4; what falls outside goes through it
-    again until it is inside.
-    """
-    half = np.uint64(max(1, (max(points - 1, 1).bit_length() + 1) // 2))
-    mask = (np.uint64(1) << half) - np.uint64(1)
-    keys = np.random.default_rng(seed).integers(0, 2**64, ROUNDS, np.uint64)
-    numbers = places.astype(np.uint64)
-    outside = np.ones(len(numbers), bool)
-    while outside.any():
-        left, right = numbers[outside] >> half, numbers[outside] & mask
-        for key in keys:
-            left, right = right, left ^ (_mixed(right ^ key) & mask)
-        numbers[outside] = (left << half) | right
-        outside = numbers >= points
-    return numbers.astype(np.int64)
-
-
-def _mixed(numbers: np.ndarray) -> np.ndarray:
-    """Return numbers of 64 bits of which each bit depends on all bits of the given ones."""
-    for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
-        numbers = (numbers ^ (numbers >> np.uint64(shift))) * np.uint64(factor)
-    return numbers ^ (numbers >> np.uint64(31))
+        return qmc.LatinHypercube(size, seed=rng).random(points)
+    return qmc.Sobol(size, seed=rng).random_base2(math.ceil(math.log2(points)))[:points]

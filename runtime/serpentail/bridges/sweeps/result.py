@@ -19,8 +19,7 @@ from ...basics.short_repr import brief
 from .points import Axes, checked_row
 from .pose import Posed
 from .runs import run_point
-from .shards import AT_ONCE, Row
-from .store import Store
+from .store import AT_ONCE, Row, Store
 from .tables import dataset, flat, write
 from .worker import model_of
 

@@ -24,7 +24,7 @@ from ...simulation.simulate import simulate
 from ...simulation.start import INTERVALS
 from .job import DATA, STARTS, Job
 from .points import Point
-from .shards import Row
+from .store import Row
 
 ENDS = ("end_s", "q_end", "v_end", "kinetic_end_J", "potential_end_J")  # outputs by default
 OUTPUTS = (*ENDS, *UNITS)

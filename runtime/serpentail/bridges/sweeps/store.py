@@ -1,26 +1,86 @@
-"""The store of a sweep: a folder with a folder of shards for each sweep, or memory."""
+"""The store of a sweep: a folder of Parquet files of rows for each sweep, or memory."""
 
 import hashlib
 import json
+import math
 import os
-import secrets
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import re
+import zlib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from heapq import heappop, heappush
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from filelock import FileLock, Timeout
 
+from serpentail_scene.messages import one_line
+
 from ...basics.errors import SweepError
+from ...basics.extras import needed
 from ...basics.files import refuse_unusable, replacing
 from .axis import as_json
-from .shards import NAME, Row, Shard, ShardFolder, in_order, parquet_library
 
-MARK = "store.json"  # tells that a folder is a store, and which one
+MARK = "store.json"  # tells that a folder is a store
 SPEC = "sweep.json"
 LOCK = "lock"
 FORMAT = 2
+NAME = re.compile(r"\d{8}-\d{8}-\d+-\d+-[0-9a-f]{8}\.parquet")
+IN_FOLDER = 100_000  # numbers of points whose files share a folder, so that folders stay small
+AT_ONCE = 4096  # rows that are read together
+
+
+class Row(NamedTuple):
+    """Result of a point: its number, outcome (JSON) or the error in place of it, seconds."""
+
+    number: int
+    outcome: str | None
+    error: str | None
+    seconds: float
+
+
+class Shard(NamedTuple):
+    """Rows that are kept together: their first and last number, how many, how many failed."""
+
+    first: int
+    last: int
+    size: int
+    failed: int
+    where: Any  # path of the file, or the rows themselves
+
+    @classmethod
+    def at(cls, path: str) -> "Shard":
+        """Return the shard of a file, from its name."""
+        first, last, size, failed = map(int, os.path.basename(path).split("-")[:4])
+        return cls(first, last, size, failed, path)
+
+    def numbers(self) -> np.ndarray:
+        """Return the numbers of its rows."""
+        if self.size == self.last - self.first + 1:
+            return np.arange(self.first, self.last + 1)
+        return np.array([row.number for row in self.rows()])
+
+    def rows(self) -> Iterator[Row]:
+        """Yield its rows; SweepError if its file cannot be read."""
+        if not isinstance(self.where, str):
+            yield from self.where
+            return
+        arrow, parquet = parquet_library()
+        try:
+            with parquet.ParquetFile(self.where) as file:
+                if not file.schema_arrow.equals(_schema(arrow)):
+                    raise ValueError("it has other columns")
+                for batch in file.iter_batches(AT_ONCE):
+                    for row in map(Row, *(column.to_pylist() for column in batch.columns)):
+                        if not (self.first <= row.number <= self.last and row.seconds >= 0):
+                            raise ValueError(f"it has a row {row.number} of {row.seconds} s")
+                        yield row
+        except (OSError, ValueError, TypeError, arrow.ArrowException) as reason:
+            raise SweepError(
+                f"store: {self.where} cannot be read ({one_line(str(reason))}): delete it, and the "
+                "same call makes its rows again"
+            ) from None
 
 
 class Store:
@@ -50,10 +110,9 @@ class Store:
         if self.path is None:
             yield
             return
-        lock = FileLock(self.path / LOCK)
         try:
             self.path.mkdir(parents=True, exist_ok=True)
-            lock.acquire(timeout=0)
+            held = FileLock(self.path / LOCK).acquire(timeout=0)
         except Timeout:
             raise SweepError(
                 f"store: another process is writing {self.path}: wait for its end, look with "
@@ -61,19 +120,13 @@ class Store:
             ) from None
         except OSError as reason:
             raise SweepError(f"store: {reason}: name another folder") from None
-        try:
+        with held:
             self._begin(self.path)
             yield
-            # the shards of workers that were thought to be lost: others have their rows
-            for path in set(_files(self.folder)) - {shard.where for shard in self.shards}:
-                Path(path).unlink(missing_ok=True)
-        finally:
-            lock.release()
 
     def _begin(self, path: Path) -> None:
         """Mark the folder, take rows of sweeps that have the same, and find all rows."""
-        if not (path / MARK).exists():
-            _write(path / MARK, {"format": FORMAT, "id": secrets.token_hex(8)})
+        _write(path / MARK, {"format": FORMAT})
         if not (self.folder / SPEC).exists():
             for other in sorted(path.glob(f"{self.folder.name[:16]}-*/{SPEC}")):
                 self._adopt(other)
@@ -83,27 +136,13 @@ class Store:
     def _adopt(self, other: Path) -> None:
         """Take the rows of another sweep that are rows of this one, too."""
         try:
-            total, numbers_here = adopted_numbers(json.loads(other.read_bytes()), self.spec)
+            numbers_here = shared_numbers(json.loads(other.read_bytes()), self.spec)
+            for shard in _accepted(other.parent, np.zeros(len(numbers_here), bool)):
+                here = numbers_here[shard.numbers()].tolist()
+                rows = [row._replace(number=k) for k, row in zip(here, shard.rows(), strict=True)]
+                self.accept(row for row in rows if row.number >= 0 and not self.done[row.number])
         except (ArithmeticError, LookupError, MemoryError, RecursionError, TypeError, ValueError):
             raise SweepError(f"store: {other} is damaged: delete its folder") from None
-        for shard in _accepted(other.parent, np.zeros(total, bool)):
-            rows = [
-                row._replace(number=number)
-                for row, number in zip(
-                    shard.rows(), numbers_here(shard.numbers()).tolist(), strict=True
-                )
-                if number >= 0 and not self.done[number]
-            ]
-            if rows:
-                self.accept(Shard.of(sorted(rows)))
-
-    @property
-    def place(self) -> ShardFolder | None:
-        """Return where workers write shards; None: in memory."""
-        if self.path is None:
-            return None
-        marked = self.path / MARK
-        return ShardFolder(self.folder, marked, marked.read_bytes())
 
     def look(self) -> None:
         """Find the rows that there are now."""
@@ -111,12 +150,32 @@ class Store:
             self.done[:] = False
             self.shards = _accepted(self.folder, self.done)
 
-    def accept(self, shard: Shard) -> None:
-        """Take notice of a shard, and write it if that was not done."""
-        if self.path is not None and not isinstance(shard.where, str):
-            shard = shard.written(self.folder)
+    def accept(self, rows: Iterable[Row]) -> None:
+        """Keep rows, whole or not at all; NotWritten if they cannot be written."""
+        told = sorted(rows)
+        if not told:
+            return
+        failed = sum(row.error is not None for row in told)
+        shard = Shard(told[0].number, told[-1].number, len(told), failed, told)
+        if self.path is not None:
+            shard = self._written(shard)
         self.done[shard.numbers()] = True
         self.shards.append(shard)
+
+    def _written(self, shard: Shard) -> Shard:
+        """Return rows as a file."""
+        arrow, parquet = parquet_library()
+        schema = _schema(arrow)
+        columns = list(zip(*shard.where, strict=True))
+        arrays = [arrow.array(x, kind.type) for x, kind in zip(columns, schema, strict=True)]
+        check = zlib.crc32(np.array(columns[0], np.int64).tobytes())
+        first, last, size, failed, _ = shard
+        name = f"{first:08d}-{last:08d}-{size}-{failed}-{check:08x}.parquet"
+        path = self.folder / f"{first // IN_FOLDER:03d}" / name
+        with replacing(path) as part:
+            table = arrow.Table.from_arrays(arrays, schema=schema)
+            parquet.write_table(table, part, compression="zstd")
+        return shard._replace(where=str(path))
 
     @property
     def failed(self) -> int:
@@ -124,8 +183,17 @@ class Store:
         return sum(shard.failed for shard in self.shards)
 
     def rows(self) -> Iterator[Row]:
-        """Yield all rows in the order of their numbers."""
-        return in_order(self.shards)
+        """Yield all rows in the order of their numbers; few files are open at a time."""
+        opened: list[tuple[Row, Iterator[Row]]] = []  # a heap of the next row of each
+        for shard in [*sorted(self.shards, key=lambda shard: shard[:4]), None]:
+            while opened and (shard is None or opened[0][0].number < shard.first):
+                row, rest = heappop(opened)
+                yield row
+                if following := next(rest, None):
+                    heappush(opened, (following, rest))
+            if shard is not None:
+                rest = shard.rows()
+                heappush(opened, (next(rest), rest))
 
     def row(self, number: int) -> Row | None:
         """Return the row of a number; None if it has none."""
@@ -145,26 +213,31 @@ class Store:
             rows = [row for row in shard.rows() if not gone[row.number]]
             if len(rows) < shard.size:
                 self.shards.remove(shard)
-                if rows:
-                    self.accept(Shard.of(rows))
+                self.accept(rows)
                 if self.path is not None:
                     os.unlink(shard.where)
         self.done &= ~gone
 
 
-def _files(folder: Path) -> list[str]:
-    """Return the paths of shards in a folder, in the order of their first numbers."""
-    paths: list[str] = []
-    for inner in folder.glob("[0-9]*"):
-        with os.scandir(inner) as entries:
-            paths += [entry.path for entry in entries if NAME.fullmatch(entry.name)]
-    return sorted(paths)
+def parquet_library() -> tuple[Any, Any]:
+    """Return the modules that read and write rows; ExtraMissing if they are not installed."""
+    return needed("pyarrow", "parquet"), needed("pyarrow.parquet", "parquet")
+
+
+def _schema(arrow: Any) -> Any:
+    """Return the names and types of a file's columns."""
+    kinds = (arrow.int64(), arrow.string(), arrow.string(), arrow.float64())
+    return arrow.schema(list(zip(Row._fields, kinds, strict=True)))
 
 
 def _accepted(folder: Path, done: np.ndarray) -> list[Shard]:
-    """Return the shards of a folder but those that have rows of others, and mark rows as done."""
+    """Return the shards of a folder, and mark their rows as done.
+
+    A kill while rows are forgotten leaves these in two files: the second one is passed over.
+    """
     accepted = []
-    for shard in map(Shard.at, _files(folder)):
+    paths = [path for path in folder.glob("[0-9]*/*") if NAME.fullmatch(path.name)]
+    for shard in map(Shard.at, sorted(map(str, paths))):
         numbers = shard.numbers()
         if not done[numbers].any():
             done[numbers] = True
@@ -189,59 +262,38 @@ def _refuse_other(path: Path) -> None:
 
 
 def _write(path: Path, value: Any) -> None:
-    """Write plain data as JSON."""
-    with replacing(path) as part:
-        part.write_text(as_json(value), encoding="utf-8")
+    """Write plain data as JSON, unless the file is there."""
+    if not path.exists():
+        with replacing(path) as part:
+            part.write_text(as_json(value), encoding="utf-8")
 
 
-def adopted_numbers(
-    old: Mapping[str, Any], new: Mapping[str, Any]
-) -> tuple[int, Callable[[np.ndarray], np.ndarray]]:
-    """Return how many points an old sweep has, and what finds their numbers in a new one.
+def shared_numbers(old: Mapping[str, Any], new: Mapping[str, Any]) -> np.ndarray:
+    """Return the numbers that the points of an old sweep have in a new one; -1: none.
 
-    It returns -1 for points that the new sweep does not have. Both sweeps are told by their "spec",
-    see ``pose``.
+    Both sweeps are told by their "spec", see ``pose``. Of fewer or more samples the first ones are
+    the same, but not those of a Latin hypercube.
     """
-    old_sizes, new_sizes = _sizes(old), _sizes(new)
-    old_models, new_models = (
-        np.broadcast_to(np.array(spec["models"]), sizes)
-        for spec, sizes in ((old, old_sizes), (new, new_sizes))
+    places: list[dict] = []
+    for spec in (old, new):
+        places.append({tuple(names): rows for names, rows in spec["grids"]})
+        places[-1] |= {(): np.arange(spec["points"])} if spec["spreads"] else {}
+    sizes = [tuple(map(len, each.values())) for each in places]
+    latin = any(kind == "latin" for _, (kind, *_) in new["spreads"])
+    same = ["spreads", *(["seed"] if new["spreads"] else []), *(["points"] if latin else [])]
+    found = np.full(math.prod(sizes[0]), -1)
+    if places[0].keys() != places[1].keys() or any(old[name] != new[name] for name in same):
+        return found
+
+    # the numbers of the new sweep, with its axes in the order of the old one's
+    order = [list(places[1]).index(names) for names in places[0]]
+    models, others = (
+        np.broadcast_to(np.array(spec["models"]), size)
+        for spec, size in zip((old, new), sizes, strict=True)
     )
-    old_axes = {tuple(names): k for k, (names, _) in enumerate(old["grids"])}
-    possible = {tuple(names) for names, _ in new["grids"]} == old_axes.keys()
-    possible = possible and all(old[name] == new[name] for name in _same(new))
-
-    # for each new axis: which old one it was, and the new place of each old place
-    axes = []
-    for names, rows in new["grids"] if possible else ():
-        k = old_axes[tuple(names)]
-        places = {row: place for place, row in enumerate(rows)}
-        axes.append((k, np.array([places.get(row, -1) for row in old["grids"][k][1]])))
-    if new["spreads"]:
-        samples = np.arange(old["points"])
-        axes.append((-1, np.where(samples < new["points"], samples, -1)))
-
-    def numbers_in_new(numbers: np.ndarray) -> np.ndarray:
-        if not possible:
-            return np.full(len(numbers), -1)
-        places = np.unravel_index(numbers, old_sizes)
-        moved = [new_places[places[k]] for k, new_places in axes]
-        inside = tuple(np.maximum(x, 0) for x in moved)
-        there = np.all([x >= 0 for x in moved], axis=0)
-        there &= old_models[places] == new_models[inside]
-        return np.where(there, np.ravel_multi_index(inside, new_sizes), -1)
-
-    return int(np.prod(old_sizes)), numbers_in_new
-
-
-def _sizes(spec: Mapping[str, Any]) -> tuple[int, ...]:
-    """Return how many places each axis has."""
-    grids = tuple(len(rows) for _, rows in spec["grids"])
-    return (*grids, spec["points"]) if spec["spreads"] else grids
-
-
-def _same(spec: Mapping[str, Any]) -> list[str]:
-    """Return what another sweep must have equal so that equal samples have equal numbers."""
-    names = ["spreads", "seed"] if spec["spreads"] else ["spreads"]
-    latin = any(kind == "latin" for _, (kind, *_) in spec["spreads"])
-    return [*names, "points"] if latin else names
+    numbers = np.arange(others.size).reshape(sizes[1]).transpose(order)
+    both = [np.intersect1d(*(each[k] for each in places), True, True)[1:] for k in places[0]]
+    here, there = (np.ix_(*each) for each in zip(*both, strict=True))
+    shared = models[here] == others.transpose(order)[there]
+    found.reshape(sizes[0])[here] = np.where(shared, numbers[there], -1)
+    return found

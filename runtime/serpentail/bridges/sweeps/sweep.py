@@ -16,10 +16,10 @@ from .driver import Driver
 from .job import RUNS, STARTS, Job
 from .points import axes_of
 from .pose import pose
+from .processes import BlockSettings
 from .result import Sweep
 from .runs import ENDS, OUTPUTS
 from .store import Store
-from .supervision import BlockSettings
 from .worker import importing
 
 WITHOUT = ("watch", "threads", "parameters")  # settings of a run that a sweep has itself
@@ -55,8 +55,7 @@ def sweep(  # noqa: PLR0913 - the public face names all that it takes
         data. It may add its Trajectory or Plan as "motion", for pages.
     store : str or path, optional
         Folder for the rows, in Parquet files; needs the extra "parquet". Default: in memory. A
-        second call with the same model, run and points runs only what is missing. Workers that see
-        the folder, also on other machines, write into it; others send their rows to this process.
+        second call with the same model, run and points runs only what is missing.
     points : int, optional
         Number of points of the axes made by ``random``, ``latin`` or ``sobol``.
     seed : int, default 0
@@ -70,8 +69,8 @@ def sweep(  # noqa: PLR0913 - the public face names all that it takes
         their reports.
     limit : float, optional
         Processor time that a point may take (s). A point fails if it takes more, if its run raises
-        an error, or if its process ends. A point that takes less than a tenth of it in ten times
-        the limit on the clock hangs: it gets no row, so that the next call runs it again.
+        an error, or if its process ends. A point that is not ready after ten times the limit on
+        the clock hangs: it gets no row, so that the next call runs it again.
     executor : str or concurrent.futures.Executor, optional
         Where the points run: "processes", "processes:4", "dask" (a cluster on this machine),
         "dask:ADDRESS", "dask:FILE.json", or an executor. They are sent in blocks of one
@@ -119,7 +118,7 @@ def sweep(  # noqa: PLR0913 - the public face names all that it takes
     with rows.store.writing():
         if retry_failed:
             rows.store.forget()
-        shared = BlockSettings(job, script, limit, run == "simulate", rows.store.place)
+        shared = BlockSettings(job, script, limit, run == "simulate")
         Driver(rows, shared, name).drive(executor)
     return rows
 

@@ -1,7 +1,6 @@
 """The rows of a sweep in the forms that other tools take."""
 
-import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from itertools import chain, islice
 from os import PathLike
 from pathlib import Path
@@ -13,7 +12,7 @@ from ...basics.checks import shown
 from ...basics.errors import SweepError
 from ...basics.extras import needed
 from ...basics.files import refuse_unwritable, replacing, write_csv
-from .shards import AT_ONCE, parquet_library
+from .store import AT_ONCE, parquet_library
 
 if TYPE_CHECKING:
     import xarray
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
     from .result import Sweep
 
 ENDINGS = {".parquet": ("pyarrow", "parquet"), ".csv": None, ".nc": ("xarray", "xarray")}
-SAMPLE = "sample"
 Rows = list[dict[str, Any]]
 
 
@@ -100,43 +98,29 @@ def flat(row: dict[str, Any], before: str = "") -> dict[str, Any]:
 
 def dataset(sweep: "Sweep") -> "xarray.Dataset":
     """Return the rows as a dataset over the grids and the samples."""
-    xarray = needed("xarray", "xarray")
+    xarray, pandas = needed("xarray", "xarray"), needed("pandas", "xarray")
     axes = sweep.axes
-    dims = ["_".join(names) for names in axes.grids]
+    rows = [flat({k: x for k, x in row.items() if k not in axes.names}) for row in sweep]
+    frame = pandas.DataFrame(rows).set_index("number").reindex(range(len(sweep)))
+    dims = ["_".join(names) for names in axes.grids] + ["sample"] * bool(axes.spreads)
+    variables = {}
+    for name, column in frame.items():
+        texts = name == "error" or column.map(lambda x: isinstance(x, str)).any()
+        values = column.fillna("").astype(str).astype(object) if texts else column.astype(float)
+        variables[name] = (dims, values.to_numpy().reshape(axes.sizes))
+
+    # a grid of one name is a coordinate by its values, any other one by the places of these
     coordinates: dict[str, Any] = {}
-    for dim, (names, columns) in zip(dims, axes.grids.items(), strict=True):
-        coordinates |= _grid_coordinates(dim, names, columns)
-    for name, samples in axes.samples(np.arange(axes.points)).items():
-        entries = _columns([flat({name: sample}) for sample in samples])
-        coordinates |= {entry: (SAMPLE, numbers) for entry, numbers in entries.items()}
-    outputs: dict[str, list] = {}
-    for row in sweep:
-        number = row.pop("number")
-        for name, value in flat({k: x for k, x in row.items() if k not in axes.names}).items():
-            outputs.setdefault(name, [None] * len(sweep))[number] = value
-    dims += [SAMPLE] if axes.spreads else []
-    variables = {
-        name: (dims, _column(name, values).reshape(axes.sizes)) for name, values in outputs.items()
-    }
+    for dim, (names, columns) in zip(dims, axes.grids.items(), strict=False):
+        for name, values in zip(names, columns, strict=True):
+            simple = all(isinstance(x, int | float | str) for x in values)
+            alone = f"{name}_value" if not simple else name
+            coordinates[alone if len(names) == 1 else name] = (
+                dim,
+                list(values) if simple else [str(x) for x in values],
+            )
+        coordinates.setdefault(dim, (dim, np.arange(len(columns[0]))))
+    for name, samples in axes.samples.items():
+        entries = _columns([flat({name: sample}) for sample in samples.tolist()])
+        coordinates |= {entry: ("sample", numbers) for entry, numbers in entries.items()}
     return xarray.Dataset(variables, coordinates)
-
-
-def _column(name: str, values: Sequence) -> np.ndarray:
-    """Return numbers, nan where there is none; or texts, if there are some."""
-    if name == "error" or any(isinstance(x, str) for x in values):
-        return np.array(["" if x is None else str(x) for x in values], object)
-    return np.array([math.nan if x is None else x for x in values], float)
-
-
-def _grid_coordinates(
-    dim: str, names: tuple[str, ...], columns: Sequence[Sequence]
-) -> dict[str, Any]:
-    """Return the coordinates of one grid: its values, or their numbers and a coordinate a name."""
-    found: dict[str, Any] = {}
-    for name, values in zip(names, columns, strict=True):
-        simple = all(isinstance(x, int | float | str) for x in values)
-        if simple and len(names) == 1:
-            return {dim: (dim, list(values))}
-        key = name if len(names) > 1 else f"{name}_value"
-        found[key] = (dim, list(values) if simple else [str(x) for x in values])
-    return {dim: (dim, np.arange(len(columns[0]))), **found}

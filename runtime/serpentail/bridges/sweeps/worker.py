@@ -52,33 +52,43 @@ def _model(bundle: Bundle, parameters: bytes, profile: str | None) -> Model:
     return model_from(checked, pickle.loads(parameters) or None, profile=profile)
 
 
+@lru_cache(1)
+def _job(script: str | None, data: bytes) -> Job:
+    """Return a job; if it needs the driver's program, import that first, as multiprocessing does."""
+    if script is not None:
+        module = types.ModuleType("__mp_main__")
+        importing.set()
+        try:
+            module.__dict__.update(runpy.run_path(script, run_name="__mp_main__"))
+        finally:
+            importing.clear()
+        sys.modules["__main__"] = sys.modules["__mp_main__"] = module
+    job: Job = pickle.loads(data)
+    return job
+
+
 def main(descriptor: int) -> None:
     """Run points that come through a socket, until it is closed.
 
     The answers to a task are [] once it begins, then lists of rows, at last None; or a text that
     tells why this process cannot run it. The system ends the process by SIGPROF once a point has
-    taken more processor time than its limit. Ctrl-C is the driver's to answer: whoever starts this
-    process blocks it.
+    taken more processor time than its limit.
     """
     os.dup2(2, 1)  # output of functions must not mix with reports
     link: Connection = Connection(descriptor)
     tasks: queue.SimpleQueue = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(link, tasks), daemon=True).start()
-    jobs: dict[bytes, Job] = {}
     while True:
         script, data, bundle, points, first_limit, limit = tasks.get()
         try:
-            if data not in jobs:
-                jobs.clear()
-                _import_main(script)
-                jobs[data] = pickle.loads(data)
-            model = model_of(bundle, jobs[data])
+            job = _job(script, data)
+            model = model_of(bundle, job)
         except (SerpentailError, ImportError, AttributeError, OSError) as reason:
             link.send(f"{reason}")
             continue
         link.send([])
         signal.setitimer(signal.ITIMER_PROF, first_limit)
-        for rows in run_points(jobs[data], model, points):
+        for rows in run_points(job, model, points):
             signal.setitimer(signal.ITIMER_PROF, limit)
             link.send(rows)
         signal.setitimer(signal.ITIMER_PROF, 0)
@@ -92,16 +102,3 @@ def _listen(link: Connection, tasks: queue.SimpleQueue) -> None:
             tasks.put(link.recv())
     except (EOFError, OSError):
         os._exit(1)
-
-
-def _import_main(script: str | None) -> None:
-    """Have the functions of the program that the driver runs, as multiprocessing does."""
-    if script is None or getattr(sys.modules["__main__"], "__file__", None) == script:
-        return
-    module = types.ModuleType("__mp_main__")
-    importing.set()
-    try:
-        module.__dict__.update(runpy.run_path(script, run_name="__mp_main__"))
-    finally:
-        importing.clear()
-    sys.modules["__main__"] = sys.modules["__mp_main__"] = module

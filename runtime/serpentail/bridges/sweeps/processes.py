@@ -1,9 +1,7 @@
-"""Runs blocks of points in processes of their own, survives crashes of these, and writes shards.
+"""Runs blocks of points in processes of their own, and survives crashes of these.
 
-Why not multiprocessing or concurrent.futures: Dask's workers may not have children of
-multiprocessing; both import the main program into every worker, also where only functions of
-modules are run; and where a worker ends, ProcessPoolExecutor loses all rows of its block, and does
-not tell at which point it was.
+Why not multiprocessing, concurrent.futures, loky or pebble: Dask's workers may not have children of
+multiprocessing, on which all of these build, and it imports the main program into every worker.
 """
 
 import atexit
@@ -12,9 +10,9 @@ import subprocess
 import sys
 import threading
 import time
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
@@ -24,15 +22,14 @@ import numpy as np
 
 from ...basics.errors import SweepError
 from ...compiling.commands import inherited
-from ...compiling.threads import VARIABLE
-from .points import Axes, Point
-from .shards import Row, Shard, ShardFolder
+from ...compiling.threads import VARIABLE, after_fork
+from .points import Point, points_of
+from .store import Row
 from .worker import Bundle
 
 TRIES = 2  # of a point whose process ends: something else may have ended it
 TOGETHER = 2048  # points that a process gets at once: it holds the motions of flights of them
-HANGS = 10  # limits on the clock in which a point hangs if it takes less processor time than
-LEAST = 0.1  # limits
+HANGS = 10  # limits, on the clock, after which a point hangs
 COMMAND = "from serpentail.bridges.sweeps.worker import main; main({})"
 
 
@@ -42,58 +39,35 @@ class BlockSettings:
 
     job: pickled; script: the driver's main program, None if the job needs none of its names; limit:
     seconds of processor time that a point may take, None: no limit; together: whether points may
-    be run side by side, with all results at once; store: None: the rows are returned.
+    be run side by side, with all results at once.
     """
 
     job: bytes
     script: str | None
     limit: float | None
     together: bool
-    store: ShardFolder | None
 
 
 class Block(NamedTuple):
-    """Points of one model: axes, places: what makes the points; numbers: of their rows."""
+    """Points of one model: columns: their values by names; numbers: of their rows."""
 
     settings: BlockSettings
     bundle: Bundle | None
-    axes: Axes
-    places: np.ndarray
+    columns: dict[str, list]
     numbers: np.ndarray
 
 
-class Result(NamedTuple):
-    """What came of a block: a shard, None if it has no row; seconds of its rows; points that hung.
+def run_block(block: Block) -> list[Row] | str:
+    """Return the rows of a block but of points that hang, or why no process can run it.
 
-    The shard is written if the worker sees its store. refusal: why no process can run the points;
-    it is no exception, because Dask would print that.
+    The reason is no exception, because Dask would print that.
     """
-
-    shard: Shard | None = None
-    seconds: float = 0.0
-    hung: int = 0
-    refusal: str = ""
-
-    @classmethod
-    def of(cls, rows: list[Row], points: int, store: ShardFolder | None) -> "Result":
-        """Return the rows of so many points."""
-        shard = Shard.of(rows) if rows else None
-        if shard and store and store.is_here():
-            shard = shard.written(store.folder)
-        return cls(shard, sum(row.seconds for row in rows), points - len(rows))
-
-
-def run_block(block: Block) -> Result:
-    """Run a block, and write its shard; NotWritten if it cannot be written."""
-    rows: list[Row] = []
-    for first in range(0, len(block.places), TOGETHER):
-        part = slice(first, first + TOGETHER)
-        points = zip(block.numbers[part].tolist(), block.axes.at(block.places[part]), strict=True)
-        try:
-            rows += _rows(block, dict(points))
-        except SweepError as reason:
-            return Result(refusal=str(reason))
-    return Result.of(rows, len(block.numbers), block.settings.store)
+    points = list(zip(block.numbers.tolist(), points_of(block.columns), strict=True))
+    try:
+        parts = (dict(points[k : k + TOGETHER]) for k in range(0, len(points), TOGETHER))
+        return [row for part in parts for row in _rows(block, part)]
+    except SweepError as reason:
+        return str(reason)
 
 
 def _rows(block: Block, left: dict[int, Point]) -> Iterator[Row]:
@@ -106,22 +80,21 @@ def _rows(block: Block, left: dict[int, Point]) -> Iterator[Row]:
     one_by_one = False
     while left:
         points = {k: left[k] for k in list(left)[:1]} if one_by_one else dict(left)
-        process, begun = _process(), time.perf_counter()
+        process, begun = _idle.pop() if _idle else Process(), time.perf_counter()
         try:
             for rows in process.run(block, points):
                 for row in rows:
                     del left[row.number]
                     yield row
                 begun = time.perf_counter()
-            _idle.append(process)
             continue
         except (EOFError, OSError) as reason:
             hangs, status = isinstance(reason, TimeoutError), process.end()
         # it was at the first point that is left, unless it ran all at once
-        number = next(iter(left))
-        if block.settings.together and len(points) > 1 and len(points) == len(left):
+        if block.settings.together and 1 < len(points) == len(left):
             one_by_one = True
             continue
+        number = next(iter(left))
         ends[number] += 1
         if hangs or status == -signal.SIGPROF or ends[number] >= TRIES:
             del left[number]
@@ -141,20 +114,21 @@ class Process:
     """A process that runs points, see ``worker``."""
 
     def __init__(self) -> None:
+        if _ending.is_set():
+            raise SweepError("the sweep is ended")
         here, there = Pipe()
-        environment = inherited(**{VARIABLE: "1"})  # its siblings use the other cores
-        command = [sys.executable, "-c", COMMAND.format(there.fileno())]
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])  # it inherits that
-        try:
-            self.child = subprocess.Popen(command, env=environment, pass_fds=[there.fileno()])
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        self.child = subprocess.Popen(
+            [sys.executable, "-c", COMMAND.format(there.fileno())],
+            env=inherited(**{VARIABLE: "1"}),  # its siblings use the other cores
+            pass_fds=[there.fileno()],
+            process_group=0,  # Ctrl-C is the driver's to answer
+        )
         there.close()
         self.link: Connection[Any, Any] = here
         _all.add(self)
 
     def run(self, block: Block, points: dict[int, Point]) -> Iterator[list[Row]]:
-        """Yield rows of points as they come.
+        """Yield rows of points as they come; then it is idle.
 
         TimeoutError if a point hangs, EOFError or OSError if the process ends, SweepError if it
         cannot run them.
@@ -163,25 +137,19 @@ class Process:
         limit = settings.limit or 0.0  # of one point
         first_limit = limit * len(points) if settings.together else limit  # of what comes first
         self.link.send((settings.script, settings.job, block.bundle, points, first_limit, limit))
-        patience = 0.0  # s until the next answer; none until it has made the model
-        while True:
-            used = self._processor_time()
-            while patience and not self.link.poll(patience):
-                before, used = used, self._processor_time()
-                if used - before < LEAST * limit:
-                    raise TimeoutError
-            answer = self.link.recv()
+        patience = None  # s until the next answer; any until it has made the model
+        while (answer := self._answer(patience)) is not None:
             if isinstance(answer, str):
                 _idle.append(self)
                 raise SweepError(f"run: no process can run it: {answer}")
-            if answer is None:
-                return
             yield answer
-            patience = HANGS * (limit if answer else first_limit)
+            patience = HANGS * (limit if answer else first_limit) or None
+        _idle.append(self)
 
-    def _processor_time(self) -> float:
-        """Return the processor time that it took (s); OSError if it is gone."""
-        return time.clock_gettime((~self.child.pid << 3) | 2)  # Linux's clock of a process
+    def _answer(self, patience: float | None) -> Any:
+        if not self.link.poll(patience):
+            raise TimeoutError
+        return self.link.recv()
 
     def end(self) -> int:
         """End the process in any case; return its status."""
@@ -191,32 +159,19 @@ class Process:
         return self.child.wait()
 
 
-# Those of a process that was forked find in its copy of these only processes that are not its own:
-# they seem to have ended, and are left to the parent.
-_idle: deque[Process] = deque()
+_idle: list[Process] = []
 _all: set[Process] = set()
 _ending = threading.Event()  # while all are ended, and no new one is to begin
-
-
-def _process() -> Process:
-    """Return a process that has nothing to do."""
-    if _ending.is_set():
-        raise SweepError("the sweep is ended")
-    with suppress(IndexError):
-        while True:
-            process = _idle.pop()
-            if process.child.poll() is None:
-                return process
-            process.end()
-    return Process()
+after_fork(_idle.clear)  # they are the parent's
+after_fork(_all.clear)
 
 
 @atexit.register
 def end_all() -> None:
     """End all processes that this one started to run points."""
     _idle.clear()
-    for process in list(_all):
-        _all.discard(process)
+    while _all:
+        process = _all.pop()
         process.child.kill()
         process.child.wait()
 
