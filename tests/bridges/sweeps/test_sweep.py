@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.bridges.sweeps import driver, shards, supervision
+from serpentail.bridges.sweeps import driver, processes
 from serpentail.bridges.sweeps.executors import Place
 from serpentail.bridges.sweeps.result import Status
-from serpentail.bridges.sweeps.shards import Row, Shard
+from serpentail.bridges.sweeps.store import Row
 from serpentail.bridges.sweeps.sweep import posed
 from tests.support import swept, zoo
 from tests.support.rows import row as named
@@ -58,7 +58,7 @@ def test_all_executors_make_the_same_rows():
         for executor in (threads, pool, "processes:2"):
             found = [row["q_end"] for row in flights(2, executor=executor).rows()]
             np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-9)
-        assert not supervision._all and not supervision._idle  # none is left of its own
+        assert not processes._all and not processes._idle  # none is left of its own
 
 
 class Forgetful(ThreadPoolExecutor):
@@ -131,14 +131,6 @@ def test_other_grids_orders_and_numbers_of_points_keep_the_rows_they_have(worker
             for k, row in enumerate(found):
                 assert row["number"] == k and row["told"] == [row["a"], row.get("d"), row["b"]]
     assert give({"a": a, "b": b}, points=4, seed=1).spent.points == 8
-
-
-def test_rows_of_workers_that_do_not_see_the_store_are_written_here(worker, tmp_path, monkeypatch):
-    monkeypatch.setattr(shards.ShardFolder, "is_here", lambda _: False)
-    given = {"over": {"x": st.grid([3, 4])}, "run": swept.square, "store": tmp_path / "rows"}
-    for points in (2, 0):
-        found = st.sweep(None, **given, executor=worker)
-        assert found.spent.points == points and [row["square"] for row in found] == [9, 16]
 
 
 def test_failures_are_rows_and_can_be_run_again(tmp_path):
@@ -230,7 +222,7 @@ def test_exports_and_iteration_hold_few_rows(tmp_path):
             told = [
                 Row(k, f'{{"square": {k * k}}}', None, 0.1) for k in range(first, first + 10**4)
             ]
-            found.store.accept(Shard.of(told))
+            found.store.accept(told)
     for name in ("rows.csv", "rows.parquet", None):
         tracemalloc.start()
         try:

@@ -109,7 +109,8 @@ def random(low: Any, high: Any, law: str = "uniform") -> Spread:
 def latin(low: Any, high: Any, law: str = "uniform") -> Spread:
     """Make an axis whose points are a Latin hypercube: each of k equal parts has one point.
 
-    Another number of points gives other points. Arguments and errors are those of ``random``.
+    Another number of points gives other points. scipy.stats.qmc.LatinHypercube makes the points.
+    Arguments and errors are those of ``random``.
     """
     return spread("latin", low, high, law)
 
@@ -136,9 +137,8 @@ def spread(kind: str, low: Any, high: Any, law: str) -> Spread:
         )
     if (lows > highs).any() or (law == "log" and (lows <= 0).any()):
         least = "above 0 and " if law == "log" else ""
-        raise refusal(
-            f"{kind}: low", low, f"numbers {least}not above high, {shown(high)}", SweepError
-        )
+        needs = f"numbers {least}not above high, {shown(high)}"
+        raise refusal(f"{kind}: low", low, needs, SweepError)
     return Spread(kind, lows, highs, law, (low, high))
 
 
@@ -162,18 +162,9 @@ def in_units(field: str, value: Any, unit: str | Sequence[str] | None = None) ->
 def plain(field: str, value: Any) -> Any:
     """Return a value as JSON represents it: numbers, texts, lists and tables."""
     try:
-        return json.loads(json.dumps(value, allow_nan=False, default=array_as_list))
-    except (TypeError, ValueError) as reason:
-        raise SweepError(
-            f"{field}: value {shown(value)}: needs numbers, texts, lists or tables ({reason})"
-        ) from None
-
-
-def array_as_list(value: Any) -> Any:
-    """Return an array or a number of NumPy for JSON; TypeError for anything else."""
-    if isinstance(value, np.ndarray | np.generic):
-        return value.tolist()
-    raise TypeError(f"{type(value).__name__} is none of these")
+        return json.loads(json.dumps(value, allow_nan=False, default=lambda x: x.tolist()))
+    except (AttributeError, TypeError, ValueError):
+        raise refusal(field, value, "numbers, texts, lists or tables", SweepError) from None
 
 
 # plain data as JSON, the same text for the same data

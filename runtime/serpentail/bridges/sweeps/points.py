@@ -57,19 +57,21 @@ class Axes:
 
     def measured(self, units: Units) -> "Axes":
         """Return the axes with texts such as "2 g" as numbers, for the names that have a unit."""
-        grids, spreads = {}, {}
-        for names, columns in self.grids.items():
-            grids[names] = [
-                [in_units(f"over: {name}", value, units[name]) for value in column]
-                if name in units
-                else column
+
+        def numbers(name: str, value: Any) -> Any:
+            return in_units(f"over: {name}", value, units[name]) if name in units else value
+
+        grids = {
+            names: [
+                [numbers(name, value) for value in column]
                 for name, column in zip(names, columns, strict=True)
             ]
+            for names, columns in self.grids.items()
+        }
+        spreads = {}
         for name, axis in self.spreads.items():
-            spreads[name] = axis
-            if name in units:
-                low, high = (in_units(f"over: {name}", x, units[name]) for x in axis.bounds)
-                spreads[name] = replace(spread(axis.kind, low, high, axis.law), bounds=axis.bounds)
+            low, high = (numbers(name, bound) for bound in axis.bounds)
+            spreads[name] = spread(axis.kind, low, high, axis.law)
         return replace(self, grids=grids, spreads=spreads)
 
     def places(self, numbers: Sequence[int] | np.ndarray) -> tuple[np.ndarray, ...]:
@@ -105,6 +107,18 @@ def points_of(columns: Mapping[str, list]) -> list[Point]:
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
+def drawn(kind: str, points: int, size: int, seed: int) -> np.ndarray:
+    """Return numbers (points, size) from 0 to 1."""
+    rng = np.random.default_rng(seed)
+    if kind == "random":
+        return rng.random((points, size))
+    from scipy.stats import qmc
+
+    if kind == "latin":
+        return qmc.LatinHypercube(size, seed=rng).random(points)
+    return qmc.Sobol(size, seed=rng).random_base2(math.ceil(math.log2(points)))[:points]
+
+
 def axes_of(over: Any, points: Any, seed: Any) -> Axes:
     """Return the axes of a sweep; SweepError if one is wrong, or there are too many points."""
     if not isinstance(over, Mapping) or not over:
@@ -114,7 +128,10 @@ def axes_of(over: Any, points: Any, seed: Any) -> Axes:
     spreads: dict[str, Spread] = {}
     taken: set[str] = set()
     for key, axis in over.items():
-        names = _names(key)
+        names = tuple(part.strip() for part in key.split(",")) if isinstance(key, str) else key
+        texts = isinstance(names, tuple) and all(isinstance(name, str) and name for name in names)
+        if not names or not texts:
+            raise refusal("over", key, "a name, or several as a tuple", SweepError)
         for name in names:
             if name in taken:
                 raise SweepError(f"over: {name!r} twice: needs one axis for each name")
@@ -129,44 +146,19 @@ def axes_of(over: Any, points: Any, seed: Any) -> Axes:
     kinds = sorted({axis.kind for axis in spreads.values()})
     if len(kinds) > 1:
         raise SweepError(f"over: {' and '.join(kinds)} together: needs one of them for all axes")
+    if spreads and points is None:
+        raise SweepError("points: no value: needs the number of points of the random axes")
+    if not spreads and points is not None:
+        none = "none: no axis is made by st.random, st.latin or st.sobol"
+        raise refusal("points", points, none, SweepError)
+    count = whole_number("points", points, SweepError, least=1, most=MOST_POINTS) if spreads else 1
     seed = whole_number("seed", seed, SweepError, least=0, most=MOST_SEED)
-    axes = Axes(grids, spreads, _samples(spreads, points), seed)
+    axes = Axes(grids, spreads, count, seed)
     if len(axes) > MOST_POINTS:
         raise SweepError(
             f"over: {len(axes)} points: needs at most {MOST_POINTS}: make several sweeps"
         )
     return axes
-
-
-def checked_row(k: Any, points: int) -> int:
-    """Return the number of one of some points; SweepError if there is no such point."""
-    return whole_number("row", k, SweepError, least=0, most=points - 1)
-
-
-def _samples(spreads: Mapping, points: Any) -> int:
-    """Return the number of samples; 1 without spreads."""
-    if spreads and points is None:
-        raise SweepError("points: no value: needs the number of points of the random axes")
-    if spreads:
-        return whole_number("points", points, SweepError, least=1, most=MOST_POINTS)
-    if points is not None:
-        raise SweepError(
-            f"points: value {shown(points)}: no axis is random: leave it out, or give st.random, "
-            "st.latin or st.sobol"
-        )
-    return 1
-
-
-def _names(key: Any) -> Names:
-    """Return the names of an axis, given as a tuple or as a text with commas."""
-    names = tuple(part.strip() for part in key.split(",")) if isinstance(key, str) else key
-    if (
-        not isinstance(names, tuple)
-        or not names
-        or not all(isinstance(n, str) and n for n in names)
-    ):
-        raise refusal("over", key, "a name, or several as a tuple", SweepError)
-    return names
 
 
 def _columns(names: Names, values: Sequence) -> Sequence[Sequence]:
@@ -180,13 +172,6 @@ def _columns(names: Names, values: Sequence) -> Sequence[Sequence]:
     return list(zip(*values, strict=True))
 
 
-def drawn(kind: str, points: int, size: int, seed: int) -> np.ndarray:
-    """Return numbers (points, size) from 0 to 1."""
-    rng = np.random.default_rng(seed)
-    if kind == "random":
-        return rng.random((points, size))
-    from scipy.stats import qmc
-
-    if kind == "latin":
-        return qmc.LatinHypercube(size, seed=rng).random(points)
-    return qmc.Sobol(size, seed=rng).random_base2(math.ceil(math.log2(points)))[:points]
+def checked_row(k: Any, points: int) -> int:
+    """Return the number of one of some points; SweepError if there is no such point."""
+    return whole_number("row", k, SweepError, least=0, most=points - 1)

@@ -21,8 +21,8 @@ from ...scenes.overrides import changed
 from ...scenes.plan import PLAN
 from ...scenes.simulate_keys import SIMULATE
 from .axis import as_json, plain
-from .job import DATA, STARTS, Job
 from .points import Axes, Point, Units
+from .runs import DATA, STARTS, Job
 from .worker import Bundle
 
 TABLES: Mapping[str, tuple[Key, type[Exception]]] = {
@@ -35,16 +35,8 @@ NEEDED = {  # of a run of a model: settings, and what they are
     "plan": (STARTS, "where a motion starts"),
     "identify": ((DATA, "markers"), "tracks, and where the markers are"),
 }
+BundleOf = Callable[[Point], Bundle | None]
 NO_SHAPE = "the shape of a model is fixed: give the sweep a scene, or a function without a model"
-
-
-@dataclass(frozen=True)
-class Subject:
-    """What a sweep is of: its job, the units of its axes, and what finds the model of a point."""
-
-    job: Job
-    units: Units
-    bundle: Callable[[Point], Bundle | None]
 
 
 @dataclass(frozen=True)
@@ -79,19 +71,24 @@ def pose(what: Any, axes: Axes, job: Job, of: Any) -> Posed:
     what: a model, a scene's path or example, or None for a function of points alone. of: what else
     rows depend on.
     """
+    units: Units = {}
+    bundle: BundleOf = lambda _: None  # noqa: E731
     if isinstance(what, Model):
-        subject = _of_model(what, axes, job)
+        job, units, bundle = _of_model(what, axes, job)
     elif what is not None:
-        subject = _of_scene(what, axes, job)
+        job, units, bundle = _of_scene(what, axes, job)
     elif isinstance(job.run, str):
         raise SweepError(f"model: None: run = {job.run!r} needs a model or a scene")
-    else:
-        subject = Subject(job, {}, lambda _: None)
-    job, axes = subject.job, axes.measured(subject.units)
+    axes = axes.measured(units)
     if isinstance(what, Model):
         _refuse_shapes(what, axes)
     grids = [[names, _row_texts(names, columns, job)] for names, columns in axes.grids.items()]
-    _refuse_twice(axes, [texts for _, texts in grids])
+    for k, (_, rows) in enumerate(grids):
+        if len(set(rows)) < len(rows):
+            place = next(i for i, row in enumerate(rows) if row in rows[:i])
+            number = place * int(np.prod(axes.sizes[k + 1 :]))
+            point = shown(axes.at([number])[0])
+            raise SweepError(f"over: point {number} occurs twice, {point}: needs each once")
 
     # one model for each place on the axes that decide on it; the last axis has all spreads
     decides = [not job.built.isdisjoint(names) for names in axes.grids]
@@ -99,7 +96,7 @@ def pose(what: Any, axes: Axes, job: Job, of: Any) -> Posed:
     shape = [size if several else 1 for several, size in zip(decides, axes.sizes, strict=True)]
     models = np.arange(np.prod(shape))
     firsts = np.ravel_multi_index(np.unravel_index(models, shape), axes.sizes)
-    bundles = [subject.bundle(point) for point in axes.at(firsts)]
+    bundles = [bundle(point) for point in axes.at(firsts)]
 
     hashes = np.array([bundle.manifest_hash if bundle else "" for bundle in bundles])
     files = job.digest_of({}) if job.run == "identify" and DATA not in axes.names else ""
@@ -126,44 +123,32 @@ def _row_texts(names: tuple[str, ...], columns: Sequence[Sequence], job: Job) ->
     return [f"{text}\n{digest}" for text, digest in zip(texts, digests, strict=True)]
 
 
-def _refuse_twice(axes: Axes, texts: Sequence[Sequence[str]]) -> None:
-    """SweepError for a grid that has a row twice."""
-    for k, rows in enumerate(texts):
-        if len(set(rows)) < len(rows):
-            place = next(i for i, row in enumerate(rows) if row in rows[:i])
-            number = place * int(np.prod(axes.sizes[k + 1 :]))
-            point = shown(axes.at([number])[0])
-            raise SweepError(f"over: point {number} occurs twice, {point}: needs each once")
-
-
-def _of_model(model: Model, axes: Axes, job: Job) -> Subject:
+def _of_model(model: Model, axes: Axes, job: Job) -> tuple[Job, Units, BundleOf]:
     """Points that change parameters, the start or settings of one model."""
     known = _parameter_units(model.manifest)
     others = frozenset(axes.names) - known.keys()
-    for name in others:
-        if name in MADE_OF:
-            raise SweepError(f"over: {name}: {NO_SHAPE}")
+    for name in others & frozenset(MADE_OF):
+        raise SweepError(f"over: {name}: {NO_SHAPE}")
     units: dict[str, Any] = {name: known[name] for name in axes.names if name in known}
     if isinstance(job.run, str):
-        needed, what = NEEDED[job.run]
+        model.serve(job.run)  # workers add no functions
+        units |= dict.fromkeys(others - {DATA})
+        needed, words = NEEDED[job.run]
         missing = [name for name in needed if name not in {*job.settings, *others}]
         if missing:
             raise SweepError(
-                f"settings: no {' and no '.join(missing)}: needs {what}, here or in over"
+                f"settings: no {' and no '.join(missing)}: needs {words}, here or in over"
             )
-        units |= dict.fromkeys(others - {DATA})
     baked = model.manifest["scene"]["baked"]
     parameters = {} if baked else independent(model.manifest, model.parameters)
     job = replace(
         job, keys=others, parameters=parameters, profile=model.profile, parent=str(Path.cwd())
     )
-    if isinstance(job.run, str):
-        model.serve(job.run)  # workers add no functions
     bundle = Bundle.of(model.checked)
-    return Subject(job, units, lambda _: bundle)
+    return job, units, lambda _: bundle
 
 
-def _of_scene(scene: Any, axes: Axes, job: Job) -> Subject:
+def _of_scene(scene: Any, axes: Axes, job: Job) -> tuple[Job, Units, BundleOf]:
     """Points that change parameters, keys of the model, or keys of the scene's table."""
     tables, path = read_scene(scene, SweepError)
     first = axes.at([0])[0]
@@ -192,8 +177,12 @@ def _of_scene(scene: Any, axes: Axes, job: Job) -> Subject:
     others = [name for name in axes.names if name not in {*keys, *shape}]
     if isinstance(job.run, str):
         _refuse_unknown(others, job.run, ParameterOptions.__annotations__)  # before a model is made
-    first_scene = tables | {name: first[name] for name in shape}
-    checked, left, _ = built(first_scene, path.stem, {name: first[name] for name in others})
+
+    def made(point: Point, names: Sequence[str]) -> Any:
+        scene = tables | {name: point[name] for name in shape}
+        return built(scene, path.stem, {name: point[name] for name in names})
+
+    checked, left, _ = made(first, others)
     known = _parameter_units(checked.manifest)
     units |= {name: known[name] for name in others if name in known}
     if isinstance(job.run, str):
@@ -201,12 +190,6 @@ def _of_scene(scene: Any, axes: Axes, job: Job) -> Subject:
     else:
         keys = [name for name in others if name not in known]
     making = [name for name in others if name not in keys and name not in (left or {})]
-
-    def bundle(point: Point) -> Bundle:
-        scene = tables | {name: point[name] for name in shape}
-        checked, *_ = built(scene, path.stem, {name: point[name] for name in making})
-        return Bundle.of(checked)
-
     job = replace(
         job,
         phases=tables.get("phase", []) if job.run == "simulate" else (),
@@ -214,7 +197,7 @@ def _of_scene(scene: Any, axes: Axes, job: Job) -> Subject:
         keys=frozenset(keys),
         built=frozenset((*shape, *making)),
     )
-    return Subject(job, units, bundle)
+    return job, units, lambda point: Bundle.of(made(point, making)[0])
 
 
 def _parameter_units(manifest: Mapping[str, Any]) -> dict[str, str]:

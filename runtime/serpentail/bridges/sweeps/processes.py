@@ -37,13 +37,11 @@ COMMAND = "from serpentail.bridges.sweeps.worker import main; main({})"
 class BlockSettings:
     """What all blocks of a sweep have in common.
 
-    job: pickled; script: the driver's main program, None if the job needs none of its names; limit:
-    seconds of processor time that a point may take, None: no limit; together: whether points may
-    be run side by side, with all results at once.
+    job: pickled; limit: seconds of processor time that a point may take, None: no limit; together:
+    whether points may be run side by side, with all results at once.
     """
 
     job: bytes
-    script: str | None
     limit: float | None
     together: bool
 
@@ -136,7 +134,7 @@ class Process:
         settings = block.settings
         limit = settings.limit or 0.0  # of one point
         first_limit = limit * len(points) if settings.together else limit  # of what comes first
-        self.link.send((settings.script, settings.job, block.bundle, points, first_limit, limit))
+        self.link.send((settings.job, block.bundle, points, first_limit, limit))
         patience = None  # s until the next answer; any until it has made the model
         while (answer := self._answer(patience)) is not None:
             if isinstance(answer, str):

@@ -1,15 +1,21 @@
-"""Runs the points of a sweep on one model: one after another, or flights side by side."""
+"""What a sweep runs at its points: one after another, or flights side by side."""
 
+import hashlib
 import json
+import pickle
 import time
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
+import cloudpickle
 import numpy as np
 
+from ...basics.checks import refusal, shown
 from ...basics.errors import SerpentailError, SweepError
 from ...model.model import Model
 from ...motion.numbers import UNITS, finite_json, numbers_of
@@ -20,17 +26,98 @@ from ...scenes.scenario import Scenario
 from ...scenes.simulate import scenario_of
 from ...simulation.controllers.controller import Damping, TorqueCurve, TorqueTable
 from ...simulation.rollouts import Rollouts
-from ...simulation.simulate import simulate
 from ...simulation.start import INTERVALS
-from .job import DATA, STARTS, Job
 from .points import Point
 from .store import Row
 
+RUNS = ("simulate", "plan", "identify")
+STARTS = ("q0", "v0")
+DATA = "data"  # of an identification: its files of marker tracks
 ENDS = ("end_s", "q_end", "v_end", "kinetic_end_J", "potential_end_J")  # outputs by default
 OUTPUTS = (*ENDS, *UNITS)
 MOST_TEXT = 2000  # characters of an error
 SHARED = (type(None), Damping, TorqueTable, TorqueCurve)  # controllers that any parameters suit
 Outcome = tuple[str | None, str | None]  # JSON, or the error in place of it
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is run: one of RUNS, or a function of a model and a point, or of a point alone.
+
+    settings: of st.simulate, st.plan or st.identify. outputs: names of a simulation's outputs.
+    table, phases, parent: of a scene; a model has no table. parent is the folder of the files that
+    are named: the scene's, or the one where the sweep was called. built: names that the model was
+    built with. keys: names of keys of the table, or of settings. parameters, profile: of a model
+    that was given.
+    """
+
+    run: str | Callable[..., Any]
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    outputs: tuple[str, ...] = ()
+    table: Mapping[str, Any] | None = None
+    phases: Sequence[Mapping] = ()
+    parent: str = ""
+    built: frozenset[str] = frozenset()
+    keys: frozenset[str] = frozenset()
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    profile: str | None = None
+
+    def parameters_of(self, point: Point) -> Point:
+        """Return the parameters of the model that a point has."""
+        return {k: value for k, value in point.items() if k not in self.built | self.keys}
+
+    def arguments_of(self, point: Point) -> dict[str, Any]:
+        """Return the table of a point, or the settings of one where the job has no table."""
+        keys = {name: value for name, value in point.items() if name in self.keys}
+        return {**self.settings, **keys} if self.table is None else changed(self.table, keys)
+
+    def recordings(self, point: Point) -> list[Any]:
+        """Return the trials of a point: paths of files, whole, and tracks as they were given."""
+        data = point.get(DATA, self.settings.get(DATA))
+        trials = data if isinstance(data, list | tuple) else [data]
+        return [Path(self.parent, x) if isinstance(x, str | PathLike) else x for x in trials]
+
+    def digest_of(self, point: Point) -> str:
+        """Return a hash of the content of a point's files; SweepError if one cannot be read."""
+        content = hashlib.sha256()
+        for path in self.recordings(point):
+            if isinstance(path, Path):
+                try:
+                    content.update(hashlib.sha256(path.read_bytes()).digest())
+                except OSError as reason:
+                    raise SweepError(
+                        f"{DATA}: {shown(str(path))}: it cannot be read ({reason.strerror}): needs "
+                        "files of marker tracks"
+                    ) from None
+        return content.hexdigest()
+
+    def pickled(self) -> bytes:
+        """Return it as bytes, with functions of the main program."""
+        content: bytes = cloudpickle.dumps(self)
+        return content
+
+    def identity(self) -> str:
+        """Return what rows depend on besides the model and the point; objects as digests."""
+        parts = (self.settings, self.outputs, self.table, self.phases, self.parameters)
+        told = [_name_of(self.run), *parts, self.profile]
+        return json.dumps(told, sort_keys=True, default=lambda x: _digest(pickle.dumps(x)))
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+def _name_of(run: Any) -> Any:
+    """Return the name of a run; of a partial function, with its arguments."""
+    if isinstance(run, str):
+        return run
+    if isinstance(run, partial):
+        return [_name_of(run.func), run.args, run.keywords]
+    where = run if hasattr(run, "__qualname__") else type(run)  # an object that is called
+    if not callable(run) or "<" in where.__qualname__:  # a lambda, or a function in a function
+        needs = f"{', '.join(map(repr, RUNS))}, or a function at the top of a module"
+        raise refusal("run", run, needs, SweepError)
+    return f"{where.__module__}.{where.__qualname__}"
 
 
 def run_points(job: Job, model: Model | None, points: Mapping[int, Point]) -> Iterator[list[Row]]:
@@ -73,10 +160,8 @@ def run_point(job: Job, model: Model | None, point: Point) -> tuple[dict[str, An
 
 
 def _simulated(job: Job, model: Model, point: Point) -> tuple[dict[str, Any], Trajectory]:
-    if job.table is not None:
-        motion = _scenario(job, model, point).simulate(**job.settings)
-    else:
-        motion = simulate(model, **{**job.settings, **job.keys_of(point)})
+    flight, changes = _flight(job, model, point)
+    motion = flight.simulate(**changes)
     assert isinstance(motion, Trajectory)
     return _outputs(motion, job.outputs), motion
 
@@ -86,13 +171,12 @@ def _planned(job: Job, model: Model, point: Point) -> tuple[dict[str, Any], Any]
     from ...planning.settings import joined
     from ...scenes.plan import arguments_for
 
+    arguments = job.arguments_of(point)
     if job.table is not None:
-        table = changed(job.table, job.keys_of(point))
-        solution = plan(model, **joined(job.settings, arguments_for(model, table)))
+        arguments = {**arguments_for(model, arguments), **job.settings}
     else:
-        arguments = joined(job.keys_of(point), joined(job.settings, {}))
-        start = tuple(arguments.pop(name) for name in STARTS)
-        solution = plan(model, start=start, **arguments)
+        arguments["start"] = tuple(arguments.pop(name) for name in STARTS)
+    solution = plan(model, **arguments)
     return solution.report | {"warnings": solution.warnings}, solution
 
 
@@ -100,46 +184,37 @@ def _identified(job: Job, model: Model, point: Point) -> tuple[dict[str, Any], A
     from ...identification.identify import identify
     from ...scenes.identify import identify_arguments
 
-    keys = {name: value for name, value in job.keys_of(point).items() if name != DATA}
+    arguments = job.arguments_of({name: x for name, x in point.items() if name != DATA})
     if job.table is not None:
-        table = changed(job.table, keys)
-        arguments = {**identify_arguments(table, size_of(model)), **job.settings}
-    else:
-        arguments = {**job.settings, **keys}
-    arguments.pop(DATA, None)
-    markers, estimate = arguments.pop("markers"), arguments.pop("estimate", ())
+        arguments = {**identify_arguments(arguments, size_of(model)), **job.settings}
+    arguments = {"estimate": (), **arguments, DATA: job.recordings(point)}
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        result = identify(model, job.recordings(point), markers, estimate, **arguments)
+        result = identify(model, arguments.pop(DATA), **arguments)
     report = result.report | {"warnings": [str(warning.message) for warning in caught]}
     del report["seconds"]  # which each row has
     return report, result
 
 
-def _scenario(job: Job, model: Model, point: Point) -> Scenario:
-    table = changed(job.table or {}, job.keys_of(point))
-    return scenario_of(model, table, Path(job.parent), list(job.phases))
+def _flight(job: Job, model: Model, point: Point) -> tuple[Scenario, dict[str, Any]]:
+    """Return the scenario of a point, and changes of its settings."""
+    arguments = job.arguments_of(point)
+    if job.table is None:
+        q0, v0 = (arguments.pop(name) for name in STARTS)
+        return Scenario(model, q0, v0, 1.0, settings=arguments), {}
+    scenario = scenario_of(model, arguments, Path(job.parent), list(job.phases))
+    return scenario, dict(job.settings)
 
 
 def _side_by_side(job: Job, model: Model, points: Sequence[Point]) -> list[Outcome] | None:
     """Return the outcomes of flights that differ in parameters and starts alone; else None."""
-    settings = dict(job.settings)
-    if job.table is None:
-        if not job.keys <= set(STARTS):
-            return None
-        q0, v0 = (
-            np.array([p[name] for p in points] if name in job.keys else settings.pop(name), float)
-            for name in STARTS
-        )
-        flight = Scenario(model, q0, v0, 1.0)
-    else:
-        start = job.table.get("start")
-        settles = isinstance(start, dict) and "settle" in start
-        if settles or job.phases or any(key.split(".")[0] != "start" for key in job.keys):
-            return None
-        flights = [_scenario(job, model, p) for p in (points if job.keys else points[:1])]
-        flight = flights[0]
-        q0, v0 = (np.array([getattr(each, name) for each in flights]) for name in STARTS)
+    start = (job.table or {}).get("start")
+    settles = isinstance(start, dict) and "settle" in start
+    others = {key.split(".")[0] for key in job.keys} - {"start", *STARTS}
+    if settles or others or job.phases:
+        return None
+    flights = [_flight(job, model, p) for p in (points if job.keys else points[:1])]
+    flight, settings = flights[0]
     settings = {"controller": flight.controller, "t_span": flight.duration} | (
         flight.settings | settings
     )
@@ -148,40 +223,36 @@ def _side_by_side(job: Job, model: Model, points: Sequence[Point]) -> list[Outco
     span = float(np.ptp([0.0, *np.atleast_1d(settings["t_span"])][-2:]))
     ends_alone = set(job.outputs) <= set(ENDS)  # which need no other sample
     settings.setdefault("output_step", span / (1 if ends_alone else INTERVALS))
-    flight = replace(
-        flight,
-        q0=np.broadcast_to(q0, (len(points), model.nq)),
-        v0=np.broadcast_to(v0, (len(points), model.nv)),
+    q0, v0 = (
+        np.broadcast_to([getattr(each, name) for each, _ in flights], (len(points), size))
+        for name, size in zip(STARTS, (model.nq, model.nv), strict=True)
     )
     parameters = [job.parameters_of(point) for point in points]
     runs = {name: [each[name] for each in parameters] for name in parameters[0]}
-    rollouts = flight.simulate(**settings, parameters=runs)
+    rollouts = replace(flight, q0=q0, v0=v0).simulate(**settings, parameters=runs)
     assert isinstance(rollouts, Rollouts)
-    return _outcomes(rollouts, job.outputs)
 
-
-def _outcomes(rollouts: Rollouts, outputs: Sequence[str]) -> list[Outcome]:
-    """Return the outcomes of runs."""
+    # the last sample of each run
     last = np.maximum(np.isfinite(rollouts.kinetic).sum(axis=1) - 1, 0)
     every = np.arange(len(rollouts))
     arrays = (rollouts.q, rollouts.v, rollouts.kinetic, rollouts.potential)
     columns = [rollouts.ends.tolist(), *(x[every, last].tolist() for x in arrays)]
-    ends = dict(zip(ENDS, columns, strict=True))
     outcomes: list[Outcome] = []
-    for k, error in enumerate(rollouts.errors):
-        if error is not None:
-            outcomes.append((None, _error_text(error)))
-        elif ends.keys() >= set(outputs):
-            outcomes.append((json.dumps({name: ends[name][k] for name in outputs}), None))
+    for k, row in enumerate(zip(*columns, strict=True)):
+        if rollouts.errors[k] is not None:
+            outcomes.append((None, _error_text(rollouts.errors[k])))
+        elif ends_alone:
+            ends = dict(zip(ENDS, row, strict=True))
+            outcomes.append((json.dumps({name: ends[name] for name in job.outputs}), None))
         else:
-            outcomes.append((json.dumps(_outputs(rollouts[k], outputs)), None))
+            outcomes.append((_as_text(_outputs(rollouts[k], job.outputs)), None))
     return outcomes
 
 
 def _outputs(motion: Trajectory, outputs: Sequence[str]) -> dict[str, Any]:
     """Return the outputs of a motion by name."""
     arrays = (motion.t[-1], motion.q[-1], motion.v[-1], motion.kinetic[-1], motion.potential[-1])
-    found = dict(zip(ENDS, (np.asarray(x).tolist() for x in arrays), strict=True))
+    found = dict(zip(ENDS, arrays, strict=True))
     found |= numbers_of(motion.model, motion, outputs)  # type: ignore[arg-type]
     return {name: found[name] for name in outputs}
 
@@ -194,6 +265,6 @@ def _as_text(outcome: dict[str, Any]) -> str:
         raise SweepError(f"run: its outcome is not plain data ({reason})") from None
 
 
-def _error_text(reason: BaseException) -> str:
+def _error_text(reason: BaseException | None) -> str:
     """Return the text of a failure in a row."""
     return f"{type(reason).__name__}: {reason}"[:MOST_TEXT]

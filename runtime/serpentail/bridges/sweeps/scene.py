@@ -9,7 +9,7 @@ from ...basics.errors import SweepError
 from ...scenes.file import read_scene, subtable
 from ...scenes.keys import SWEEP, read
 from .axis import Grid, Spread, grid, latin, random, sobol
-from .job import RUNS
+from .runs import RUNS
 
 SPREADS = {"random": random, "latin": latin, "sobol": sobol}
 

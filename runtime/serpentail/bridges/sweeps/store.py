@@ -292,7 +292,7 @@ def shared_numbers(old: Mapping[str, Any], new: Mapping[str, Any]) -> np.ndarray
         for spec, size in zip((old, new), sizes, strict=True)
     )
     numbers = np.arange(others.size).reshape(sizes[1]).transpose(order)
-    both = [np.intersect1d(*(each[k] for each in places), True, True)[1:] for k in places[0]]
+    both = [np.intersect1d(places[0][k], places[1][k], True, True)[1:] for k in places[0]]
     here, there = (np.ix_(*each) for each in zip(*both, strict=True))
     shared = models[here] == others.transpose(order)[there]
     found.reshape(sizes[0])[here] = np.where(shared, numbers[there], -1)

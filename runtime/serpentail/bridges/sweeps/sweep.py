@@ -1,26 +1,23 @@
 """``sweep``: makes many runs, keeps each as a row of a store, and resumes where it was stopped."""
 
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from ...basics.checks import none_of, number, one_of, refusal, shown
+from ...basics.checks import none_of, number, one_of, refusal
 from ...basics.errors import SweepError
 from ...model.model import Model
 from ...model.state import State
 from .axis import Grid, Spread, plain
 from .driver import Driver
-from .job import RUNS, STARTS, Job
 from .points import axes_of
 from .pose import pose
 from .processes import BlockSettings
 from .result import Sweep
-from .runs import ENDS, OUTPUTS
+from .runs import ENDS, OUTPUTS, RUNS, STARTS, Job
 from .store import Store
-from .worker import importing
 
 WITHOUT = ("watch", "threads", "parameters")  # settings of a run that a sweep has itself
 
@@ -51,8 +48,8 @@ def sweep(  # noqa: PLR0913 - the public face names all that it takes
         a scene also a key of its table, such as "start.pitch" or "duration", or of its model,
         such as "segments" and "links"; with a model also "q0", "v0" or a setting.
     run : {"simulate", "plan", "identify"} or callable, default "simulate"
-        What to run. A function f(model, point) or f(point) of a module returns a dict of plain
-        data. It may add its Trajectory or Plan as "motion", for pages.
+        What to run. A function f(model, point) or f(point) returns a dict of plain data. It may
+        add its Trajectory or Plan as "motion", for pages.
     store : str or path, optional
         Folder for the rows, in Parquet files; needs the extra "parquet". Default: in memory. A
         second call with the same model, run and points runs only what is missing.
@@ -103,22 +100,15 @@ def sweep(  # noqa: PLR0913 - the public face names all that it takes
     >>> sweep = st.sweep("kick", over, points=8, store="kick.rows")  # doctest: +SKIP
     >>> sweep.to_pandas()  # doctest: +SKIP
     """
-    if importing.is_set():
-        raise SweepError(
-            "the main program calls sweep where a worker imports its functions: put the call below "
-            'the line if __name__ == "__main__":'
-        )
     rows = posed(
         model, over, run, store, points=points, seed=seed, settings=settings, outputs=outputs, of=of
     )
     limit = None if limit is None else number("limit", limit, SweepError, unit="s", above=0)
     name = model.name if isinstance(model, Model) else Path(model or _function_name(run)).stem
-    job = rows.posed.job.pickled()
-    script = _script(job)
     with rows.store.writing():
         if retry_failed:
             rows.store.forget()
-        shared = BlockSettings(job, script, limit, run == "simulate")
+        shared = BlockSettings(rows.posed.job.pickled(), limit, run == "simulate")
         Driver(rows, shared, name).drive(executor)
     return rows
 
@@ -141,8 +131,15 @@ def posed(  # noqa: PLR0913 - the arguments of ``sweep`` on which rows depend
         raise SweepError(f"{wrong}, or a function")
     axes = axes_of(over, points, seed)
     job = Job(run, _settings(settings, run), _outputs(outputs, run))
-    job.identity()  # refuses functions that other processes cannot import
-    job.pickled()
+    try:
+        job.identity(), job.pickled()
+    except SweepError:
+        raise
+    except Exception as reason:  # whatever a part of it raises
+        raise SweepError(
+            f"run, settings: they cannot be sent to another process ({reason}): take a function at "
+            "the top of a module, and settings that can be pickled"
+        ) from None
     problem = pose(model, axes, job, of)
     return Sweep(problem, Store(store, problem.spec, len(axes)))
 
@@ -160,10 +157,7 @@ def _settings(settings: Any, run: Any) -> dict[str, Any]:
             raise SweepError(f"settings: {name}: is set by the sweep: leave it out")
     if isinstance(checked.get("q0"), State):
         checked |= dict(zip(STARTS, checked["q0"], strict=True))
-    for name in STARTS:
-        if name in checked:
-            checked[name] = plain(f"settings: {name}", checked[name])
-    return checked
+    return checked | {n: plain(f"settings: {n}", checked[n]) for n in STARTS if n in checked}
 
 
 def _outputs(outputs: Any, run: Any) -> tuple[str, ...]:
@@ -171,9 +165,7 @@ def _outputs(outputs: Any, run: Any) -> tuple[str, ...]:
     if outputs is None:
         return ENDS if run == "simulate" else ()
     if run != "simulate":
-        raise SweepError(
-            f"outputs: value {shown(outputs)}: only run='simulate' has a choice: leave it out"
-        )
+        raise refusal("outputs", outputs, "run='simulate', or nothing here", SweepError)
     if isinstance(outputs, str) or not isinstance(outputs, Sequence) or not outputs:
         raise refusal("outputs", outputs, "a list of names", SweepError)
     return tuple(one_of("outputs", name, OUTPUTS, SweepError) for name in outputs)
@@ -184,16 +176,3 @@ def _function_name(run: Any) -> str:
     while isinstance(run, partial):
         run = run.func
     return str(getattr(run, "__name__", type(run).__name__))
-
-
-def _script(job: bytes) -> str | None:
-    """Return the path of the main program if a pickled job has functions of it, else None."""
-    if b"__main__" not in job:
-        return None
-    script = getattr(sys.modules["__main__"], "__file__", None)
-    if script is None:
-        raise SweepError(
-            "run: a function of an interactive session: write it to a module that other processes "
-            "can import"
-        )
-    return str(Path(script).absolute())

@@ -3,11 +3,8 @@
 import os
 import pickle
 import queue
-import runpy
 import signal
-import sys
 import threading
-import types
 import zlib
 from dataclasses import replace
 from functools import lru_cache
@@ -19,11 +16,9 @@ from ...compiling.cache import cache_folder
 from ...model.load import model_from
 from ...model.manifest import CheckedFolder, snapshot
 from ...model.model import Model
-from .job import Job
-from .runs import run_points
+from .runs import Job, run_points
 
 MOST_MODELS = 64  # that a process keeps
-importing = threading.Event()  # while this process imports the driver's main program
 
 
 class Bundle(NamedTuple):
@@ -53,17 +48,8 @@ def _model(bundle: Bundle, parameters: bytes, profile: str | None) -> Model:
 
 
 @lru_cache(1)
-def _job(script: str | None, data: bytes) -> Job:
-    """Return a job; if it needs the driver's program, import that first, as multiprocessing does."""
-    if script is not None:
-        module = types.ModuleType("__mp_main__")
-        importing.set()
-        try:
-            module.__dict__.update(runpy.run_path(script, run_name="__mp_main__"))
-        finally:
-            importing.clear()
-        sys.modules["__main__"] = sys.modules["__mp_main__"] = module
-    job: Job = pickle.loads(data)
+def _job(content: bytes) -> Job:
+    job: Job = pickle.loads(content)
     return job
 
 
@@ -79,9 +65,9 @@ def main(descriptor: int) -> None:
     tasks: queue.SimpleQueue = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(link, tasks), daemon=True).start()
     while True:
-        script, data, bundle, points, first_limit, limit = tasks.get()
+        content, bundle, points, first_limit, limit = tasks.get()
         try:
-            job = _job(script, data)
+            job = _job(content)
             model = model_of(bundle, job)
         except (SerpentailError, ImportError, AttributeError, OSError) as reason:
             link.send(f"{reason}")
