@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import serpentail as st
-from serpentail.bridges.sweeps import supervision
+from serpentail.bridges.sweeps import processes
 from serpentail.bridges.sweeps.result import Status
 from tests.support import swept
 
@@ -36,7 +36,7 @@ def test_dask_needs_no_main_guard_and_functions_of_the_program_tell_that_they_do
 
 
 def test_a_worker_process_does_not_hear_ctrl_c_while_it_starts(capfd):
-    process = supervision.Process()
+    process = processes.Process()
     try:
         for _ in range(20):
             process.child.send_signal(signal.SIGINT)
@@ -71,8 +71,8 @@ def test_a_limit_is_of_processor_time_and_what_sleeps_is_given_up_without_a_row(
     found = st.sweep(None, over, run, limit=0.15, executor=worker)
     assert found[0]["error"] is None and found[0]["seconds"] >= 0.4
     assert found.status() == Status(2, 1, 0) and found.spent.hung == 1
-    monkeypatch.setattr(supervision, "HANGS", 0.3)  # as where many others are at work
-    monkeypatch.setattr(supervision, "LEAST", 1e-3)
+    monkeypatch.setattr(processes, "HANGS", 0.3)  # as where many others are at work
+    monkeypatch.setattr(processes, "LEAST", 1e-3)
     over = {"number_of": st.grid(swept.HANGS)}
     found = st.sweep(None, over, run, limit=0.5, executor=worker)  # but it does not hang
     assert found[0]["error"].startswith("TimeLimit")

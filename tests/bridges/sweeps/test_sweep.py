@@ -61,45 +61,35 @@ def test_all_executors_make_the_same_rows():
         assert not processes._all and not processes._idle  # none is left of its own
 
 
-class Forgetful(ThreadPoolExecutor):
-    """Loses the first blocks that it gets."""
+class Broken(ThreadPoolExecutor):
+    """Loses the blocks that it gets."""
 
-    lost = 0
-
-    def submit(self, *work):
-        if not self.lost:
-            return super().submit(*work)
-        self.lost -= 1
+    def submit(self, *_):
         gone = Future()
         gone.set_exception(BrokenExecutor("the worker has died"))
         return gone
 
 
-def test_a_block_that_a_worker_lost_runs_again_and_an_executor_that_is_gone_is_named(monkeypatch):
-    """Three times at most."""
+def test_an_executor_that_is_gone_is_named(monkeypatch):
+    """When its workers are lost, when it takes no more work, and when it does not answer."""
 
     def squares(executor):
         return st.sweep(None, {"x": st.grid([3])}, swept.square, executor=executor, limit=60)
 
-    with Forgetful(1) as executor:
-        executor.lost = 3
-        assert [row["square"] for row in squares(executor).rows()] == [9]
-        executor.lost = 4
-        with pytest.raises(st.SweepError, match="the worker has died"):
-            squares(executor)
-    with ThreadPoolExecutor(1) as executor:
-        pass  # it takes no more work
+    with Broken(1) as executor, pytest.raises(st.SweepError, match="the worker has died"):
+        squares(executor)
     with pytest.raises(st.SweepError, match=r"its workers are gone.*after shutdown"):
+        with ThreadPoolExecutor(1) as executor:
+            pass
         squares(executor)
 
     def lost():
         raise ConnectionResetError("reset by the scheduler")
 
-    with ThreadPoolExecutor(1) as executor:
-        place = Place(executor.submit, lost)
-        monkeypatch.setattr(driver, "place_of", lambda _: nullcontext(place))
-        with pytest.raises(st.SweepError, match=r"are gone.*reset by the scheduler"):
-            squares(None)
+    place = Place(executor.submit, lost)
+    monkeypatch.setattr(driver, "place_of", lambda _: nullcontext(place))
+    with pytest.raises(st.SweepError, match=r"are gone.*reset by the scheduler"):
+        squares(None)
 
 
 def test_a_second_call_runs_what_is_missing_only(tmp_path):

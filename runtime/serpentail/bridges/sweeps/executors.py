@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ...basics.checks import refusal
-from ...basics.errors import SweepError
+from ...basics.errors import SerpentailError, SweepError
 from ...basics.extras import needed
 from ...compiling.threads import checked_threads, threads
 from .processes import ending
@@ -16,6 +16,9 @@ from .processes import ending
 CHOICES = (
     'None, "processes", "processes:4", "dask", "dask:tcp://host:8786", "dask:scheduler.json", or '
     "an executor of concurrent.futures"
+)
+GONE = (
+    "executor: its workers are gone: finished rows are kept, and the same call resumes from there"
 )
 PATIENCE_S = 30  # s to wait for a scheduler
 RETRIES = 3  # by Dask, of a task whose worker is gone
@@ -82,3 +85,14 @@ def _dask(address: str) -> Iterator[Place]:
             lambda: max(1, sum(client.nthreads().values())),
             lambda: client.status == "running",
         )
+
+
+def asked(ask: Callable, *arguments: Any) -> Any:
+    """Ask an executor; what it raises, whatever that is, tells that it is gone."""
+    try:
+        return ask(*arguments)
+    except SerpentailError:
+        raise
+    except Exception as reason:
+        words = " ".join(str(reason).split())
+        raise SweepError(f"{GONE} ({type(reason).__name__}: {words:.300})") from reason

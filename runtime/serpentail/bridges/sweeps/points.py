@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...basics.checks import refusal, shown, whole_number
+from ...basics.checks import refusal, whole_number
 from ...basics.errors import SweepError
 from .axis import Grid, Spread, in_units, spread
 
@@ -146,19 +146,23 @@ def axes_of(over: Any, points: Any, seed: Any) -> Axes:
     kinds = sorted({axis.kind for axis in spreads.values()})
     if len(kinds) > 1:
         raise SweepError(f"over: {' and '.join(kinds)} together: needs one of them for all axes")
-    if spreads and points is None:
-        raise SweepError("points: no value: needs the number of points of the random axes")
-    if not spreads and points is not None:
-        none = "none: no axis is made by st.random, st.latin or st.sobol"
-        raise refusal("points", points, none, SweepError)
-    count = whole_number("points", points, SweepError, least=1, most=MOST_POINTS) if spreads else 1
     seed = whole_number("seed", seed, SweepError, least=0, most=MOST_SEED)
-    axes = Axes(grids, spreads, count, seed)
+    axes = Axes(grids, spreads, _samples(spreads, points), seed)
     if len(axes) > MOST_POINTS:
         raise SweepError(
             f"over: {len(axes)} points: needs at most {MOST_POINTS}: make several sweeps"
         )
     return axes
+
+
+def _samples(spreads: Mapping, points: Any) -> int:
+    """Return the number of samples; 1 without spreads."""
+    if spreads:
+        return whole_number("points", points, SweepError, least=1, most=MOST_POINTS)
+    if points is not None:
+        none = "none, because no axis is made by st.random, st.latin or st.sobol"
+        raise refusal("points", points, none, SweepError)
+    return 1
 
 
 def _columns(names: Names, values: Sequence) -> Sequence[Sequence]:

@@ -25,15 +25,16 @@ from .points import Axes, Point, Units
 from .runs import DATA, STARTS, Job
 from .worker import Bundle
 
-TABLES: Mapping[str, tuple[Key, type[Exception]]] = {
-    "simulate": (SIMULATE, SimulationError),
-    "plan": (PLAN, PlanningError),
-    "identify": (IDENTIFY, IdentificationError),
-}
-NEEDED = {  # of a run of a model: settings, and what they are
-    "simulate": (STARTS, "where a motion starts"),
-    "plan": (STARTS, "where a motion starts"),
-    "identify": ((DATA, "markers"), "tracks, and where the markers are"),
+STARTED = (STARTS, "where a motion starts")
+# of each run: its table of a scene; of one of a model, the settings that it needs, and in words
+RUN_KEYS: Mapping[str, tuple[Key, type[Exception], tuple[tuple[str, ...], str]]] = {
+    "simulate": (SIMULATE, SimulationError, STARTED),
+    "plan": (PLAN, PlanningError, STARTED),
+    "identify": (
+        IDENTIFY,
+        IdentificationError,
+        ((DATA, "markers"), "tracks, and where the markers are"),
+    ),
 }
 BundleOf = Callable[[Point], Bundle | None]
 NO_SHAPE = "the shape of a model is fixed: give the sweep a scene, or a function without a model"
@@ -43,24 +44,15 @@ NO_SHAPE = "the shape of a model is fixed: give the sweep a scene, or a function
 class Posed:
     """A sweep that is well posed: its axes in SI, its job, and its models.
 
-    model_places: which of the bundles the points have, an array that has a place for each value of
-    the axes that decide on the model, and one for all values of the others. spec: plain data that
+    models: which of the bundles each point has, by its place on the axes. spec: plain data that
     tells this sweep from others, see ``Store``.
     """
 
     axes: Axes
     job: Job
     bundles: list[Bundle | None]
-    model_places: np.ndarray
+    models: np.ndarray
     spec: dict[str, Any]
-
-    def models(self, numbers: np.ndarray) -> np.ndarray:
-        """Return which of the bundles the points of some numbers have."""
-        if len(self.bundles) == 1:
-            return np.zeros(len(numbers), int)
-        places = self.axes.places(numbers)
-        found: np.ndarray = np.broadcast_to(self.model_places, self.axes.sizes)[places]
-        return found
 
 
 def pose(what: Any, axes: Axes, job: Job, of: Any) -> Posed:
@@ -98,7 +90,7 @@ def pose(what: Any, axes: Axes, job: Job, of: Any) -> Posed:
     firsts = np.ravel_multi_index(np.unravel_index(models, shape), axes.sizes)
     bundles = [bundle(point) for point in axes.at(firsts)]
 
-    hashes = np.array([bundle.manifest_hash if bundle else "" for bundle in bundles])
+    hashes = np.array([bundle.identity if bundle else "" for bundle in bundles])
     files = job.digest_of({}) if job.run == "identify" and DATA not in axes.names else ""
     spec = {
         "family": [__version__, job.identity(), plain("of", of), files, sorted(job.built)],
@@ -111,7 +103,7 @@ def pose(what: Any, axes: Axes, job: Job, of: Any) -> Posed:
         "seed": axes.seed,
         "models": hashes.reshape(shape).tolist(),
     }
-    return Posed(axes, job, bundles, models.reshape(shape), spec)
+    return Posed(axes, job, bundles, np.broadcast_to(models.reshape(shape), axes.sizes), spec)
 
 
 def _row_texts(names: tuple[str, ...], columns: Sequence[Sequence], job: Job) -> list[str]:
@@ -133,7 +125,7 @@ def _of_model(model: Model, axes: Axes, job: Job) -> tuple[Job, Units, BundleOf]
     if isinstance(job.run, str):
         model.serve(job.run)  # workers add no functions
         units |= dict.fromkeys(others - {DATA})
-        needed, words = NEEDED[job.run]
+        needed, words = RUN_KEYS[job.run][2]
         missing = [name for name in needed if name not in {*job.settings, *others}]
         if missing:
             raise SweepError(
@@ -141,11 +133,8 @@ def _of_model(model: Model, axes: Axes, job: Job) -> tuple[Job, Units, BundleOf]
             )
     baked = model.manifest["scene"]["baked"]
     parameters = {} if baked else independent(model.manifest, model.parameters)
-    job = replace(
-        job, keys=others, parameters=parameters, profile=model.profile, parent=str(Path.cwd())
-    )
-    bundle = Bundle.of(model.checked)
-    return job, units, lambda _: bundle
+    bundle = Bundle.of(model.checked, parameters or None, model.profile)
+    return replace(job, keys=others, parent=str(Path.cwd())), units, lambda _: bundle
 
 
 def _of_scene(scene: Any, axes: Axes, job: Job) -> tuple[Job, Units, BundleOf]:
@@ -156,7 +145,7 @@ def _of_scene(scene: Any, axes: Axes, job: Job) -> tuple[Job, Units, BundleOf]:
     keys: list[str] = []
     units: dict[str, Any] = {}
     if isinstance(job.run, str):
-        key, error = TABLES[job.run]
+        key, error, _ = RUN_KEYS[job.run]
         table = subtable(tables, job.run, path, error)
         keys = [name for name in axes.names if name.split(".")[0] in key.keys]
         units = {name: _unit_at(key, name) for name in keys}
@@ -233,6 +222,6 @@ def _refuse_unknown(names: Collection[str], run: str, known: Collection[str]) ->
     """SweepError for a name that is neither a parameter nor a key of the table."""
     for name in names:
         if name not in known:
-            near = did_you_mean(name.split(".")[0], [*known, *MADE_OF, *TABLES[run][0].keys])
+            near = did_you_mean(name.split(".")[0], [*known, *MADE_OF, *RUN_KEYS[run][0].keys])
             remedy = near or f"the parameters are {', '.join(sorted(known))}"
             raise SweepError(f"over: {shown(name)}: no parameter and no key of [{run}]; {remedy}")

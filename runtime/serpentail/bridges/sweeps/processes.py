@@ -118,6 +118,7 @@ class Process:
         self.child = subprocess.Popen(
             [sys.executable, "-c", COMMAND.format(there.fileno())],
             env=inherited(**{VARIABLE: "1"}),  # its siblings use the other cores
+            stdin=subprocess.DEVNULL,
             pass_fds=[there.fileno()],
             process_group=0,  # Ctrl-C is the driver's to answer
         )

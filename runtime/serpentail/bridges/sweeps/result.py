@@ -8,8 +8,6 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from serpentail_scene.messages import one_line
 
 from ...basics.errors import SweepError
@@ -148,9 +146,9 @@ class Sweep(NearNames):
         SerpentailError
             What the run raises.
         """
-        number, job = [checked_row(k, len(self))], self.posed.job
-        bundle = self.posed.bundles[self.posed.models(np.array(number))[0]]
-        _, motion = run_point(job, model_of(bundle, job), self.axes.at(number)[0])
+        number = checked_row(k, len(self))
+        model = model_of(self.posed.bundles[self.posed.models.flat[number]])
+        _, motion = run_point(self.posed.job, model, self.axes.at([number])[0])
         if motion is None:
             raise SweepError(
                 f"point {k}: its run returned no motion: let the function return it as "

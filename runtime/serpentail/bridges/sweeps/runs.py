@@ -47,8 +47,7 @@ class Job:
     settings: of st.simulate, st.plan or st.identify. outputs: names of a simulation's outputs.
     table, phases, parent: of a scene; a model has no table. parent is the folder of the files that
     are named: the scene's, or the one where the sweep was called. built: names that the model was
-    built with. keys: names of keys of the table, or of settings. parameters, profile: of a model
-    that was given.
+    built with. keys: names of keys of the table, or of settings.
     """
 
     run: str | Callable[..., Any]
@@ -59,8 +58,6 @@ class Job:
     parent: str = ""
     built: frozenset[str] = frozenset()
     keys: frozenset[str] = frozenset()
-    parameters: Mapping[str, Any] = field(default_factory=dict)
-    profile: str | None = None
 
     def parameters_of(self, point: Point) -> Point:
         """Return the parameters of the model that a point has."""
@@ -98,8 +95,7 @@ class Job:
 
     def identity(self) -> str:
         """Return what rows depend on besides the model and the point; objects as digests."""
-        parts = (self.settings, self.outputs, self.table, self.phases, self.parameters)
-        told = [_name_of(self.run), *parts, self.profile]
+        told = [_name_of(self.run), self.settings, self.outputs, self.table, self.phases]
         return json.dumps(told, sort_keys=True, default=lambda x: _digest(pickle.dumps(x)))
 
 

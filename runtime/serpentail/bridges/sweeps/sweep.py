@@ -1,7 +1,6 @@
 """``sweep``: makes many runs, keeps each as a row of a store, and resumes where it was stopped."""
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -104,7 +103,11 @@ def sweep(  # noqa: PLR0913 - the public face names all that it takes
         model, over, run, store, points=points, seed=seed, settings=settings, outputs=outputs, of=of
     )
     limit = None if limit is None else number("limit", limit, SweepError, unit="s", above=0)
-    name = model.name if isinstance(model, Model) else Path(model or _function_name(run)).stem
+    name = (
+        model.name
+        if isinstance(model, Model)
+        else Path(model or getattr(run, "__name__", "sweep")).stem
+    )
     with rows.store.writing():
         if retry_failed:
             rows.store.forget()
@@ -169,10 +172,3 @@ def _outputs(outputs: Any, run: Any) -> tuple[str, ...]:
     if isinstance(outputs, str) or not isinstance(outputs, Sequence) or not outputs:
         raise refusal("outputs", outputs, "a list of names", SweepError)
     return tuple(one_of("outputs", name, OUTPUTS, SweepError) for name in outputs)
-
-
-def _function_name(run: Any) -> str:
-    """Return the name of a function."""
-    while isinstance(run, partial):
-        run = run.func
-    return str(getattr(run, "__name__", type(run).__name__))

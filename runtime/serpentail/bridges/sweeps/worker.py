@@ -1,11 +1,13 @@
 """A process that runs points, so that a crash or a hang in a point ends this process only."""
 
+import hashlib
 import os
 import pickle
 import queue
 import signal
 import threading
 import zlib
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
 from multiprocessing.connection import Connection
@@ -16,35 +18,37 @@ from ...compiling.cache import cache_folder
 from ...model.load import model_from
 from ...model.manifest import CheckedFolder, snapshot
 from ...model.model import Model
+from .axis import as_json
 from .runs import Job, run_points
 
 MOST_MODELS = 64  # that a process keeps
 
 
 class Bundle(NamedTuple):
-    """A model's generated folder as it is sent to workers: the manifest's hash, and all, packed."""
+    """A model as it is sent to workers: its folder, parameters and profile, and a hash of these."""
 
-    manifest_hash: str
+    identity: str
     content: bytes
 
     @classmethod
-    def of(cls, checked: CheckedFolder) -> "Bundle":
+    def of(
+        cls, checked: CheckedFolder, parameters: Mapping | None = None, profile: str | None = None
+    ) -> "Bundle":
         """Return the bundle of a folder that was checked."""
         whole = CheckedFolder(checked.folder, checked.manifest, dict(checked.files))
-        return cls(checked.manifest_hash, zlib.compress(pickle.dumps(whole)))
-
-
-def model_of(bundle: Bundle | None, job: Job) -> Model | None:
-    """Return the model of a bundle for a job, compiled if this machine has not yet done so."""
-    return bundle and _model(bundle, pickle.dumps(job.parameters), job.profile)
+        told = as_json([checked.manifest_hash, parameters, profile])
+        content = zlib.compress(pickle.dumps((whole, parameters, profile)))
+        return cls(hashlib.sha256(told.encode()).hexdigest(), content)
 
 
 @lru_cache(MOST_MODELS)
-def _model(bundle: Bundle, parameters: bytes, profile: str | None) -> Model:
-    """Return the model of a folder that is put into this machine's cache."""
-    checked: CheckedFolder = pickle.loads(zlib.decompress(bundle.content))
+def model_of(bundle: Bundle | None) -> Model | None:
+    """Return the model of a bundle, compiled if this machine has not yet done so."""
+    if bundle is None:
+        return None
+    checked, parameters, profile = pickle.loads(zlib.decompress(bundle.content))
     checked = replace(checked, folder=snapshot(checked, cache_folder(None)))
-    return model_from(checked, pickle.loads(parameters) or None, profile=profile)
+    return model_from(checked, parameters, profile=profile)
 
 
 @lru_cache(1)
@@ -68,7 +72,7 @@ def main(descriptor: int) -> None:
         content, bundle, points, first_limit, limit = tasks.get()
         try:
             job = _job(content)
-            model = model_of(bundle, job)
+            model = model_of(bundle)
         except (SerpentailError, ImportError, AttributeError, OSError) as reason:
             link.send(f"{reason}")
             continue
