@@ -14,11 +14,11 @@ from pathlib import Path
 
 import ezc3d  # noqa
 import pytest
+from serpentail.bridges.sweeps.shards import Row, Shard
 
 import serpentail as st
 from serpentail.bridges.sweeps.result import Sweep
 from serpentail.bridges.sweeps.scene import arguments_of
-from serpentail.bridges.sweeps.shards import Row, Shard
 from serpentail.bridges.sweeps.sweep import posed
 from serpentail.cli import cli
 from serpentail.identification import c3d, c3d_child

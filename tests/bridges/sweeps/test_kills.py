@@ -1,24 +1,20 @@
 """The store of a sweep: each row once, whole, by one writer, also where parts are killed."""
 
-import os
 import resource
 import signal
 import subprocess
 import sys
 import time
 from collections import Counter
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.bridges.sweeps.shards import Row, Shard
-from serpentail.bridges.sweeps.store import Store
+from serpentail.bridges.sweeps.store import Row, Store
 from tests.support import swept
 from tests.support.rows import row
 
@@ -31,9 +27,9 @@ SPEC = {"family": [], "grids": [[["x"], ["1", "2"]]], "spreads": [], "points": 1
 SPEC |= {"models": [""], "varied": []}
 
 
-def shard(*numbers, failed=()):
+def made(*numbers, failed=()):
     told = [(None, "wrong") if n in failed else (f'{{"y":{n}}}', None) for n in numbers]
-    return Shard.of([Row(n, *each, 0.5) for n, each in zip(numbers, told, strict=True)])
+    return [Row(n, *each, 0.5) for n, each in zip(numbers, told, strict=True)]
 
 
 def numbers_of(store):
@@ -42,11 +38,11 @@ def numbers_of(store):
 
 
 def test_rows_are_read_in_order_and_once_and_can_be_forgotten(tmp_path):
-    """Also if a worker that was thought to be lost wrote its shard after others did its work."""
+    """Also if a kill left rows that were forgotten in two files."""
     for path in (None, tmp_path / "s"):
         store = Store(path, SPEC, 300_000)
         with row(path), store.writing():
-            for part in (shard(7, 9, 250_000, failed=[9]), shard(*range(7)), shard(8, failed=[8])):
+            for part in (made(7, 9, 250_000, failed=[9]), made(*range(7)), made(8, failed=[8])):
                 store.accept(part)
             assert numbers_of(store) == [*range(10), 250_000] and store.failed == 2
             assert store.row(9) == Row(9, None, "wrong", 0.5) and store.row(10) is None
@@ -54,19 +50,15 @@ def test_rows_are_read_in_order_and_once_and_can_be_forgotten(tmp_path):
             store.forget()
             store.forget([3, 250_000])
             assert numbers_of(store) == [0, 1, 2, 4, 5, 6, 7] and store.failed == 0
-    shard(6, 7, 8).written(store.folder)
+    (path / "not.parquet").touch()
+    with store.writing():
+        store.accept(made(6, 7, 8))
     again = Store(path, SPEC, 300_000)
     assert numbers_of(again) == [0, 1, 2, 4, 5, 6, 7]
-    (path / "not.parquet").touch()
-    with again.writing():
-        again.accept(shard(8))
-        shard(8, 9).written(store.folder)
-    assert [each.name[:17] for each in sorted(path.glob("*/*/0*8*.parquet"))] == [f"{8:08}-{8:08}"]
-    assert numbers_of(Store(path, SPEC, 300_000)) == [0, 1, 2, 4, 5, 6, 7, 8]
-    for file in path.rglob("00000008*.parquet"):
+    for file in path.rglob("00000007*.parquet"):
         file.write_bytes(b"no rows")
-    with pytest.raises(st.SweepError, match=r"0*8-.*cannot be read.*delete it"):
-        numbers_of(Store(path, SPEC, 300_000))
+    with pytest.raises(st.SweepError, match=r"0*7-.*cannot be read.*delete it"):
+        numbers_of(again)
 
 
 def test_one_process_writes_and_other_files_are_refused(tmp_path):
@@ -74,7 +66,7 @@ def test_one_process_writes_and_other_files_are_refused(tmp_path):
     with first.writing():
         with pytest.raises(st.SweepError, match="another process is writing"), second.writing():
             pass
-        first.accept(shard(1))
+        first.accept(made(1))
         second.look()
         assert numbers_of(second) == [1]  # who reads may
     with second.writing():
@@ -113,15 +105,6 @@ def wait_for(count, folder, process):
     assert process.poll() is None, process.communicate()
 
 
-def settled(folder):
-    """Wait until workers whose driver is gone write no more, and return the rows."""
-    found = None
-    while found != set(rows(folder)):
-        found = set(rows(folder))
-        time.sleep(3)
-    return found
-
-
 def logged(folder):
     return Counter(map(int, (folder / "log").read_text().split()))
 
@@ -151,9 +134,9 @@ def few_rows():
     resource.setrlimit(resource.RLIMIT_FSIZE, (1450, 1450))
 
 
-def check_full(folder, executor, **settings):
-    """A full disk, for the driver or for workers, ends the sweep in one line."""
-    process = driver(folder, executor, **settings)
+def check_full(folder, executor):
+    """A full disk ends the sweep in one line."""
+    process = driver(folder, executor, preexec_fn=few_rows)
     _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 1
     told = errors.splitlines()[-1]
@@ -161,37 +144,10 @@ def check_full(folder, executor, **settings):
     assert 0 < len(rows(folder)) < swept.POINTS
 
 
-def killed_at_rename(path):
-    """Have this process die where it would give a file of rows its name."""
-
-    def die(*_):
-        os.kill(os.getpid(), signal.SIGKILL)
-
-    if not path.exists():
-        path.touch()
-        Path.replace = die
-
-
-def test_a_worker_that_dies_between_write_and_rename_leaves_no_row(tmp_path):
-    """The block is made by the next call, and the part of its file is no shard."""
-    given = {"over": {"x": st.grid([3, 4, 5])}, "run": swept.square, "store": tmp_path / "s.rows"}
-    once, spawn = tmp_path / "once", get_context("spawn")
-    for died in (True, False):
-        with ProcessPoolExecutor(1, spawn, killed_at_rename, (once,)) as pool:
-            if died:
-                with pytest.raises(st.SweepError, match="its workers are gone"):
-                    st.sweep(None, **given, executor=pool)
-                assert rows(tmp_path) == [] and [*tmp_path.rglob(".*.parquet.*.part")]
-            else:
-                found = st.sweep(None, **given, executor=pool)
-    assert sorted(rows(tmp_path)) == [(k, f'{{"square": {(k + 3) ** 2}}}', None) for k in range(3)]
-    assert found.spent.points == 3 and st.sweep(None, **given).spent.points == 0
-
-
 @pytest.mark.slow
 def test_a_full_disk_kills_and_ctrl_c_keep_the_rows(tmp_path):
     """On the same rows, one after the other: none is lost, and none that is there made again."""
-    check_full(tmp_path, "processes:2", preexec_fn=few_rows)
+    check_full(tmp_path, "processes:2")
     kept = {}
     for ending in (signal.SIGKILL, signal.SIGKILL, signal.SIGINT):
         count = len(rows(tmp_path)) + 5
@@ -207,20 +163,19 @@ def test_a_full_disk_kills_and_ctrl_c_keep_the_rows(tmp_path):
 
 
 @contextmanager
-def cluster(folder, limited=None):
+def cluster(folder):
     """Yield the name of Dask's scheduler, the scheduler and workers, as real processes, and what
-    starts a worker, one without a nanny. limited: called in each worker first.
+    starts a worker, one without a nanny.
     """
     file, parts = folder / f"{time.monotonic_ns()}.json", []
 
-    def begin(kind, *options, **settings):
+    def begin(kind, *options):
         command = [sys.executable, "-m", f"distributed.cli.dask_{kind}", "--no-dashboard", *options]
         command += ["--scheduler-file", file, "--host", "127.0.0.1"]
         quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-        parts.append(subprocess.Popen(command, cwd=ROOT, **quiet, **settings))
+        parts.append(subprocess.Popen(command, cwd=ROOT, **quiet))
 
     worker = partial(begin, "worker", "--nthreads", "1", "--no-nanny", "--death-timeout", "60")
-    worker = partial(worker, preexec_fn=limited)
     begin("scheduler", "--port", "0", "--no-show")
     try:
         worker()
@@ -237,7 +192,7 @@ def cluster(folder, limited=None):
 
 
 @pytest.mark.slow
-def test_dask_survives_kills_of_all_its_parts_and_a_full_disk(tmp_path):
+def test_dask_survives_kills_of_all_its_parts(tmp_path):
     with cluster(tmp_path) as (name, parts, worker):
         process = driver(tmp_path, name)
         wait_for(5, tmp_path, process)
@@ -246,7 +201,7 @@ def test_dask_survives_kills_of_all_its_parts_and_a_full_disk(tmp_path):
         worker()
         process.kill()
         process.communicate(timeout=PATIENCE)
-        kept = settled(tmp_path)
+        kept = set(rows(tmp_path))
         process = driver(tmp_path, name)
         wait_for(len(kept) + 5, tmp_path, process)
         parts[0].kill()  # the scheduler
@@ -255,6 +210,3 @@ def test_dask_survives_kills_of_all_its_parts_and_a_full_disk(tmp_path):
         assert kept < set(rows(tmp_path)) and len(rows(tmp_path)) < swept.POINTS
     with cluster(tmp_path) as (name, *_):
         finish(tmp_path, name)
-    (tmp_path / "full").mkdir()
-    with cluster(tmp_path, few_rows) as (name, *_):
-        check_full(tmp_path / "full", name)

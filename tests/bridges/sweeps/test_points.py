@@ -94,7 +94,7 @@ def test_points_that_cannot_be_are_refused_in_one_line():
         "'a' twice": lambda: points({"a": st.grid([1]), ("a",): st.grid([2])}),
         "'b' twice": lambda: points({"a, b": st.grid([[1, 2]]), "b": st.grid([2])}),
         "latin and random": lambda: points(one | {"b": st.latin(0, 1)}, 3),
-        "points: no value": lambda: points(one),
+        "points: value None": lambda: points(one),
         "points: value 3": lambda: points({"a": st.grid([1])}, 3),
         "points: value 0": lambda: points(one, 0),
         "seed: value -1": lambda: points(one, 3, -1),

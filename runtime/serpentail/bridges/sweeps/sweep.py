@@ -103,11 +103,8 @@ def sweep(  # noqa: PLR0913 - the public face names all that it takes
         model, over, run, store, points=points, seed=seed, settings=settings, outputs=outputs, of=of
     )
     limit = None if limit is None else number("limit", limit, SweepError, unit="s", above=0)
-    name = (
-        model.name
-        if isinstance(model, Model)
-        else Path(model or getattr(run, "__name__", "sweep")).stem
-    )
+    of_function = getattr(run, "__name__", "sweep")
+    name = model.name if isinstance(model, Model) else Path(model or of_function).stem
     with rows.store.writing():
         if retry_failed:
             rows.store.forget()
