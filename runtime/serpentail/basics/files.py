@@ -72,6 +72,17 @@ def write_csv(path: str | os.PathLike[str], rows: Iterable[Iterable[Any]]) -> Pa
     return Path(path)
 
 
+def write_netcdf(path: str | os.PathLike[str], data: Any) -> Path:
+    """Write a dataset of xarray as NetCDF, whole or not at all, and return the path.
+
+    SciPy, which is always installed, writes NetCDF 3 with 64-bit offsets. NotWritten if the system
+    refuses.
+    """
+    with replacing(path) as part:
+        data.to_netcdf(part, engine="scipy", format="NETCDF3_64BIT")
+    return Path(path)
+
+
 def _quoted(cell: Any) -> Any:
     """Return a cell, a text with a ' in front if it could be a formula."""
     if not isinstance(cell, str):

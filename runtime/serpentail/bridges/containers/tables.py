@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...basics.extras import needed
-from ...basics.files import replacing, write_csv
+from ...basics.files import write_csv, write_netcdf
 from ...motion.trajectory import Trajectory
 from ...simulation.rollouts import Rollouts
 from .contents import Contents, Quantity, contents
@@ -45,13 +45,9 @@ def dataset(motion: Trajectory | Rollouts) -> "xarray.Dataset":
 def write_dataset(motion: Trajectory | Rollouts, path: str | os.PathLike[str]) -> Path:
     """Write a NetCDF file, whole or not at all, and return its path.
 
-    ExtraMissing without xarray, NotWritten if it cannot be written. SciPy, which is always
-    installed, writes NetCDF 3 with 64-bit offsets.
+    ExtraMissing without xarray, NotWritten if it cannot be written.
     """
-    target, data = Path(path), dataset(motion)
-    with replacing(target) as part:
-        data.to_netcdf(part, engine="scipy", format="NETCDF3_64BIT")
-    return target
+    return write_netcdf(path, dataset(motion))
 
 
 def frame(motion: Trajectory | Rollouts) -> "pandas.DataFrame":

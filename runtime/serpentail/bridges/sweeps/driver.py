@@ -13,11 +13,10 @@ import numpy as np
 from ...basics.errors import SweepError
 from ...basics.progress import Stage
 from .executors import GONE, Place, asked, place_of
-from .processes import Block, BlockSettings, run_block
+from .processes import Block, BlockSettings, Bundle, model_of, run_block
 from .result import Sweep
 from .runs import run_points
 from .store import Row
-from .worker import Bundle, model_of
 
 LEAST_S = 1.0  # s of work that a block is to have
 MOST_S = 60.0  # s of work that a kill may cost

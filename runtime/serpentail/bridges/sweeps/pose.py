@@ -22,8 +22,8 @@ from ...scenes.plan import PLAN
 from ...scenes.simulate_keys import SIMULATE
 from .axis import as_json, plain
 from .points import Axes, Point, Units
+from .processes import Bundle
 from .runs import DATA, STARTS, Job
-from .worker import Bundle
 
 STARTED = (STARTS, "where a motion starts")
 # of each run: its table of a scene; of one of a model, the settings that it needs, and in words

@@ -16,10 +16,10 @@ from ...basics.near_names import NearNames
 from ...basics.short_repr import brief
 from .points import Axes, checked_row
 from .pose import Posed
+from .processes import model_of
 from .runs import run_point
 from .store import AT_ONCE, Row, Store
 from .tables import dataset, flat, write
-from .worker import model_of
 
 if TYPE_CHECKING:
     import pandas

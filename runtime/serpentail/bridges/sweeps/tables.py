@@ -11,7 +11,7 @@ import numpy as np
 from ...basics.checks import shown
 from ...basics.errors import SweepError
 from ...basics.extras import needed
-from ...basics.files import refuse_unwritable, replacing, write_csv
+from ...basics.files import refuse_unwritable, replacing, write_csv, write_netcdf
 from .store import AT_ONCE, parquet_library
 
 if TYPE_CHECKING:
@@ -47,11 +47,10 @@ def write(sweep: "Sweep", path: str | PathLike[str]) -> Path:
         names = list(dict.fromkeys(name for row in sweep for name in flat(row)))
         lines = ([row.get(name, "") for name in names] for row in map(flat, sweep))
         return write_csv(target, chain([names], lines))
+    if target.suffix == ".nc":
+        return write_netcdf(target, dataset(sweep))
     with replacing(target) as part:
-        if target.suffix == ".parquet":
-            _write_parquet(sweep, part)
-        else:
-            dataset(sweep).to_netcdf(part, engine="scipy", format="NETCDF3_64BIT")
+        _write_parquet(sweep, part)
     return target
 
 
@@ -98,8 +97,7 @@ def flat(row: dict[str, Any], before: str = "") -> dict[str, Any]:
 
 def dataset(sweep: "Sweep") -> "xarray.Dataset":
     """Return the rows as a dataset over the grids and the samples."""
-    xarray, pandas = needed("xarray", "xarray"), needed("pandas", "xarray")
-    axes = sweep.axes
+    xarray, pandas, axes = needed("xarray", "xarray"), needed("pandas", "pandas"), sweep.axes
     rows = [flat({k: x for k, x in row.items() if k not in axes.names}) for row in sweep]
     frame = pandas.DataFrame(rows).set_index("number").reindex(range(len(sweep)))
     dims = ["_".join(names) for names in axes.grids] + ["sample"] * bool(axes.spreads)
@@ -114,11 +112,8 @@ def dataset(sweep: "Sweep") -> "xarray.Dataset":
     for dim, (names, columns) in zip(dims, axes.grids.items(), strict=False):
         for name, values in zip(names, columns, strict=True):
             simple = all(isinstance(x, int | float | str) for x in values)
-            alone = f"{name}_value" if not simple else name
-            coordinates[alone if len(names) == 1 else name] = (
-                dim,
-                list(values) if simple else [str(x) for x in values],
-            )
+            label = name if simple or len(names) > 1 else f"{name}_value"
+            coordinates[label] = (dim, list(values) if simple else list(map(str, values)))
         coordinates.setdefault(dim, (dim, np.arange(len(columns[0]))))
     for name, samples in axes.samples.items():
         entries = _columns([flat({name: sample}) for sample in samples.tolist()])
