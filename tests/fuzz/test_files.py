@@ -14,11 +14,11 @@ from pathlib import Path
 
 import ezc3d  # noqa
 import pytest
-from serpentail.bridges.sweeps.shards import Row, Shard
 
 import serpentail as st
 from serpentail.bridges.sweeps.result import Sweep
 from serpentail.bridges.sweeps.scene import arguments_of
+from serpentail.bridges.sweeps.store import Row, Shard
 from serpentail.bridges.sweeps.sweep import posed
 from serpentail.cli import cli
 from serpentail.identification import c3d, c3d_child
@@ -55,7 +55,10 @@ OVER = {"x": st.grid(range(20)), "word": st.grid(["a", "b"])}
 
 def shard(path):
     rows = [Row(k, '{"square":4.0}' if k else None, None if k else "no", 0.1) for k in range(40)]
-    shutil.copy(Shard.of(rows).written(path.parent / "made").where, path)
+    made = sweep_of(path.parent, OVER)
+    with made.writing():
+        made.accept(rows)
+    shutil.copy(made.shards[0].where, path)
 
 
 def rows_of(path):

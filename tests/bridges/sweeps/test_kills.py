@@ -1,5 +1,6 @@
 """The store of a sweep: each row once, whole, by one writer, also where parts are killed."""
 
+import os
 import resource
 import signal
 import subprocess
@@ -7,7 +8,6 @@ import sys
 import time
 from collections import Counter
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +18,7 @@ from serpentail.bridges.sweeps.store import Row, Store
 from tests.support import swept
 from tests.support.rows import row
 
+distributed = pytest.importorskip("distributed")
 parquet = pytest.importorskip("pyarrow.parquet")
 
 ROOT = Path(__file__).parents[3]
@@ -78,14 +79,9 @@ def test_one_process_writes_and_other_files_are_refused(tmp_path):
 
 
 def driver(folder, executor, **settings):
-    return subprocess.Popen(
-        [sys.executable, "-m", "tests.support.swept", str(folder), executor, "0.1"],
-        cwd=ROOT,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        **settings,
-    )
+    command = [sys.executable, "-m", "tests.support.swept", str(folder), executor, "0.1"]
+    settings |= {"cwd": ROOT, "text": True, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    return subprocess.Popen(command, **settings)
 
 
 def rows(folder):
@@ -130,24 +126,17 @@ def finish(folder, executor):
 
 
 def few_rows():
-    """Let no file be larger than a shard of few rows."""
+    """Let no file be larger than one of few rows."""
     resource.setrlimit(resource.RLIMIT_FSIZE, (1450, 1450))
-
-
-def check_full(folder, executor):
-    """A full disk ends the sweep in one line."""
-    process = driver(folder, executor, preexec_fn=few_rows)
-    _, errors = process.communicate(timeout=PATIENCE)
-    assert process.returncode == 1
-    told = errors.splitlines()[-1]
-    assert "is not written" in told and "make room" in told, errors
-    assert 0 < len(rows(folder)) < swept.POINTS
 
 
 @pytest.mark.slow
 def test_a_full_disk_kills_and_ctrl_c_keep_the_rows(tmp_path):
     """On the same rows, one after the other: none is lost, and none that is there made again."""
-    check_full(tmp_path, "processes:2")
+    process = driver(tmp_path, "processes:2", preexec_fn=few_rows)
+    told = process.communicate(timeout=PATIENCE)[1].splitlines()[-1]
+    assert process.returncode == 1 and "is not written" in told and "make room" in told
+    assert 0 < len(rows(tmp_path)) < swept.POINTS
     kept = {}
     for ending in (signal.SIGKILL, signal.SIGKILL, signal.SIGINT):
         count = len(rows(tmp_path)) + 5
@@ -164,49 +153,28 @@ def test_a_full_disk_kills_and_ctrl_c_keep_the_rows(tmp_path):
 
 @contextmanager
 def cluster(folder):
-    """Yield the name of Dask's scheduler, the scheduler and workers, as real processes, and what
-    starts a worker, one without a nanny.
-    """
-    file, parts = folder / f"{time.monotonic_ns()}.json", []
-
-    def begin(kind, *options):
-        command = [sys.executable, "-m", f"distributed.cli.dask_{kind}", "--no-dashboard", *options]
-        command += ["--scheduler-file", file, "--host", "127.0.0.1"]
-        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-        parts.append(subprocess.Popen(command, cwd=ROOT, **quiet))
-
-    worker = partial(begin, "worker", "--nthreads", "1", "--no-nanny", "--death-timeout", "60")
-    begin("scheduler", "--port", "0", "--no-show")
-    try:
-        worker()
-        worker()
-        end = time.monotonic() + PATIENCE
-        while not file.exists():
-            assert time.monotonic() < end
-            time.sleep(0.05)
-        yield f"dask:{file}", parts, worker
-    finally:
-        for part in parts:
-            part.kill()
-            part.wait()
+    """Yield a cluster of Dask with two worker processes, and its name for a sweep."""
+    given = {"processes": True, "dashboard_address": None}
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, **given) as dask:
+        with dask.get_client() as client:
+            client.write_scheduler_file(folder / "scheduler.json")
+        yield dask, f"dask:{folder / 'scheduler.json'}"
 
 
 @pytest.mark.slow
 def test_dask_survives_kills_of_all_its_parts(tmp_path):
-    with cluster(tmp_path) as (name, parts, worker):
+    with cluster(tmp_path) as (dask, name):
         process = driver(tmp_path, name)
         wait_for(5, tmp_path, process)
-        parts[1].kill()  # a worker
+        os.kill(dask.workers[0].pid, signal.SIGKILL)
         wait_for(15, tmp_path, process)
-        worker()
         process.kill()
         process.communicate(timeout=PATIENCE)
         kept = set(rows(tmp_path))
         process = driver(tmp_path, name)
         wait_for(len(kept) + 5, tmp_path, process)
-        parts[0].kill()  # the scheduler
-        _, errors = process.communicate(timeout=PATIENCE)
-        assert process.returncode == 1 and "its workers are gone" in errors.splitlines()[-1], errors
-        assert kept < set(rows(tmp_path)) and len(rows(tmp_path)) < swept.POINTS
-    with cluster(tmp_path) as (name, *_):
+    _, errors = process.communicate(timeout=PATIENCE)  # the scheduler is gone
+    assert process.returncode == 1 and "its workers are gone" in errors.splitlines()[-1], errors
+    assert kept < set(rows(tmp_path)) and len(rows(tmp_path)) < swept.POINTS
+    with cluster(tmp_path) as (_, name):
         finish(tmp_path, name)

@@ -66,10 +66,10 @@ class Shard(NamedTuple):
         if not isinstance(self.where, str):
             yield from self.where
             return
-        arrow, parquet = parquet_library()
+        arrow, parquet, schema = parquet_library()
         try:
             with parquet.ParquetFile(self.where) as file:
-                if not file.schema_arrow.equals(_schema(arrow)):
+                if not file.schema_arrow.equals(schema):
                     raise ValueError("it has other columns")
                 for batch in file.iter_batches(AT_ONCE):
                     for row in map(Row, *(column.to_pylist() for column in batch.columns)):
@@ -164,16 +164,13 @@ class Store:
 
     def _written(self, shard: Shard) -> Shard:
         """Return rows as a file."""
-        arrow, parquet = parquet_library()
-        schema = _schema(arrow)
-        columns = list(zip(*shard.where, strict=True))
-        arrays = [arrow.array(x, kind.type) for x, kind in zip(columns, schema, strict=True)]
-        check = zlib.crc32(np.array(columns[0], np.int64).tobytes())
+        arrow, parquet, schema = parquet_library()
+        table = arrow.Table.from_pylist([row._asdict() for row in shard.where], schema)
+        check = zlib.crc32(table["number"].to_numpy().tobytes())
         first, last, size, failed, _ = shard
         name = f"{first:08d}-{last:08d}-{size}-{failed}-{check:08x}.parquet"
         path = self.folder / f"{first // IN_FOLDER:03d}" / name
         with replacing(path) as part:
-            table = arrow.Table.from_arrays(arrays, schema=schema)
             parquet.write_table(table, part, compression="zstd")
         return shard._replace(where=str(path))
 
@@ -219,15 +216,11 @@ class Store:
         self.done &= ~gone
 
 
-def parquet_library() -> tuple[Any, Any]:
-    """Return the modules that read and write rows; ExtraMissing if they are not installed."""
-    return needed("pyarrow", "parquet"), needed("pyarrow.parquet", "parquet")
-
-
-def _schema(arrow: Any) -> Any:
-    """Return the names and types of a file's columns."""
+def parquet_library() -> tuple[Any, Any, Any]:
+    """Return what reads and writes rows, and their columns; ExtraMissing if it is missing."""
+    arrow, parquet = needed("pyarrow", "parquet"), needed("pyarrow.parquet", "parquet")
     kinds = (arrow.int64(), arrow.string(), arrow.string(), arrow.float64())
-    return arrow.schema(list(zip(Row._fields, kinds, strict=True)))
+    return arrow, parquet, arrow.schema(list(zip(Row._fields, kinds, strict=True)))
 
 
 def _accepted(folder: Path, done: np.ndarray) -> list[Shard]:

@@ -56,7 +56,7 @@ def write(sweep: "Sweep", path: str | PathLike[str]) -> Path:
 
 def _write_parquet(sweep: "Sweep", path: Path) -> None:
     """Write a column for each entry; SweepError if one has texts and numbers."""
-    arrow, parquet = parquet_library()
+    arrow, parquet, _ = parquet_library()
     schema = arrow.schema([])
     try:
         for part in _parts(sweep):
