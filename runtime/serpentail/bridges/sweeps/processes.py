@@ -6,6 +6,7 @@ multiprocessing, on which all of these build, and it imports the main program in
 
 import atexit
 import hashlib
+import math
 import os
 import pickle
 import queue
@@ -40,7 +41,8 @@ from .store import Row
 
 TRIES = 2  # of a point whose process ends: something else may have ended it
 TOGETHER = 2048  # points that a process gets at once: it holds the motions of flights of them
-HANGS = 10  # limits, on the clock, after which a point hangs
+HANGS = 10  # limits on the clock in which a point hangs if it takes less processor time than
+LEAST = 0.1  # limits
 COMMAND = "from serpentail.bridges.sweeps.processes import serve; serve({})"
 MOST_MODELS = 64  # that a process keeps
 
@@ -176,7 +178,7 @@ class Process:
         first_limit = limit * len(points) if settings.together else limit  # of what comes first
         self.link.send((settings.job, block.bundle, points, first_limit, limit))
         patience = None  # s until the next answer; any until it has made the model
-        while (answer := self._answer(patience)) is not None:
+        while (answer := self._answer(patience, LEAST * limit)) is not None:
             if isinstance(answer, str):
                 _idle.append(self)
                 raise SweepError(f"run: no process can run it: {answer}")
@@ -184,9 +186,13 @@ class Process:
             patience = HANGS * (limit if answer else first_limit) or None
         _idle.append(self)
 
-    def _answer(self, patience: float | None) -> Any:
-        if not self.link.poll(patience):
-            raise TimeoutError
+    def _answer(self, patience: float | None, least: float) -> Any:
+        """Return an answer; TimeoutError if the process takes too little time in its patience."""
+        used = -math.inf
+        while not self.link.poll(patience):
+            before, used = used, time.clock_gettime((~self.child.pid << 3) | 2)  # Linux's of it
+            if used - before < least:
+                raise TimeoutError
         return self.link.recv()
 
     def end(self) -> int:
