@@ -14,16 +14,14 @@ from tests.support.rows import row as named
 
 def test_points_need_no_list():
     over = {"a": st.grid(range(2500)), "b": st.latin([0] * 3, [1] * 3), "c": st.latin(1, 2)}
-    axes = axes_of(over, 4000, 0)  # 10 million
     tracemalloc.start()
     try:
-        numbers = np.array([9_999_999, 3, 4_000_003, 5_000_000])
-        found = axes.at(numbers)
-        assert [x["a"] for x in found] == [2499, 0, 1000, 1250]
-        assert found[1]["b"] == found[2]["b"] != found[3]["b"]
+        found = axes_of(over, 4000, 0).at([9_999_999, 3, 4_000_003, 5_000_000])  # of 10 million
         assert tracemalloc.get_traced_memory()[1] < 2e6
     finally:
         tracemalloc.stop()
+    assert [x["a"] for x in found] == [2499, 0, 1000, 1250]
+    assert found[1]["b"] == found[2]["b"] != found[3]["b"]
 
 
 def points(over, count=None, seed=0):

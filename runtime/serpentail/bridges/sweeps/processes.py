@@ -6,7 +6,6 @@ multiprocessing, on which all of these build, and it imports the main program in
 
 import atexit
 import hashlib
-import math
 import os
 import pickle
 import queue
@@ -188,9 +187,10 @@ class Process:
 
     def _answer(self, patience: float | None, least: float) -> Any:
         """Return an answer; TimeoutError if the process takes too little time in its patience."""
-        used = -math.inf
+        clock = (~self.child.pid << 3) | 2  # Linux's of its processor time
+        used = time.clock_gettime(clock)
         while not self.link.poll(patience):
-            before, used = used, time.clock_gettime((~self.child.pid << 3) | 2)  # Linux's of it
+            before, used = used, time.clock_gettime(clock)
             if used - before < least:
                 raise TimeoutError
         return self.link.recv()
