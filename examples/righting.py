@@ -1,5 +1,7 @@
 """Models, starts and plans that the righting study and the planning benchmark share."""
 
+from functools import cache
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -28,6 +30,7 @@ FUNCTIONS = (
 )
 
 
+@cache
 def model(segments: int, links: int | None) -> st.Model:
     """Return a tail with all that plans use; a continuum where links is None."""
     tail = {"tail": "articulated", "links": links} if links else {"tail": "continuum"}

@@ -1,43 +1,63 @@
-"""Plans one flight as the paper does, with several rules and nodes, and as `st.plan` does.
+"""Computes the figures and tables of the paper again, and prints them beside its own numbers.
 
-effort: integral of tau^2, (mN m)^2 s; `st.plan` also weighs rates, unless smoothing is 0.
-error: angle in deg, at the end, from the torso's planned attitude to where the torques truly lead.
+Y. Liu, P. Ben-Tzvi, "How a serpentine tail assists agile motions of kangaroo rats", 2023: Figs. 6
+to 15, Tables 1 and 2. NAMES make only some: fig8 table2. All together also write the table of
+docs/paper.md. Pictures and pages that move go to output/paper. What is computed is kept there: an
+interrupted run resumes.
 """
+
+from functools import partial
+from pathlib import Path
 
 from examples import front
 
-SEED = 4  # of the random start, from which the paper's program converges
-WAYS = {
-    "paper, trapezoidal, 59 nodes": {},
-    "paper, translation-free": {"formulation": "translation-free"},
-    "paper, trapezoidal, 201 nodes": {"nodes": 201},
-    "paper, Hermite-Simpson, 59 nodes": {"rule": "hermite-simpson"},
+FOLDER = front.ROOT / "output" / "paper"
+# the module and function of each part, its files, its figures and tables; the longest first
+PARTS = {
+    "segments": ("plans", ("fig12.html", "fig13.png"), ("fig12", "fig13", "table2")),
+    "recovery": ("ground", ("fig15.html",), ("fig15",)),
+    "nodes": ("plans", ("fig11.html", "fig11.png"), ("fig11",)),
+    "jump": ("flights", ("fig9.html", "fig10.png"), ("fig6", "fig9", "fig10")),
+    "support": ("ground", ("fig14.html",), ("fig14",)),
+    "swing": ("swing", ("fig8.html", "fig8.png"), ("fig7", "fig8")),
+    "table_1": ("ground", (), ("table1",)),
 }
-OURS = {"st.plan": {}, "st.plan, smoothing = 0": {"smoothing": 0.0}}
+SOURCES = ("runtime", "codegen", "examples/paper", "examples/righting.py")
 
 
-def main() -> None:
-    """Print a table."""
-    import serpentail as st
-    from examples import righting
-    from examples.paper.collocation import paper_plan
-    from examples.studies import righting_paper
+def main(names: list[str], folder: Path) -> int:
+    """Compute the parts of the named figures and tables, and print them; all, if none is named."""
+    from examples.paper import page, published
 
-    rat = righting.model(1, 3)
-    start, limits = righting.tumbling(rat, SEED), righting.bounds(rat)
-    rows = {}
-    for way, settings in WAYS.items():
-        plan = paper_plan(rat, start, righting.FLIGHT, limits, **settings)
-        rows[way] = righting_paper.row(rat, plan)
-    for way, settings in OURS.items():
-        task = {"start": start, "duration": righting.FLIGHT, "bounds": limits}
-        rows[way] = righting.row(st.plan(rat, **task, **settings))
-    print(f"{'':<34}{'iterations':>10}{'effort':>10}{'CPU [s]':>10}{'error':>10}")
-    for way, row in rows.items():
-        numbers = 1e6 * row["effort"], row["solve_cpu_s"], row["open_loop_attitude_error_deg"]
-        print(f"{way:<34}{row['iterations']:>10}" + "".join(f"{x:>10.4f}" for x in numbers))
+    items = published.read()
+    values = computed(folder, set(names or items))
+    chosen = {name: items[name] for name in items if name in values}
+    print("\n".join(page.lines(chosen, values)))
+    if chosen == items:
+        page.write(items, values)
+        print(f"\nwritten: {page.PAGE}")
+    print(f"pictures and pages that move: {folder}")
+    return 0
+
+
+def computed(folder: Path, names: set[str]) -> dict[str, dict]:
+    """Return the values of figures and tables, by row; parts that FOLDER has are not made again."""
+    from importlib import import_module
+
+    from examples.studies.parts import Part, digest, made
+
+    of, parts = {"program": digest(*(front.ROOT / source for source in SOURCES))}, {}
+    for title, (module, files, figures) in PARTS.items():
+        if names & set(figures):
+            make = getattr(import_module(f"examples.paper.{module}"), title)
+            parts[title] = Part(partial(make, folder), of, tuple(folder / file for file in files))
+    folder.mkdir(parents=True, exist_ok=True)
+    found = made("paper", folder / "parts", parts)
+    return {name: rows for part in found.values() for name, rows in part.items() if name in names}
 
 
 if __name__ == "__main__":
-    front.parser(__doc__).parse_args()
-    front.run(main)
+    parser = front.parser(__doc__)
+    known = [name for _, _, figures in PARTS.values() for name in figures]
+    parser.add_argument("names", nargs="*", metavar="NAME", choices=[[], *known], default=[])
+    front.run(main, parser.parse_args().names, FOLDER, after=front.GOES_ON)

@@ -143,14 +143,16 @@ def paper_plan(
     nodes: int = 59,
     formulation: str = "full",
     at_rest: bool = True,
+    guess: tuple | None = None,
     **options: object,
 ) -> PaperPlan:
     """Plan torques of least effort that turn the torso upright, as in Sect. 4.2.
 
     start: (q0, v0). duration: s, or (least, most) if it is free. bounds: of angles and torques.
     rule: "trapezoidal" or "hermite-simpson". nodes: in equal distances. at_rest: the torso does not
-    turn at the end. options: of IPOPT, such as max_wall_time=60.0 (s). PlanningError, StateError or
-    SimulationError if one of these is wrong, ModelError if the model is.
+    turn at the end. guess: (q0, v0) from which the first guess flies; start by default. options: of
+    IPOPT, such as max_wall_time=60.0 (s). PlanningError, StateError or SimulationError if one of
+    these is wrong, ModelError if the model is.
     """
     angle, most = limits(model, bounds)
     shortest, longest = checked_duration(model, duration)
@@ -162,8 +164,11 @@ def paper_plan(
         raise refusal("nodes", nodes, f"an odd number for {rule!r}", st.PlanningError)
     places, unit = places_of(model, formulation), TORQUE_UNIT * most
     units = np.concatenate([np.full(at.stop - at.start, UNITS[k]) for k, at in places.items()])
-    guess, guessed_torques = first_guess(model, start, places, longest, N)
-    low, high = box(guess, places, angle, at_rest)
+    first, guessed_torques = first_guess(model, start, places, longest, N)
+    if guess is not None:
+        flown, guessed_torques = first_guess(model, guess, places, longest, N)
+        first[1:] = flown[1:]
+    low, high = box(first, places, angle, at_rest)
 
     # decision variables p_d, in units: t_N, states z and torques w at all nodes; Eqs. 40 to 42
     t_N, z, w = ca.MX.sym("t_N"), ca.MX.sym("z", len(units), N), ca.MX.sym("w", len(unit), N)
@@ -178,7 +183,7 @@ def paper_plan(
     solver, ones = ca.nlpsol("paper", "ipopt", nlp, given), np.ones(w.numel()) / TORQUE_UNIT
     begun = time.process_time()
     found = solver(
-        x0=np.concatenate([[longest], (guess / units).ravel(), (guessed_torques / unit).ravel()]),
+        x0=np.concatenate([[longest], (first / units).ravel(), (guessed_torques / unit).ravel()]),
         lbx=np.concatenate([[shortest], (low / units).ravel(), -ones]),
         ubx=np.concatenate([[longest], (high / units).ravel(), ones]),
         lbg=0,

@@ -11,9 +11,9 @@ import numpy as np
 
 import serpentail as st
 from examples import righting
-from examples.studies import righting_paper
+from examples.paper import truth
+from examples.paper.plans import RAT
 from examples.studies.parts import Part
-from examples.studies.righting_plans import RAT, rat
 
 BLOCK = 10  # random starts that are kept together
 PAPER = "paper"
@@ -115,8 +115,8 @@ def row_of(kind: Kind, way: str, model: st.Model, start: tuple, limits: st.Bound
     if way == PAPER:
         task = start, settings["duration"], limits
         rest = not kind.any_rate
-        plan = righting_paper.planned(model, *task, at_rest=rest, time_limit=LIMIT)
-        return righting_paper.row(model, plan)
+        plan = truth.planned(model, *task, at_rest=rest, time_limit=LIMIT)
+        return truth.row(model, plan)
     goal = {"goal": st.Goal(torso_rate=None)} if kind.any_rate else {}
     given = {"start": start, "bounds": limits} | goal | settings
     solver = st.Solver(**WAYS[way], time_limit=LIMIT)
@@ -125,7 +125,7 @@ def row_of(kind: Kind, way: str, model: st.Model, start: tuple, limits: st.Bound
 
 def animal(kind: Kind) -> st.Model:
     """Return the model of a kind."""
-    model = rat(*kind.size)
+    model = righting.model(*kind.size)
     changes = {
         name: (np.asarray(model.parameters[name]) * factor).tolist()
         for name, factor in kind.body.items()
