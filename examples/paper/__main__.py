@@ -22,7 +22,13 @@ PARTS = {
     "swing": ("swing", ("fig8.html", "fig8.png"), ("fig7", "fig8")),
     "table_1": ("ground", (), ("table1",)),
 }
-SOURCES = ("runtime", "codegen", "examples/paper", "examples/righting.py")
+COMPUTE = ("collocation", "figures", "flights", "ground", "plans", "swing", "truth")
+SOURCES = (
+    "runtime",
+    "codegen",
+    "examples/righting.py",
+    *(f"examples/paper/{x}.py" for x in COMPUTE),
+)
 
 
 def main(names: list[str], folder: Path) -> int:
@@ -46,7 +52,10 @@ def computed(folder: Path, names: set[str]) -> dict[str, dict]:
 
     from examples.studies.parts import Part, digest, made
 
-    of, parts = {"program": digest(*(front.ROOT / source for source in SOURCES))}, {}
+    sources = [front.ROOT / source for source in SOURCES]
+    sources += [Path(__file__).with_name(f"{module}.py") for module in COMPUTE]
+    of, parts = {"program": digest(*sources)}, {}
+    of["scenes"] = [path.read_text("utf-8") for path in sorted((front.ROOT / "scenes").iterdir())]
     for title, (module, files, figures) in PARTS.items():
         if names & set(figures):
             make = getattr(import_module(f"examples.paper.{module}"), title)

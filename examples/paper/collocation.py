@@ -3,7 +3,7 @@
 The state x has the blocks (p, phi, q_t, p_dot, omega, q_t_dot): position of B (m, world); angles of
 R = Rz(phi_z) Rx(phi_x) Ry(phi_y) (rad); tail coordinates (rad); velocity of B (m/s, world); angular
 velocity in the torso's axes (rad/s), which the paper equates with phi_dot; rates of the tail
-(rad/s). "translation-free" leaves out p and p_dot, on which nothing else depends in flight.
+(rad/s).
 """
 
 import time
@@ -17,10 +17,6 @@ from serpentail.basics.attitude import product
 from serpentail.basics.checks import one_of, refusal, whole_number
 from serpentail.planning.magnitudes import checked_bounds, checked_duration
 
-FORMULATIONS = {
-    "full": ("position", "angles", "tail", "velocity", "torso_rate", "tail_rate"),
-    "translation-free": ("angles", "tail", "torso_rate", "tail_rate"),
-}
 # what makes unknowns of the order of 1; of torques: a part of their bounds
 UNITS = {"position": 0.1, "angles": 1, "tail": 1, "velocity": 1, "torso_rate": 10, "tail_rate": 10}
 TORQUE_UNIT = 0.05
@@ -65,10 +61,10 @@ def curve(times: np.ndarray, values: np.ndarray, steps: int) -> st.Piecewise:
 # ---- dynamics ------------------------------------------------------------------------------------
 
 
-def places_of(model: st.Model, formulation: str) -> dict[str, slice]:
+def places_of(model: st.Model) -> dict[str, slice]:
     """Return where each block is in a state."""
     found, at = {}, 0
-    for name in FORMULATIONS[formulation]:
+    for name in UNITS:
         size = model.layout.nt if name.startswith("tail") else 3
         found[name], at = slice(at, at + size), at + size
     return found
@@ -102,12 +98,11 @@ def dynamics(model: st.Model, places: dict[str, slice]) -> ca.Function:
     size = max(at.stop for at in places.values())
     x, tau = ca.MX.sym("x", size), ca.MX.sym("tau", model.layout.nt)
     of = {name: x[at] for name, at in places.items()}
-    p, p_dot = (of.get(name, ca.DM.zeros(3)) for name in ("position", "velocity"))
     quaternion, phi_dot = attitude_of_angles()(of["angles"], of["torso_rate"])
-    q = ca.vertcat(p, quaternion, of["tail"])
-    v = ca.vertcat(p_dot, of["torso_rate"], of["tail_rate"])
+    q = ca.vertcat(of["position"], quaternion, of["tail"])
+    v = ca.vertcat(of["velocity"], of["torso_rate"], of["tail_rate"])
     v_dot = model.casadi.external("forward_dynamics", derivatives=2, folded=True)(q, v, tau)
-    rates = {"position": p_dot, "angles": phi_dot, "tail": of["tail_rate"]}
+    rates = {"position": of["velocity"], "angles": phi_dot, "tail": of["tail_rate"]}
     rates |= {"velocity": v_dot[:3], "torso_rate": v_dot[3:6], "tail_rate": v_dot[6:]}
     return ca.Function("x_dot", [x, tau], [ca.vertcat(*(rates[name] for name in places))])
 
@@ -141,7 +136,6 @@ def paper_plan(
     bounds: st.Bounds,
     rule: str = "trapezoidal",
     nodes: int = 59,
-    formulation: str = "full",
     at_rest: bool = True,
     guess: tuple | None = None,
     **options: object,
@@ -156,13 +150,12 @@ def paper_plan(
     """
     angle, most = limits(model, bounds)
     shortest, longest = checked_duration(model, duration)
-    one_of("formulation", formulation, FORMULATIONS, st.PlanningError)
     defects, weights = RULES[one_of("rule", rule, RULES, st.PlanningError)]
     N = whole_number("nodes", nodes, st.PlanningError, least=3, most=MOST_NODES)
     steps = len(weights) - 1
     if (N - 1) % steps:
         raise refusal("nodes", nodes, f"an odd number for {rule!r}", st.PlanningError)
-    places, unit = places_of(model, formulation), TORQUE_UNIT * most
+    places, unit = places_of(model), TORQUE_UNIT * most
     units = np.concatenate([np.full(at.stop - at.start, UNITS[k]) for k, at in places.items()])
     first, guessed_torques = first_guess(model, start, places, longest, N)
     if guess is not None:

@@ -54,24 +54,28 @@ def read(path: Path = FILE) -> dict[str, Item]:
 
 def item(name: str, of: dict) -> Item:
     """Return a figure or a table of the file, checked."""
-    if not isinstance(of, dict) or set(of) != {"title", "where", "page", "rows"}:
-        raise refusal(name, of, "title, where, page and rows", st.SerpentailError)
+    if not isinstance(of, dict) or set(of) != set(Item.__dataclass_fields__):
+        raise refused(name, of, "a table of title, where, page and rows")
     rows = tuple(row(f"{name}.rows[{k}]", each) for k, each in enumerate(of["rows"]))
-    if len({each.name for each in rows}) != len(rows):
-        names = [each.name for each in rows]
-        raise refusal(f"{name}.rows", names, "a name for each row", st.SerpentailError)
-    return Item(of["title"], of["where"], of["page"], rows)
+    names = [each.name for each in rows]
+    if len(set(names)) != len(names):
+        raise refused(f"{name}.rows", names, "a name of its own for each")
+    return Item(**of | {"rows": rows})
 
 
 def row(field: str, of: dict) -> Row:
     """Return a row, checked: a number has a band that it lies in, or a reason for having none."""
     known = set(Row.__dataclass_fields__)
-    if not set(of) <= known or not {"name", "says", "value"} <= set(of):
-        raise refusal(field, sorted(of), f"of {sorted(known)}, name, says, value", st.SerpentailError)
+    if not {"name", "says", "value"} <= set(of) <= known:
+        raise refused(field, sorted(of), f"name, says and value, of {', '.join(sorted(known))}")
     found, is_sentence = Row(**of), of["value"] is True
     if is_sentence == ("unit" in of) or is_sentence + ("band" in of) + ("incomparable" in of) != 1:
-        needs = "true alone, or a number with a unit and either a band or incomparable"
-        raise refusal(field, of, needs, st.SerpentailError)
+        raise refused(field, of, "true alone, or a number, a unit, and band or incomparable")
     if found.band is not None and (len(found.band) != 2 or found.verdict(found.value) != INSIDE):
-        raise refusal(f"{field}.band", found.band, "[least, most] with the value inside", st.SerpentailError)
+        raise refused(f"{field}.band", found.band, f"[least, most] around {found.value}")
     return found
+
+
+def refused(field: str, value: object, needs: str) -> Exception:
+    """Return the error about a value of the file."""
+    return refusal(f"published.toml: {field}", value, needs, st.SerpentailError)

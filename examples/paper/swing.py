@@ -106,7 +106,7 @@ def swing(folder: Path) -> dict:
     full = np.degrees(arc_direction(angles_of(arc)[-1]))
     return {
         "fig7": {"direction": float(full), "same": bool(np.abs(apart).max() < np.radians(1e-6))},
-        "fig8": {"most": sizes[most], "links": most, "tends": sizes[64] < sizes[most] / 5},
+        "fig8": {"most": sizes[most], "links": most, "tends": bool(sizes[64] < sizes[most] / 5)},
     }
 
 

@@ -10,7 +10,12 @@ from examples.studies import righting_kinds as kinds
 from examples.studies.parts import Part, digest, made
 from examples.studies.righting_figures import draw_rates
 
-SOURCES = ("examples/righting.py", "examples/paper", "examples/studies/righting_kinds.py", "runtime")
+SOURCES = (
+    "examples/righting.py",
+    "examples/paper",
+    "examples/studies/righting_kinds.py",
+    "runtime",
+)
 
 
 def content(size: tuple) -> dict:

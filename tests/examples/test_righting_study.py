@@ -45,11 +45,11 @@ def test_both_ways_get_one_task(monkeypatch):
     def ask(_, *task, **given):
         asked.update(given, task=task)
 
-    monkeypatch.setattr(kinds, "rat", lambda *_: rat())
+    monkeypatch.setattr(kinds.righting, "model", lambda *_: rat())
     monkeypatch.setattr(kinds.st, "plan", lambda model, **given: asked.update(given))
     monkeypatch.setattr(kinds.righting, "row", lambda _: {})
-    monkeypatch.setattr(kinds.righting_paper, "planned", ask)
-    monkeypatch.setattr(kinds.righting_paper, "row", lambda *_: {})
+    monkeypatch.setattr(kinds.truth, "planned", ask)
+    monkeypatch.setattr(kinds.truth, "row", lambda *_: {})
     for name, least, most in (("(1, 3), any rate", 0.3, 0.58), ("falling cat, 1 s", 0.3, 1.0)):
         kind = kinds.KINDS[name]
         asked.clear()

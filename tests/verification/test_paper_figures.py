@@ -1,27 +1,21 @@
-"""The paper's figures: numbers that independent computations of its studies gave must come out of
+"""The paper's figures: numbers that independent computations gave must come out of
 the models.
 """
 
-import json
-import os
-import subprocess
-import sys
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import serpentail as st
-from examples.studies import models_motion as study_models
+from examples.paper import swing
 from tests.support import zoo
 from tests.support.models import model_folder
 from tests.support.rows import row
 
-ROOT = Path(__file__).parents[2]
 # deg, articulated less continuum, Fig. 8b
 DIFFERENCE = {2: -0.148, 4: -0.400, 8: -0.333, 16: -0.211, 32: -0.120}
-THIN = {"link_inertia": study_models.THIN}
+THIN = {"link_inertia": swing.THIN}
 ZOO = {None: "arcs1", 1: "m1_n1", 3: "m1_n3"}
 
 
@@ -31,7 +25,7 @@ def motion(links, thin=False):
     # the number of links is the point of the figure: models of H alone
     own = None if links in ZOO else model_folder(1, links, functions=["mass_matrix"])
     model = zoo.model(ZOO[links]) if own is None else st.load(own)
-    return study_models.yaw_motion(model.with_parameters(**THIN) if thin else model)
+    return swing.yaw_motion(model.with_parameters(**THIN) if thin else model)
 
 
 def difference(links, thin=False):
@@ -48,8 +42,8 @@ def test_tails_turn_the_torso_as_in_fig_8():
         with row(links):
             assert difference(links) == pytest.approx(expected, abs=1e-3)
     sizes = {links: abs(difference(links)) for links in (2, 3, 4, 5, 8)}
-    assert max(sizes, key=sizes.get) == study_models.SHOWN
-    assert sizes[study_models.SHOWN] < 0.5
+    assert max(sizes, key=sizes.get) == swing.SHOWN
+    assert sizes[swing.SHOWN] < 0.5
 
 
 def test_thin_links_tend_to_the_continuum_and_thick_ones_keep_their_thickness():
@@ -63,36 +57,16 @@ def test_directions_of_the_com_are_those_of_its_position():
     joints = bend * np.arange(1, links + 1) / links
     ends = np.cumsum(np.stack([np.sin(joints), np.cos(joints)]), axis=1)
     x, y = (ends - np.stack([np.sin(joints), np.cos(joints)]) / 2).mean(axis=1)
-    assert study_models.chain_direction(np.array(bend), links) == pytest.approx(
+    assert swing.chain_direction(np.array(bend), links) == pytest.approx(
         np.arctan2(x, y), rel=1e-14
     )
-    assert study_models.chain_direction(np.array(bend), samples) == pytest.approx(
-        study_models.arc_direction(bend), abs=2 / samples
+    assert swing.chain_direction(np.array(bend), samples) == pytest.approx(
+        swing.arc_direction(bend), abs=2 / samples
     )
 
 
 def test_bends_have_the_wanted_directions():
-    targets = study_models.com_directions()
-    bends = study_models.bend_towards(study_models.arc_direction, targets)
+    targets = swing.com_directions()
+    bends = swing.bend_towards(swing.arc_direction, targets)
     assert (bends[0], bends[-1]) == (pytest.approx(0, abs=1e-12), pytest.approx(np.pi, rel=1e-12))
-    np.testing.assert_allclose(
-        study_models.arc_direction(bends[1:]), targets[1:], rtol=0, atol=1e-11
-    )
-
-
-@pytest.mark.slow
-def test_the_study_runs_anywhere_and_writes_its_files(tmp_path):
-    command = [sys.executable, "-m", "examples.studies", "models", "study"]
-    path = {"PYTHONPATH": str(ROOT)}
-    done = subprocess.run(
-        command, cwd=tmp_path, env=os.environ | path, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    assert "continuum: final yaw -21.450 deg" in done.stdout
-    study = json.loads((tmp_path / "study" / "summary.json").read_text())
-    rows = {row["links"]: row for row in study["articulated"]}
-    for links, expected in DIFFERENCE.items():
-        assert rows[links]["difference"] == pytest.approx(expected, abs=1e-3)
-    assert rows[256]["ns"] > 10 * study["continuum"]["ns"] > 0
-    for picture in ("fig8", "cost_against_difference"):
-        assert (tmp_path / "study" / f"{picture}.png").read_bytes()[:4] == b"\x89PNG"
+    np.testing.assert_allclose(swing.arc_direction(bends[1:]), targets[1:], rtol=0, atol=1e-11)
