@@ -248,16 +248,14 @@ def draw_figure_11(rows: dict[str, list[dict]], path: Path) -> tuple[Figure, np.
     return drawn(draw, path)
 
 
-def draw_figure_13(
-    flights: dict[tuple, st.Trajectory], rats: dict[tuple, st.Model], path: Path
-) -> tuple[Figure, np.ndarray]:
+def draw_figure_13(flights: dict[tuple, st.Trajectory], path: Path) -> tuple[Figure, np.ndarray]:
     """Attitude, bends and torques of plans for tails of one, two and three segments."""
 
     def draw() -> tuple[Figure, np.ndarray]:
         figure = Figure(figsize=(7.2, 5.4), layout="constrained")
         axes = figure.subplots(3, len(flights), squeeze=False, sharex="col")
         for column, ((m, n), flight) in zip(axes.T, flights.items(), strict=True):
-            flight.plot("attitude", "tail", "torque", ax=column, model=rats[m, n])
+            flight.plot("attitude", "tail", "torque", ax=column)
             column[0].set_title(f"$m = {m}$, $n = {n}$")
         for panel in axes[:, 1:].flat:
             panel.set_ylabel("")

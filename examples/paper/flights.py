@@ -13,7 +13,7 @@ from serpentail.basics.attitude import angle_deg, tilt_deg
 
 BEGIN = 0.5  # s, t_1
 UPRIGHT = 30.0  # deg of tilt
-PAPER, OURS = "the paper's plan", "st.plan"
+PAPER, OURS = "paper", "st.plan"
 
 
 def jump(folder: Path) -> dict:
@@ -32,7 +32,7 @@ def jump(folder: Path) -> dict:
         jumps[name] = kick.simulate(controller=st.Phases(phases))
     st.view(list(jumps.values()), folder / "fig9.html", names=list(jumps))
     for name, motion in jumps.items():
-        motion.filmstrip(folder / f"fig9 {name}.png")
+        motion.filmstrip(folder / f"fig9_{name}.png")
 
     flights = {"planned": truth.as_motion(model, paper), "tracked": truth.followed(model, paper)}
     flights["passive"] = righting.passive(model, start, righting.FLIGHT)

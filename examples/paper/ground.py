@@ -36,7 +36,7 @@ def simulated(scenes: dict, page: Path) -> dict[str, dict]:
     motions = {name: scene.simulate() for name, scene in found.items()}
     st.view(list(motions.values()), page, names=list(motions))
     for name, motion in motions.items():
-        motion.filmstrip(page.with_name(f"{page.stem} {name}.png"))
+        motion.filmstrip(page.with_name(f"{page.stem}_{name}.png"))
     return {name: dict(found[name].summary(motion)) for name, motion in motions.items()}
 
 

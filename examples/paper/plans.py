@@ -72,14 +72,11 @@ def segments(folder: Path) -> dict:
     for name, less in (("two_less", efforts[1]), ("three_less", efforts[2])):
         found["fig13"][name] = [bool(a < b) for a, b in zip(less, efforts[0], strict=True)]
     draw_figure_13(planned, folder / "fig13.png")
-    names = {
-        f"({m}, {n}), {way}": of[m, n]
-        for m, n in TAILS
-        for way, of in (("paper", planned), ("st.plan", true))
-    }
-    st.view(list(names.values()), folder / "fig12.html", names=list(names))
-    for name, motion in names.items():
-        motion.filmstrip(folder / f"fig12 {name}.png")
+    shown = {f"{m}x{n} paper": motion for (m, n), motion in planned.items()}
+    shown |= {f"{m}x{n} st.plan": motion for (m, n), motion in true.items()}
+    st.view(list(shown.values()), folder / "fig12.html", names=list(shown))
+    for name, motion in shown.items():
+        motion.filmstrip(folder / f"fig12_{name.replace(' ', '_')}.png")
     return found
 
 
