@@ -8,7 +8,7 @@ import serpentail as st
 from examples import righting
 from examples.paper import truth
 from examples.paper.figures import draw_figure_10
-from examples.paper.plans import FREE, LIMIT, RAT
+from examples.paper.plans import FREE, LIMIT, RAT, RETRIES
 from serpentail.basics.attitude import angle_deg, tilt_deg
 
 BEGIN = 0.5  # s, t_1
@@ -22,10 +22,11 @@ def jump(folder: Path) -> dict:
     passive = kick.simulate()
     at = np.abs(passive.t - BEGIN).argmin()
     start, limits = (passive.q[at], passive.v[at]), righting.bounds(model)
-    paper = truth.searched(model, start, righting.FLIGHT, limits, time_limit=LIMIT)
-    ours = st.plan(model, start=start, bounds=limits, time_limit=LIMIT, **FREE)
+    task = {"start": start, "duration": FREE, "bounds": limits}
+    paper = truth.searched(model, *task.values(), time_limit=LIMIT)
+    ours = st.plan(model, **task, retries=RETRIES, time_limit=LIMIT)
     jumps, damping = {"passive": passive}, st.Damping(righting.K_DMP)
-    laws = {PAPER: (truth.law(kick.model, paper), righting.FLIGHT)}
+    laws = {PAPER: (truth.law(kick.model, paper), paper.times[-1])}
     laws[OURS] = st.Pfl(kick.model, ours), ours.duration
     for name, (law, lasts) in laws.items():
         phases = [(0.0, damping), (BEGIN, law), (BEGIN + lasts, damping)]
@@ -40,10 +41,11 @@ def jump(folder: Path) -> dict:
     told = {name: kick.summary(motion) for name, motion in jumps.items()}
     acts = np.abs(jumps[PAPER].tau + righting.K_DMP * jumps[PAPER].tail_rate).max(axis=1) > 1e-9
     times = jumps[PAPER].t
-    tilts = {name: tilt_before_landing(motion) for name, motion in jumps.items()}
+    ends = {"passive": righting.FLIGHT} | {name: lasts for name, (_, lasts) in laws.items()}
+    tilts = {name: tilt_at(BEGIN + ends[name], motion) for name, motion in jumps.items()}
     return {
         "fig6": {
-            "begin": float(times[acts][0]),
+            "begin": float(times[acts.argmax() - 1]),  # the last sample before it acts
             "passive_before": not acts[times < BEGIN].any(),
             "end": [told[name]["recontact_s"] for name in (PAPER, OURS)],
         },
@@ -57,9 +59,9 @@ def jump(folder: Path) -> dict:
     }
 
 
-def tilt_before_landing(motion: st.Trajectory) -> float:
-    """Return the torso's tilt (deg) 0.58 s after t_1."""
-    return float(np.interp(BEGIN + righting.FLIGHT, motion.t, tilt_deg(motion.attitude)))
+def tilt_at(t: float, motion: st.Trajectory) -> float:
+    """Return the torso's tilt (deg) at a time (s)."""
+    return float(np.interp(t, motion.t, tilt_deg(motion.attitude)))
 
 
 def of_figure_10(paper, ours: st.Plan, flights: dict, tracked: st.Trajectory) -> dict:

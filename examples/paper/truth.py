@@ -12,13 +12,13 @@ ITERATIONS = 300  # of IPOPT, as many as `st.plan` has
 TRUE = ("open_loop_attitude_error_deg", "energy_J", "peak_power_W")
 TRACKED = ("tracked_attitude_error_deg", "tracked_tail_error_rad", "dyn_err")
 SAMPLES = 1000  # of a flight
-PUSHES = 8  # random guesses after passive flight
+PUSHES, MOST = 2, 1500  # random guesses after passive flight, and iterations of each
 
 
 def planned(rat: st.Model, *task, time_limit: float, **settings) -> PaperPlan:
     """Plan (start, duration, bounds) within a time (s)."""
     limit = {"max_iter": ITERATIONS, "max_wall_time": time_limit}
-    return paper_plan(rat, *task, **limit, **settings)
+    return paper_plan(rat, *task, **limit | settings)
 
 
 def searched(rat: st.Model, *task, time_limit: float) -> PaperPlan:
@@ -28,12 +28,13 @@ def searched(rat: st.Model, *task, time_limit: float) -> PaperPlan:
     as Sect. 4.5 advises.
     """
     (q, v), *_ = task
-    plan = planned(rat, *task, time_limit=time_limit)
+    limits = {"time_limit": time_limit, "max_iter": MOST}
+    plan = planned(rat, *task, **limits)
     for seed in range(1, 1 + PUSHES):
         if plan.stats["converged"]:
             break
         push = np.random.default_rng(seed).normal(size=rat.nv) * (np.arange(rat.nv) >= 3)
-        plan = planned(rat, *task, guess=(q, v + push), time_limit=time_limit)
+        plan = planned(rat, *task, guess=(q, v + push), **limits)
     return plan
 
 
