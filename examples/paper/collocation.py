@@ -157,6 +157,9 @@ def paper_plan(
         raise refusal("nodes", nodes, f"an odd number for {rule!r}", st.PlanningError)
     places, unit = places_of(model), TORQUE_UNIT * most
     units = np.concatenate([np.full(at.stop - at.start, UNITS[k]) for k, at in places.items()])
+    for field, pair in (("start", start), ("guess", start if guess is None else guess)):
+        if not isinstance(pair, tuple | list) or len(pair) != 2:
+            raise refusal(field, pair, "(q0, v0), two arrays", st.PlanningError)
     first, guessed_torques = first_guess(model, start, places, longest, N)
     if guess is not None:
         flown, guessed_torques = first_guess(model, guess, places, longest, N)
@@ -217,8 +220,6 @@ def first_guess(
     model: st.Model, start: tuple, places: dict[str, slice], duration: float, nodes: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return states and torques at the nodes of a flight whose tail only damps (Sect. 3.2)."""
-    if not isinstance(start, tuple | list) or len(start) != 2:
-        raise refusal("start", start, "(q0, v0), two arrays", st.PlanningError)
     step, law = duration / (nodes - 1) / SAMPLES, st.Damping(K_DMP)
     motion = st.simulate(model, *start, controller=law, t_span=duration, output_step=step)
     return states_of(motion, places)[::SAMPLES], motion.tau[::SAMPLES]

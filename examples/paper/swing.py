@@ -13,6 +13,7 @@ STEPS = 400
 FULL_TURN = np.arctan(np.pi / 2)  # rad, COM direction of an arc bent by pi
 SHOWN = 4  # links of the tail in Fig. 8a, the one that differs most
 THIN = (0.0, 0.0, 0.0)  # kg m^2: links are lines, like the continuum
+FUNCTIONS = ["mass_matrix", "tail_points", "energy", "momentum"]
 LINKS = (2, 3, 4, 5, 6, 8, 16, 32, 64)
 HEIGHT = 0.1  # m, of B on the page
 MOST_BEND = 1.5 * np.pi  # rad, more than any tail needs for it
@@ -113,7 +114,7 @@ def swing(folder: Path) -> dict:
 def built(links: int | None) -> st.Model:
     """Return a tail of one segment with what this comparison takes; a continuum for no links."""
     tail = {"tail": "articulated", "links": links} if links else {"tail": "continuum"}
-    return st.build(segments=1, functions=["mass_matrix", "tail_points"], **tail)
+    return st.build(segments=1, functions=FUNCTIONS, **tail)
 
 
 def seen_directions(model: st.Model) -> np.ndarray:
@@ -126,8 +127,8 @@ def seen_directions(model: st.Model) -> np.ndarray:
 
 
 def as_motion(model: st.Model) -> st.Trajectory:
-    """Return the swing as a motion of 1 s, without velocities, energies or momenta."""
+    """Return the swing as a motion of 1 s that stands still at each sample."""
     q = torso_swung(model)
-    zeros = [np.zeros((len(q), k)) for k in (model.nv, model.nu, 1, 1, 3, 3)]
-    zeros[2:4] = np.zeros((2, len(q)))
-    return st.Trajectory(np.linspace(0, 1, len(q)), q, *zeros, model=model)
+    v, tau = np.zeros((len(q), model.nv)), np.zeros((len(q), model.nu))
+    told = (*model.energy(q, v), *model.momentum(q, v))
+    return st.Trajectory(np.linspace(0, 1, len(q)), q, v, tau, *told, model=model)

@@ -74,13 +74,12 @@ def followed(rat: st.Model, plan: PaperPlan) -> st.Trajectory:
 
 
 def as_motion(rat: st.Model, plan: PaperPlan) -> st.Trajectory:
-    """Return a plan's nodes as a motion; it has no energies or momenta."""
+    """Return a plan's nodes as a motion."""
     of = {name: plan.states[:, at] for name, at in plan.places.items()}
     q = np.column_stack([of["position"], from_angles(of["angles"]), of["tail"]])
     v = np.column_stack([of["velocity"], of["torso_rate"], of["tail_rate"]])
-    none = {"kinetic": np.zeros(len(q)), "potential": np.zeros(len(q))}
-    none |= dict.fromkeys(("linear_momentum", "angular_momentum"), np.zeros((len(q), 3)))
-    return st.Trajectory(plan.times, q, v, plan.torques, **none, model=rat)
+    told = (*rat.energy(q, v), *rat.momentum(q, v))
+    return st.Trajectory(plan.times, q, v, plan.torques, *told, model=rat)
 
 
 def tracked(rat: st.Model, plan: PaperPlan) -> dict[str, float]:

@@ -171,6 +171,37 @@ def test_a_torso_may_turn_at_the_end():
     assert short.stats["status"] == "Maximum_Iterations_Exceeded"
 
 
+def test_a_guess_flies_from_elsewhere_and_the_plan_from_its_start():
+    q, v = start(rat())
+    pushed = v + np.array([0, 0, 0, 0.3, -0.2, 0.1, 0.5, -0.5])
+    plan = paper_plan(rat(), (q, v), DURATION, LIMITS, nodes=61, guess=(q, pushed))
+    assert plan.stats["converged"]
+    np.testing.assert_allclose(block(plan, "torso_rate")[0], v[3:6], atol=1e-12)
+    assert plan.stats["effort"] == pytest.approx(paper().stats["effort"], rel=1e-6)
+    with pytest.raises(st.PlanningError, match="guess: value"):
+        paper_plan(rat(), (q, v), DURATION, LIMITS, guess=q)
+
+
+def test_a_search_begins_with_passive_flight_and_ends_with_the_first_plan_that_converges(
+    monkeypatch,
+):
+    q, v = start(rat())
+    for good, tries in ((0, 1), (1, 2), (2, 3), (9, 3)):
+        asked = []
+
+        def answer(_, *task, asked=asked, good=good, **settings):
+            asked.append(settings.get("guess"))
+            return replace(paper(), stats={"converged": len(asked) > good, "try": len(asked)})
+
+        monkeypatch.setattr(truth, "planned", answer)
+        with row(good):
+            found = truth.searched(rat(), (q, v), DURATION, LIMITS, time_limit=9.0)
+            assert found.stats == {"converged": good < 3, "try": tries}
+            assert asked[0] is None and len(asked) == tries
+            pushes = [guess[1] - v for guess in asked[1:]]
+            assert all((push[:3] == 0).all() and (push[3:] != 0).all() for push in pushes)
+
+
 def test_wrong_tasks_are_refused():
     q, v = start(rat())
     good = {"start": (q, v), "duration": DURATION, "bounds": LIMITS}
