@@ -2,6 +2,8 @@
 their tail's path.
 """
 
+from itertools import product
+
 import numpy as np
 
 import serpentail as st
@@ -12,7 +14,7 @@ ITERATIONS = 300  # of IPOPT, as many as `st.plan` has
 TRUE = ("open_loop_attitude_error_deg", "energy_J", "peak_power_W")
 TRACKED = ("tracked_attitude_error_deg", "tracked_tail_error_rad", "dyn_err")
 SAMPLES = 1000  # of a flight
-PUSHES, MOST = 2, 1500  # random guesses after passive flight, and iterations of each
+PUSHES, MOST = 3, 1500  # random guesses after passive flight; iterations of a second try
 
 
 def planned(rat: st.Model, *task, time_limit: float, **settings) -> PaperPlan:
@@ -25,16 +27,15 @@ def searched(rat: st.Model, *task, time_limit: float) -> PaperPlan:
     """Return the first plan for (start, duration, bounds) whose program converges, else the last.
 
     The first guess is passive flight (Sect. 3.2); the others begin with random pushes of 1 rad/s,
-    as Sect. 4.5 advises.
+    as Sect. 4.5 advises. If none converges, all are tried again with more iterations.
     """
     (q, v), *_ = task
-    limits = {"time_limit": time_limit, "max_iter": MOST}
-    plan = planned(rat, *task, **limits)
-    for seed in range(1, 1 + PUSHES):
+    for most, seed in product((ITERATIONS, MOST), range(1 + PUSHES)):
+        push = np.random.default_rng(seed).normal(size=rat.nv) * (np.arange(rat.nv) >= 3)
+        guess = q, v + push * (seed > 0)
+        plan = planned(rat, *task, guess=guess, time_limit=time_limit, max_iter=most)
         if plan.stats["converged"]:
             break
-        push = np.random.default_rng(seed).normal(size=rat.nv) * (np.arange(rat.nv) >= 3)
-        plan = planned(rat, *task, guess=(q, v + push), **limits)
     return plan
 
 

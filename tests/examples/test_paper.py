@@ -186,20 +186,22 @@ def test_a_search_begins_with_passive_flight_and_ends_with_the_first_plan_that_c
     monkeypatch,
 ):
     q, v = start(rat())
-    for good, tries in ((0, 1), (1, 2), (2, 3), (9, 3)):
+    for good, tries in ((1, 1), (2, 2), (5, 5), (99, 8)):
         asked = []
 
         def answer(_, *task, asked=asked, good=good, **settings):
-            asked.append(settings.get("guess"))
-            return replace(paper(), stats={"converged": len(asked) > good, "try": len(asked)})
+            asked.append(settings)
+            return replace(paper(), stats={"converged": len(asked) == good})
 
         monkeypatch.setattr(truth, "planned", answer)
         with row(good):
             found = truth.searched(rat(), (q, v), DURATION, LIMITS, time_limit=9.0)
-            assert found.stats == {"converged": good < 3, "try": tries}
-            assert asked[0] is None and len(asked) == tries
-            pushes = [guess[1] - v for guess in asked[1:]]
-            assert all((push[:3] == 0).all() and (push[3:] != 0).all() for push in pushes)
+            assert found.stats["converged"] == (good < 99) and len(asked) == tries
+            assert [each["max_iter"] for each in asked] == ([300] * 4 + [1500] * 4)[:tries]
+            pushes = [each["guess"][1] - v for each in asked]
+            for k, push in enumerate(pushes):
+                assert (push[:3] == 0).all() and (push[3:] != 0).all() == (k % 4 > 0)
+                np.testing.assert_array_equal(push, pushes[k % 4])
 
 
 def test_wrong_tasks_are_refused():
