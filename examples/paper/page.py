@@ -21,7 +21,8 @@ def lines(items: dict[str, Item], values: dict[str, dict]) -> list[str]:
     """Return the table of values by figure and row; one value, or ours and that of `st.plan`."""
     found = [cells(HEAD), "|---" * len(HEAD) + "|"]
     for name, item in items.items():
-        found.append(cells([f"**{item.title}** ({item.where})", *[""] * (len(HEAD) - 1)]))
+        title = f"**{item.title}** ({item.where}; `{item.page}`)"
+        found.append(cells([title, *[""] * (len(HEAD) - 1)]))
         found += [cells(told(row, values[name][row.name])) for row in item.rows]
     return found
 
