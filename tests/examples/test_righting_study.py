@@ -65,6 +65,7 @@ def test_both_ways_get_one_task(monkeypatch):
                 np.testing.assert_array_equal(v0, v * (name != "falling cat, 1 s"))
                 assert duration == (least, most) and bounds.torque == righting.TORQUE
                 assert bounds.angle == pytest.approx(np.pi / 3)
-            assert asked["time_limit"] == kinds.LIMIT and asked["solver"] == "ipopt"
+            assert asked["time_limit"] == asked["solver"].time_limit == kinds.LIMIT
+            assert asked["solver"].name == "ipopt"
             free = name == "(1, 3), any rate"
             assert asked["at_rest"] is not free and ("goal" in asked) is free
