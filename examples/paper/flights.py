@@ -24,7 +24,7 @@ def jump(folder: Path) -> dict:
     start, limits = (passive.q[at], passive.v[at]), righting.bounds(model)
     task = {"start": start, "duration": FREE, "bounds": limits}
     paper = truth.searched(model, *task.values(), time_limit=LIMIT)
-    ours = st.plan(model, **task, retries=RETRIES, time_limit=LIMIT)
+    ours = st.plan(model, **task, solver=st.Solver(retries=RETRIES, time_limit=LIMIT))
     jumps, damping = {"passive": passive}, st.Damping(righting.K_DMP)
     laws = {PAPER: (truth.law(kick.model, paper), paper.times[-1])}
     laws[OURS] = st.Pfl(kick.model, ours), ours.duration

@@ -33,8 +33,9 @@ def nodes(folder: Path) -> dict:
         rows["paper"].append(of | truth.row(model, paper) | truth.tracked(model, paper))
         if frequency in SHOWN:
             flights[f"{frequency} Hz"] = truth.followed(model, paper)
-        mesh = {"intervals": max(2, steps // 3), "tolerance": None, "retries": 0}
-        rows["ours"].append(of | righting.row(st.plan(model, **given, **mesh)))
+        given |= {"mesh": st.Mesh(intervals=max(2, steps // 3))}
+        plan = st.plan(model, **given, tolerances=free, solver=once)
+        rows["ours"].append(of | righting.row(plan))
     draw_figure_11(rows, folder / "fig11.png")
     st.view(list(flights.values()), folder / "fig11.html", names=list(flights))
     told = [of_figure_11(way) for way in rows.values()]
@@ -65,7 +66,7 @@ def segments(folder: Path) -> dict:
         task = righting.kicked(model), FREE, righting.bounds(model, 2 * np.pi)
         paper = truth.searched(model, *task, time_limit=LIMIT)
         given = dict(zip(("start", "duration", "bounds"), task, strict=True))
-        ours = st.plan(model, **given, retries=RETRIES, time_limit=LIMIT)
+        ours = st.plan(model, **given, solver=st.Solver(retries=RETRIES, time_limit=LIMIT))
         planned[size], true[size] = truth.as_motion(model, paper), ours.trajectory
         efforts.append((paper.stats["effort"], ours.report["effort"]))
         for name, pair in of_table_2(model, paper, planned[size], ours).items():

@@ -196,16 +196,15 @@ def test_of_several_plans_the_first_true_one_is_taken():
     run = sequence(kick(), st.Phase("right", 0.02, plan=hopeless)).simulate(*settled())
     assert not run.phases[1].plan.success
     assert "'right', at t = 0.46 s: no true plan (1 tried)" in str(run.trajectory.warnings)
-    wrong = st.Phase("right", 1.0, plan=plan(intervals=-3))
-    with pytest.raises(st.PlanningError, match="phase 'right': intervals: value -3"):
+    wrong = st.Phase("right", 1.0, plan=plan(mesh=st.Mesh(intervals=-3)))
+    with pytest.raises(st.PlanningError, match=r"phase 'right': mesh\.intervals: value -3"):
         sequence(kick(), wrong).simulate(*settled())
 
 
 def test_a_plan_that_fails_is_not_tracked_and_a_torque_that_suffices_is_told():
     """The phase's own controller acts; with the torque of the message there is a plan."""
-    weak = [
-        plan(bounds=st.Bounds(angle=pi / 3, torque=torque), retries=0) for torque in (4e-3, 8e-3)
-    ]
+    once = {"solver": st.Solver(retries=0)}
+    weak = [plan(bounds=st.Bounds(angle=pi / 3, torque=each), **once) for each in (4e-3, 8e-3)]
     right = st.Phase("right", 0.02, controller=DAMPING, plan=weak[:1])
     run = sequence(kick(), right).simulate(*settled())
     motion = run.trajectory

@@ -169,8 +169,9 @@ def _planned(job: Job, model: Model, point: Point) -> tuple[dict[str, Any], Any]
 
     arguments = job.arguments_of(point)
     if job.table is not None:
-        arguments = {**arguments_for(model, arguments), **job.settings}
+        arguments = joined(job.settings, arguments_for(model, arguments))
     else:
+        arguments = joined(arguments, {})
         arguments["start"] = tuple(arguments.pop(name) for name in STARTS)
     solution = plan(model, **arguments)
     return solution.report | {"warnings": solution.warnings}, solution
