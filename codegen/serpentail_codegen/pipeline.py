@@ -1,13 +1,17 @@
 """The stages of a generation in order, from a scene to its folder."""
 
 from collections.abc import Callable, Collection, Iterator
+from dataclasses import replace
 from pathlib import Path
+
+from serpentail_scene.parameters import PARTS
 
 from . import __version__
 from .functions.catalogue import CATALOGUE, function_of
 from .functions.function import Function
 from .functions.tail import Tail
 from .scene.scene import Scene
+from .scene.variant import Shape
 from .targets.c.target import C
 from .targets.casadi.target import CASADI
 from .targets.manifest import FORMAT, manifest
@@ -61,7 +65,48 @@ def hash_of(emission: Emission) -> str:
 
 
 def tail_of(scene: Scene) -> Tail:
-    """Return the sizes of a scene's tail."""
+    """Return the sizes of a scene's tail, or of the tree of its chains."""
+    tail = _chain_of(scene)
+    if not scene.chains:
+        return tail
+    chains = [replace(tail, contacts=())]
+    for described in scene.chains:
+        shape = replace(described.scene.shape, weightless=scene.weightless)
+        one = replace(_chain_of(described.scene), shape=shape, owner=described.name)
+        for name in described.names:
+            last = chains[-1]
+            chains.append(
+                replace(
+                    one,
+                    name=name,
+                    mirrored=described.pair and name != described.names[0],
+                    segments_before=last.segments_before + last.segments,
+                    points_before=last.points_before + last.tail_points,
+                )
+            )
+    return _tree(tail, tuple(chains))
+
+
+def _tree(tail: Tail, chains: tuple[Tail, ...]) -> Tail:
+    """Return the sizes of an animal of several chains: those of all segments, one after another."""
+    stretches = [stretch for chain in chains for stretch in chain.stretches]
+    each = [stretch for stretch in stretches for _ in range(stretch.stop - stretch.first)]
+    kinds, counts = (tuple(getattr(s, name) for s in each) for name in ("kind", "points"))
+    mixed = len(set(kinds)) > 1
+    return replace(
+        tail,
+        segments=len(each),
+        links=max(counts),
+        kind="mixed" if mixed else kinds[0],
+        bend_range=max(chain.bend_range for chain in chains),
+        shape=Shape(counts=counts, kinds=kinds * mixed, weightless=tail.shape.weightless),
+        passive=tuple(part for part in PARTS if any(part in chain.passive for chain in chains)),
+        branches=chains,
+    )
+
+
+def _chain_of(scene: Scene) -> Tail:
+    """Return the sizes of one chain, described as a tail."""
     pieces = scene.links if scene.kind == "articulated" else scene.samples
     polar = scene.coordinates == "polar"
     return Tail(

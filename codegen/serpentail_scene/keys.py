@@ -109,6 +109,7 @@ KEYS = {
     "body": SceneKey(None, ANY),  # the size of the animal
     "base": SceneKey("free", one_of(["free", "fixed"])),
     "weightless": SceneKey(False, FLAG),
+    "chain": SceneKey({}, table("chain.NAME")),  # besides the tail
 }
 
 
@@ -143,6 +144,10 @@ def foreign_to(kind: str) -> tuple[list[str], list[str]]:
         name for only in ONLY.values() for name in only.parameters if name not in has.parameters
     ]
     return [*dict.fromkeys(keys)], [*dict.fromkeys(names)]
+
+
+# keys of a table [chain.NAME], besides its parameters
+CHAIN = ("on", "pair", "kind", "segments", "links", "samples", "bend_range", "taper")
 
 
 # ---- keys of tables ------------------------------------------------------------------------------

@@ -1,7 +1,8 @@
 """The physical parameters of a model: what each is, its default and its rule."""
 
+import re
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 from typing import Any
 
@@ -35,6 +36,22 @@ class Parameter:
     def of_pieces(self) -> bool:
         """Tell if each link or arc has its own values."""
         return self.tail in ("link", "arc")
+
+    @property
+    def of_chain(self) -> bool:
+        """Tell if each chain of a tree has this parameter, as the tail does."""
+        return self.needs in ("", *PARTS) and self.tail not in ("free", "weight")
+
+    def owned(self, chain: str) -> "Parameter":
+        """Return this parameter of another chain; without a name that of the tail."""
+        if not chain:
+            return self
+        meaning = re.sub(r"\btail\b", f"chain {chain}", self.meaning)
+        return replace(
+            self,
+            name=name_in(chain, self.name),
+            meaning=meaning.replace("tail_", f"{chain}_"),
+        )
 
 
 Row = tuple[str, int, Value | None, str, NumberRule, str]
@@ -150,6 +167,18 @@ PASSIVE = (
 # fmt: on
 PASSIVE_NAMES = tuple(p.name for p in PASSIVE)
 NAMES = (*(p.name for p in PARAMETERS), *PASSIVE_NAMES)
+
+
+def name_in(chain: str, name: str) -> str:
+    """Return the name of a parameter in a chain: ``hind_mass`` is what ``tail_mass`` is for the
+    tail.
+    """
+    return f"{chain}_{key_in_chain(name)}" if chain else name
+
+
+def key_in_chain(name: str) -> str:
+    """Return the key of a parameter in the table of a chain: ``mass`` for ``tail_mass``."""
+    return name.removeprefix("tail_")
 
 
 def parts_of(named: Collection[str]) -> tuple[str, ...]:

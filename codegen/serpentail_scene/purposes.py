@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping
 from typing import Any
 
 from .parameters import parts_of
-from .signatures.table import AIRBORNE, ALL, DERIVATIVES, EXACT_DERIVATIVES, FIXED, NEEDS
+from .signatures.table import AIRBORNE, ALL, DERIVATIVES, EXACT_DERIVATIVES, FIXED, NEEDS, OF_TREES
 
 MOTION = ("forward_dynamics", "energy", "momentum", "tail_points", "center_of_mass")
 RUNS = (*MOTION, "rollout", "implicit", "contact_points", "leg_points")
@@ -71,6 +71,8 @@ def possible(tables: Mapping[str, Any], names: Collection[str], polar: bool = Tr
         without |= {*DERIVATIVES, *AIRBORNE}
     if tables.get("base") == "fixed":
         without |= {*ALL} - {*FIXED}
+    if tables.get("chain"):
+        without |= {*ALL} - {*OF_TREES}
     return [name for name in ALL if name in names and name not in without]
 
 
@@ -84,12 +86,18 @@ def needed_for(tables: Mapping[str, Any], purposes: Collection[str]) -> list[str
     """Return the functions that a scene has for purposes."""
     names = {name for purpose in purposes for name in PURPOSES[purpose]}
     # flights of a passive tail may be stiff, as the ground is
-    if not tables.get("contacts") and not parts_of(_keys(tables.get("parameters"))):
+    if not tables.get("contacts") and not _passive(tables):
         names -= {"implicit"}
     acting = [tables.get("simulate"), *_entries(tables.get("phase"))]
     laws = [law for table in acting for law in _entries(_keys(table).get("controller"))]
     names |= {"pfl"} if any(_keys(law).get("kind") == "pfl" for law in laws) else set()
     return possible(tables, names)
+
+
+def _passive(tables: Mapping[str, Any]) -> bool:
+    """Tell if the tail or another chain has springs, damping or stops."""
+    chains = [{f"tail_{key}" for key in _keys(t)} for t in _keys(tables.get("chain")).values()]
+    return any(parts_of(names) for names in (_keys(tables.get("parameters")), *chains))
 
 
 def _entries(value: Any) -> list[Any]:

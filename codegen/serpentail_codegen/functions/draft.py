@@ -3,11 +3,11 @@ step.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
-from serpentail_scene.parameters import Parameter
+from serpentail_scene.parameters import PARAMETERS, PASSIVE, Parameter, name_in
 from serpentail_scene.signatures.table import SIGNATURES
 
 from ..ir import dataflow
@@ -22,6 +22,7 @@ from .scope import Instead, Scope, State, Vectors
 from .tail import Tail
 
 AT_REST = ("identity", "still", "zero_1", "zero_3")  # constants that have one value by each name
+OF_CHAINS = tuple(p.name for p in (*PARAMETERS, *PASSIVE) if p.of_chain)
 Reads = Scope | Mapping[str, Ref]
 
 
@@ -34,9 +35,10 @@ class Draft(Builder):
     articulated tail; "segments" computes v_dot without H if no other result needs H.
     """
 
-    tail: Tail
+    tail: Tail  # the whole animal, or the chain that the draft stands on
     dynamics: str = "composite"
     parameters: Mapping[str, Ref] = field(default_factory=dict, init=False)
+    mounts: dict[str, Ref] = field(default_factory=dict, init=False)  # axes there, by their owner
     stretch: Stretch | None = field(
         default=None, init=False
     )  # the stretch whose segments the open loop is over
@@ -48,6 +50,30 @@ class Draft(Builder):
         if self.tail.fixed:  # a base without mass, so that the steps of the torso serve it, too
             refs |= {"torso_mass": self.zero(1), "torso_inertia": self.zero(3)}
         self.parameters = MappingProxyType(refs)
+
+    def on(self, chain: Tail) -> AbstractContextManager[None]:
+        """Stand on one chain: with its sizes, and its parameters under the names of the tail's; its
+        name begins those of local arrays.
+        """
+        return self._standing(chain) if self.tail.branches else nullcontext()
+
+    @contextmanager
+    def _standing(self, chain: Tail) -> Iterator[None]:
+        before, refs = (self.tail, self.parameters), self.parameters
+        names = {name_in(chain.owner, name): name for name in OF_CHAINS}
+        own = {name: refs[of_all] for of_all, name in names.items() if of_all in refs}
+        others = {name: ref for name, ref in refs.items() if name not in OF_CHAINS}
+        self.tail, self.parameters = chain, MappingProxyType(others | own)
+        yield
+        self.tail, self.parameters = before
+
+    def declare(self, array: Array) -> Array:
+        """Declare an array; names of a chain's own begin with its name."""
+        return super().declare(replace(array, name=self.own(array.name)))
+
+    def own(self, name: str) -> str:
+        """Return a name with that of the chain that the draft stands on."""
+        return f"{self.tail.name}_{name}" if self.tail.name else name
 
     def state(self, q: Array, v: Array | None = None) -> State:
         """Return a state; leave out the velocity if it is not used."""
@@ -142,13 +168,17 @@ class Draft(Builder):
     def scratch(self, **sizes: int) -> Vectors:
         """Return local vectors that each stretch of segments uses again; they are declared once."""
         found, suffix = {a.name: a[0] for a in self.arrays if a.role == "local"}, self._lanes[1]
-        return Vectors({n: found.get(n + suffix) or self.vector(n, s) for n, s in sizes.items()})
+        return Vectors(
+            {n: found.get(self.own(n + suffix)) or self.vector(n, s) for n, s in sizes.items()}
+        )
 
     def fixed(self, name: str, values: Iterable[Number]) -> Ref:
         """Return a constant, which is declared once."""
         values = tuple(values)
-        same = [a for a in self.arrays if (a.name, a.role, a.values) == (name, "constant", values)]
-        return (same[0] if same else self.constant(name, values))[0]
+        names = (name, self.own(name))
+        same = [a for a in self.arrays if a.name in names and a.role == "constant"]
+        found = next((a for a in same if a.values == values), None)
+        return (found or self.constant(name, values))[0]
 
     def zero(self, size: int) -> Ref:
         """Return zeros."""

@@ -14,12 +14,13 @@ from .function import Assembly, Function, assemble
 from .layout import block
 from .passive import add_elastic_energy, add_passive_forces, net_torques
 from .scope import Motion, State, Vectors
-from .sweeps.inertia import column_of, tail_inertia
+from .sweeps.chains import prepared
+from .sweeps.inertia import animal_inertia, column_of
 from .sweeps.loads import gather_loads
 from .sweeps.momentum import gather_kinetic, gather_momentum
-from .sweeps.pieces import IDENTITY, attitude, mechanism
+from .sweeps.pieces import IDENTITY, attitude
 from .sweeps.segments import forward_dynamics
-from .sweeps.wrenches import forward_wrenches, gather_wrenches, torso_wrench
+from .sweeps.wrenches import inertial_forces
 from .tails.mechanism import Segments
 
 # ---- H and C -------------------------------------------------------------------------------------
@@ -32,8 +33,10 @@ def assemble_mass_matrix(draft: Draft, arrays: dict[str, Array], world: bool = F
 
 def fill_mass_matrix(
     draft: Draft, state: State, H: Array, row: int, world: bool = False
-) -> tuple[Segments, Ref]:
-    """H (Eq. 2), both triangles; its rows are ``row`` apart.  Returns segments and attitude."""
+) -> tuple[list[Segments], Ref]:
+    """H (Eq. 2), both triangles; its rows are ``row`` apart.  Returns the segments of each chain,
+    and the attitude.
+    """
     tail, R, before = draft.tail, attitude(draft, state), draft.tail.torso_nv
 
     def H_tail(k: Index, other: Index, size: int = 1) -> Ref:
@@ -41,7 +44,7 @@ def fill_mass_matrix(
 
     columns = draft.array("columns", 12, tail.segments)
     along = R if world else None
-    segments, composite = tail_inertia(draft, state, H_tail, columns, along)
+    segments, composite = animal_inertia(draft, state, H_tail, columns, along)
 
     # columns in world axes need no further rotation
     axes = {"R": R}
@@ -71,7 +74,7 @@ def assemble_inverse_dynamics(draft: Draft, arrays: dict[str, Array], world: boo
     state = draft.state(arrays["q"], arrays["v"])
     unmoved = draft.fixed("still", [0, 0, 0])
     R = attitude(draft, state)
-    segments = mechanism(draft).prepare(draft, state, False)
+    segments = prepared(draft, state)
 
     # gravity is an acceleration of the torso
     p_ddot = draft.of_torso(v_dot, VELOCITY) if v_dot else unmoved
@@ -86,18 +89,6 @@ def assemble_inverse_dynamics(draft: Draft, arrays: dict[str, Array], world: boo
     for part in (VELOCITY, OMEGA) if world else (VELOCITY,):
         vector = block(force, part)
         draft.step(rotations.world_vector, {"R": R, "vector": vector}, vector=vector)
-
-
-def inertial_forces(
-    draft: Draft, segments: Segments, motion: Motion, v_dot: Array | None, force: Array
-) -> None:
-    """Compute the generalised forces of a motion of the torso and ``v_dot`` of the tail, in torso
-    axes.
-    """
-    wrenches = forward_wrenches(draft, segments, motion, v_dot)
-    total = gather_wrenches(draft, segments, wrenches, lambda i: draft.tail.segment_v(force, i))
-    if not draft.tail.fixed:
-        torso_wrench(draft, motion, total, force)
 
 
 # ---- forward dynamics ----------------------------------------------------------------------------

@@ -13,7 +13,7 @@ from .function import Function, assemble
 from .layout import block
 from .scope import Instead, Scope, Vectors
 from .sweeps.columns import factored_dynamics_by_columns
-from .sweeps.inertia import column_of, tail_inertia
+from .sweeps.inertia import animal_inertia, column_of
 from .sweeps.pieces import IDENTITY
 from .sweeps.wrenches import core_bias
 
@@ -42,7 +42,7 @@ def assemble_factored_dynamics(draft: Draft, arrays: dict[str, Array]) -> None:
         draft.factor(A, size)
         return
     columns = arrays["columns"]
-    segments, composite = tail_inertia(draft, state, A_tail, columns)
+    segments, composite = animal_inertia(draft, state, A_tail, columns)
     if tail.fixed:
         core_bias(draft, segments, bias)
         draft.factor(A, size)

@@ -6,6 +6,7 @@ from ..ir.program import Array, Index, Ref
 from ..mechanics import loads, torso
 from .draft import Draft
 from .layout import coordinate
+from .sweeps.chains import each_chain, facing
 from .sweeps.inertia import column_of, columns_and_inertia
 from .sweeps.pieces import (
     attitude,
@@ -21,12 +22,14 @@ def assemble_tail_points(draft: Draft, arrays: dict[str, Array]) -> None:
     """The joints and the tip (Eqs. 14, 15), or equally spaced samples of every segment."""
     points, state = arrays["points"], draft.state(arrays["q"])
     R = attitude(draft, state)
-    samples = mechanism(draft).prepare_samples(draft, state, None)
-    pose = torso_pose(draft, R, state.position)
-    draft.copy(points.part(0, 3), pose.P)
-    for i, g in each_point(draft):
-        draft.step(mechanism(draft).pose, pose, samples.at(i, g), **pose)
-        draft.copy(points.part(3 * (g + 1), 3), pose.P)
+    for chain in each_chain(draft):
+        first = chain.points_before
+        samples = mechanism(draft).prepare_samples(draft, state.on(chain), None)
+        pose = torso_pose(draft, facing(draft, R), state.position)
+        draft.copy(points.part(3 * first, 3), pose.P)
+        for i, g in each_point(draft):
+            draft.step(mechanism(draft).pose, pose, samples.at(i, g), **pose)
+            draft.copy(points.part(3 * (first + g + 1), 3), pose.P)
 
 
 def assemble_tail_point_jacobians(draft: Draft, arrays: dict[str, Array]) -> None:

@@ -14,6 +14,7 @@ from ..mechanics.lower import declared_shapes
 from .draft import Draft
 from .layout import coordinates
 from .scope import Instead, State, Vectors
+from .sweeps.chains import each_chain
 from .tails.mechanism import StepFunction
 
 FORCES: dict[str, StepFunction] = {
@@ -33,7 +34,9 @@ def passive_parameters(draft: Draft, step: StepFunction, part: Callable[[Array],
 
 @contextmanager
 def each_passive_force(draft: Draft, state: State) -> Iterator[tuple[Index, Ref]]:
-    """Open a loop over segments; yields the segment and the forces of its passive parts."""
+    """Open a loop over the segments of a chain; yields the segment and the forces of its passive
+    parts.
+    """
     force = draft.vector("passive", 2)
     with draft.loop("i", draft.tail.segments) as i:
         draft.fill(force, 0)
@@ -51,9 +54,10 @@ def _add_forces(draft: Draft, state: State, i: Index, force: Ref) -> None:
 
 def add_passive_forces(draft: Draft, state: State, force: Callable[[Index], Ref]) -> None:
     """Add the forces of the passive parts to the force on each segment."""
-    if draft.tail.passive:
-        with draft.loop("i", draft.tail.segments) as i:
-            _add_forces(draft, state, i, force(i))
+    for chain in each_chain(draft):
+        if chain.passive:
+            with draft.loop("i", chain.segments) as i:
+                _add_forces(draft, state.on(chain), i, force(i))
 
 
 def add_passive_power(draft: Draft, state: State, multiplier: Array, power: Ref) -> None:
@@ -69,17 +73,18 @@ def net_torques(draft: Draft, state: State, tau: Array) -> Array:
     if not draft.tail.passive:
         return tau
     net = draft.array("net_torques", draft.tail.nt)
-    with each_passive_force(draft, state) as (i, passive_force):
-        reads = {"tau": coordinates(tau, i), "passive": passive_force}
-        draft.step(passive.net_torque, reads, net=coordinates(net, i))
+    for chain in each_chain(draft):
+        with each_passive_force(draft, state.on(chain)) as (i, passive_force):
+            reads = {"tau": chain.segment_tau(tau, i), "passive": passive_force}
+            draft.step(passive.net_torque, reads, net=chain.segment_tau(net, i))
     return net
 
 
 def add_elastic_energy(draft: Draft, state: State, potential: Ref) -> None:
     """Add the energy that springs and stops store."""
-    for name in draft.tail.passive:
-        if name in ENERGIES:
-            step = ENERGIES[name]
-            with draft.loop("i", draft.tail.segments) as i:
+    for chain in each_chain(draft):
+        own_state = state.on(chain)
+        for step in (ENERGIES[name] for name in chain.passive if name in ENERGIES):
+            with draft.loop("i", chain.segments) as i:
                 own = passive_parameters(draft, step, partial(coordinates, i=i))
-                draft.step(step, {"angles": state.angles(i)}, own, potential_=potential)
+                draft.step(step, {"angles": own_state.angles(i)}, own, potential_=potential)

@@ -3,13 +3,14 @@
 from serpentail_scene.layout import OMEGA, VELOCITY
 
 from ..ir.program import Array, padded
-from ..mechanics import rotations, torso, translation
+from ..mechanics import branch, rotations, torso, translation
 from .draft import Draft
-from .layout import block, coordinates
+from .layout import block
 from .passive import add_passive_forces
 from .scope import State, Vectors
+from .sweeps.chains import add, on_each, prepared, seen
 from .sweeps.inertia import column_of, columns_and_inertia
-from .sweeps.pieces import attitude, mechanism
+from .sweeps.pieces import attitude
 from .sweeps.wrenches import forward_wrenches, gather_wrenches, torso_without_acceleration
 from .tails.mechanism import Segments
 
@@ -36,7 +37,7 @@ def assemble_pfl(draft: Draft, arrays: dict[str, Array]) -> None:
         draft.copy(tail.coordinate_v(v_dot, k), arrays["accelerations"].part(k, 1))
     wrench = tail_alone(draft, segments, v_dot, tau)
     motion = free_torso(draft, composite, wrench)
-    add_passive_forces(draft, state, lambda i: coordinates(tau, i))
+    add_passive_forces(draft, state, lambda i: draft.tail.segment_tau(tau, i))
     with draft.loop("k", tail.nt) as k:
         column = {"column": column_of(columns, k)}
         draft.step(translation.coupling_torque, motion, column, torque_=tau.part(k, 1))
@@ -48,21 +49,26 @@ def assemble_pfl(draft: Draft, arrays: dict[str, Array]) -> None:
 
 def hold_base(draft: Draft, state: State, arrays: dict[str, Array]) -> None:
     """Torques H v_dot + C: on a fixed base they give exactly the wanted accelerations."""
-    segments, v_dot = mechanism(draft).prepare(draft, state, False), arrays["accelerations"]
+    segments, v_dot = prepared(draft, state), arrays["accelerations"]
     tail_alone(draft, segments, v_dot, arrays["tau"])
-    add_passive_forces(draft, state, lambda i: coordinates(arrays["tau"], i))
+    add_passive_forces(draft, state, lambda i: draft.tail.segment_tau(arrays["tau"], i))
     if "v_dot" in arrays:
         draft.copy(draft.tail.all_v(arrays["v_dot"]), draft.tail.all_v(v_dot))
 
 
-def tail_alone(draft: Draft, segments: Segments, v_dot: Array, tau: Array) -> Vectors:
-    """Compute ``force, moment`` at B and torques for ``v_dot`` of the tail while the torso does not
-    accelerate.
+def tail_alone(draft: Draft, segments: list[Segments], v_dot: Array, tau: Array) -> Vectors:
+    """Compute ``force, moment`` at B and torques for ``v_dot`` of the chains while the torso does
+    not accelerate.
     """
-    motion = torso_without_acceleration(draft, segments.state)
-    wrenches = forward_wrenches(draft, segments, motion, v_dot)
-    total = gather_wrenches(draft, segments, wrenches, lambda i: coordinates(tau, i))
-    return draft.store(torso.torso_wrench, motion, total, force=3, moment=3)
+    motion, sums = torso_without_acceleration(draft, segments[0].state), Vectors({})
+    for own in on_each(draft, segments):
+        wrenches = forward_wrenches(draft, own, seen(draft, motion), v_dot)
+        total = gather_wrenches(draft, own, wrenches, lambda i: draft.tail.segment_tau(tau, i))
+        if draft.tail.name:
+            add(draft, branch.chain_wrench, total, sums)
+        else:
+            sums = draft.store(torso.torso_wrench, motion, total, force=3, moment=3)
+    return sums
 
 
 def free_torso(draft: Draft, composite: Vectors, wrench: Vectors) -> Vectors:

@@ -5,7 +5,7 @@ declares.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, VELOCITY
 
@@ -120,6 +120,10 @@ class State:
         if self.v is None:
             raise ValueError("this function has no v among its arguments")
         return self.v
+
+    def on(self, chain: Tail) -> "State":
+        """Return the same state, whose segments are those of a chain."""
+        return replace(self, tail=chain)
 
     def torso(self, R: Ref) -> Torso:
         """Return the vectors of the torso; R is its attitude."""

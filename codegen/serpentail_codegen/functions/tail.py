@@ -7,7 +7,7 @@ from serpentail_scene.layout import PER_SEGMENT, Sizes
 from serpentail_scene.parameters import Parameter
 
 from ..ir.program import Array, Index, Ref, padded
-from ..scene.resolve import parameters_of
+from ..scene.resolve import each_parameter
 from ..scene.scene import Scene
 from ..scene.variant import EQUAL, SegmentRun, Shape, Stretch, runs_of, stretches_of
 from .layout import LOAD
@@ -32,11 +32,31 @@ class Tail(Sizes):
     friction: str = "cone"
     shape: Shape = EQUAL
     passive: tuple[str, ...] = ()  # springs, damping, stops
+    # a tree has chains, the tail first; its segments and its shape are those of all
+    branches: tuple["Tail", ...] = ()
+    # of a chain besides the tail: its name, how the names of its parameters begin, whether it is
+    # the mirror image of what they describe, and how many segments and points the chains before
+    # it have
+    name: str = ""
+    owner: str = ""
+    mirrored: bool = False
+    segments_before: int = 0
+    points_before: int = 0
+
+    @property
+    def chains(self) -> tuple["Tail", ...]:
+        """Return all chains: the tail, then the others of a tree."""
+        return self.branches or (self,)
 
     @property
     def stretches(self) -> tuple[Stretch, ...]:
         """Consecutive segments of one kind with equally many links."""
         return stretches_of(self.segments, self.links, self.kind, self.shape)
+
+    @property
+    def parts(self) -> dict[str, "Tail"]:
+        """Return a chain for each set of parameters, by what begins their names."""
+        return {chain.owner: chain for chain in self.chains}
 
     def runs(self, kind: str) -> tuple[SegmentRun, ...]:
         """Consecutive segments of one kind, links or arcs; in most tails all of them."""
@@ -72,11 +92,15 @@ class Tail(Sizes):
 
     def segment_q(self, q: Array, i: Index | int) -> Ref:
         """Return the coordinates of segment i."""
-        return q.part(self.torso_nq + PER_SEGMENT * i, PER_SEGMENT)
+        return q.part(self.torso_nq + PER_SEGMENT * (self.segments_before + i), PER_SEGMENT)
 
     def segment_v(self, v: Array, i: Index | int) -> Ref:
         """Return the rates, accelerations or forces of segment i."""
-        return v.part(self.torso_nv + PER_SEGMENT * i, PER_SEGMENT)
+        return v.part(self.torso_nv + PER_SEGMENT * (self.segments_before + i), PER_SEGMENT)
+
+    def segment_tau(self, tau: Array, i: Index | int) -> Ref:
+        """Return the torques of segment i."""
+        return tau.part(PER_SEGMENT * (self.segments_before + i), PER_SEGMENT)
 
     def coordinate_v(self, v: Array, k: Index | int) -> Ref:
         """Return the rate, acceleration or force of tail coordinate k."""
@@ -94,8 +118,10 @@ class Tail(Sizes):
 
     @property
     def tail_points(self) -> int:
-        """Number of tail points, N + 1: N joints and the tip, or the root and N samples of arcs."""
-        return self.total + 1
+        """Number of points of all chains: N joints and the tip of each, or the root and N samples
+        of arcs.
+        """
+        return self.total + len(self.chains)
 
     @property
     def loads(self) -> int:
@@ -191,5 +217,4 @@ class Tail(Sizes):
 
 def struct_parameters(model: Tail | Scene) -> tuple[Parameter, ...]:
     """Return the parameters that the functions of a model read: the fields of its struct."""
-    own = parameters_of(model.kind, model.contacts, model.shape, model.passive, model.segments)
-    return tuple(p for p in own if p.name != "link_radius")
+    return tuple(p for _, p in each_parameter(model) if not p.name.endswith("link_radius"))

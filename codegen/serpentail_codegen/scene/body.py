@@ -10,11 +10,11 @@ from math import pi, prod
 from typing import Any
 
 from serpentail_scene.keys import BODY, TORSOS
-from serpentail_scene.parameters import PARAMETERS, PASSIVE, Value
+from serpentail_scene.parameters import PARAMETERS, PASSIVE, Value, name_in
 from serpentail_scene.units import dimensions
 
 from .problems import Problem, suggest
-from .scene import Parameters
+from .scene import Chain, Parameters
 from .segment_tables import numbers_of
 
 # Exponents of the body mass: bone lengths of legs, Alexander, Jayes, Maloiy & Wathuta, J. Zool. 189
@@ -132,16 +132,26 @@ def _shaped(shape: str, lengths: tuple[float, ...], density: float) -> dict[str,
     return dict(zip(OF_TORSO, (mass, inertia, semi_axes), strict=True))
 
 
-def scaled_parameters(body: BodyTable, parameters: Parameters) -> dict[str, Any]:
-    """Return the scaled parameters, the original ones, and the size, as Scene stores them."""
-    tail = next(
-        parameters[n] for n in ("tail_mass", "link_masses", "arc_masses") if n in parameters
-    )
-    masses = tail if isinstance(tail, tuple) else (tail,)
-    size = body.size(float(parameters.get("torso_mass", 0.0)) + sum(masses))  # type: ignore[arg-type]
+def _mass(parameters: Mapping[str, Value]) -> float:
+    """Return the mass of a tail or another chain, as if it were one."""
+    found = [parameters[n] for n in ("tail_mass", "link_masses", "arc_masses") if n in parameters]
+    return sum(sum(each) if isinstance(each, tuple) else each for each in found)
+
+
+def scaled_parameters(
+    body: BodyTable, parameters: Parameters, chains: Collection[Chain] = ()
+) -> dict[str, Any]:
+    """Return the scaled parameters, the original ones, and the size, as Scene stores them.
+
+    chains: besides the tail; their parameters are among all.
+    """
+    mass = float(parameters.get("torso_mass", 0.0)) + _mass(parameters)  # type: ignore[arg-type]
+    mass += sum(_mass(chain.scene.parameters) * len(chain.names) for chain in chains)
+    size = body.size(mass)
     if size == SAME:
         return {}
-    units = {p.name: p.unit for p in (*PARAMETERS, *PASSIVE)}
+    owners = ("", *(chain.name for chain in chains))
+    units = {name_in(o, p.name): p.unit for o in owners for p in (*PARAMETERS, *PASSIVE)}
     entries = tuple((name, size.of(name, units[name], x)) for name, x in parameters.entries)
     return {
         "parameters": Parameters(entries),

@@ -9,13 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from serpentail_scene.keys import CONTACTS, GROUPS, KEYS, ONLY, TARGETS, Only, foreign_to
-from serpentail_scene.parameters import PARAMETERS
+from serpentail_scene.parameters import PARAMETERS, name_in
 from serpentail_scene.purposes import functions_of
 from serpentail_scene.signatures.table import ALL
 from serpentail_scene.source import tables_of
 from serpentail_scene.units import in_unit
 
 from .body import OF_TORSO, body_table, scaled_parameters
+from .chains import all_parameters, chains_of
 from .checks import (
     MOST_LINKS,
     contact_problems,
@@ -70,6 +71,10 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
 
     # everything that is wrong with keys and functions
     problems = unknown_keys(table, "", KEYS)
+    chains = chains_of(values, parse_scene)
+    problems += chains.problems
+    values |= {"chains": chains.chains, "parameters": chains.parameters}
+    values["chain"] = json.dumps(values["chain"], default=str) if values["chain"] else ""
     tail = tail_description(kind, values)
     values |= tail.values
     problems += [*tail.problems, *key_problems(values), *kind_problems(table, kind)]
@@ -90,7 +95,8 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
     except SceneError as error:
         problems += error.problems
     if not problems:
-        values |= scaled_parameters(body, values["parameters"])
+        values["parameters"] = all_parameters(values["parameters"], chains.chains)
+        values |= scaled_parameters(body, values["parameters"], chains.chains)
     if not problems and values["real"] == "float":
         problems += single_problems(values["parameters"])
     if problems:
@@ -118,6 +124,17 @@ def _with_defaults(table: Mapping[str, Any], name: str, rules: Only) -> dict[str
     return values | dict(table)
 
 
+def _computed(scene: Scene) -> set[str]:
+    """Return the parameters that follow from other values: an inertia from link_radius, values of
+    single pieces from tables.
+    """
+    tables = json.loads(scene.tables or "{}")
+    computed = {"link_inertia"} if "link_radius" in scene.parameters else set()
+    if tables and have_values(tables):
+        computed |= {p.name for p in PARAMETERS if p.of_pieces}
+    return computed
+
+
 def scene_to_dict(scene: Scene) -> dict[str, Any]:
     """Return the table from which parse_scene makes this scene again: ready for JSON, floats
     exact.
@@ -125,21 +142,22 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
     # keys that this kind of tail, or a flight, does not have
     foreign = {*foreign_to(scene.kind)[0]}
     foreign |= set() if scene.contacts else {"contacts", "friction"}
-    foreign |= {"shape", "tables", "body", "unscaled", "size"}  # these follow from other keys
+    foreign |= {"shape", "tables", "body", "unscaled", "size", "chains", "chain"}  # these follow
     usual = {name: KEYS[name].default for name in ("base", "weightless")}
     foreign |= {name for name, value in usual.items() if getattr(scene, name) == value}
     names = [field.name for field in fields(Scene) if field.name not in foreign]
     table = {name: getattr(scene, name) for name in names}
     tables = json.loads(scene.tables or "{}")
-    table |= tables | ({"body": json.loads(scene.body)} if scene.body else {})
+    table |= tables | {
+        key: json.loads(text) for key in ("body", "chain") if (text := getattr(scene, key))
+    }
     if are_tables(table["segments"]):
         table.pop("links", None)
     table |= {key: list(table[key]) for key in ("functions", "contacts", "targets") if key in table}
 
-    # an inertia that follows from link_radius is computed again, as are values from tables
-    computed = {"link_inertia"} if "link_radius" in scene.parameters else set()
-    if tables and have_values(tables):
-        computed |= {p.name for p in PARAMETERS if p.of_pieces}
+    computed = {
+        name_in(owner, name) for owner, part in scene.parts.items() for name in _computed(part)
+    }
     if "torso" in table.get("body", {}):
         computed |= set(OF_TORSO)
     unscaled = scene.unscaled or scene.parameters

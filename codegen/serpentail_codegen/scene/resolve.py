@@ -1,7 +1,7 @@
 """Gives each parameter of a model its value, from those that the scene names."""
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -56,6 +56,16 @@ def parameters_of(
     if kind == "mixed":
         parameters = tuple(replace(p, meaning=MEANINGS.get(p.name, p.meaning)) for p in parameters)
     return parameters + passive_parameters(passive, segments)
+
+
+def each_parameter(model: Any) -> Iterator[tuple[Any, Parameter]]:
+    """Yield the parameters of a scene, or of the sizes of its model, each with what it describes:
+    the torso and the tail, or another chain.
+    """
+    for owner, part in model.parts.items():
+        for p in parameters_of(part.kind, part.contacts, part.shape, part.passive, part.segments):
+            if p.of_chain or not owner:
+                yield part, p.owned(owner)
 
 
 def resolve_parameters(

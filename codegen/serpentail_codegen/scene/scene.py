@@ -37,6 +37,23 @@ def _default(key: str) -> Any:
 
 
 @dataclass(frozen=True)
+class Chain:
+    """A chain besides the tail, or a pair of them, whose numbers are those of the right one.
+
+    scene: what its table describes, as if it were a tail; its functions mean nothing.
+    """
+
+    name: str
+    pair: bool
+    scene: "Scene"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return the name of each of its chains, right before left."""
+        return (f"{self.name}_right", f"{self.name}_left") if self.pair else (self.name,)
+
+
+@dataclass(frozen=True)
 class Scene:
     """What to generate: a tail, its parameters, the functions, and in which form."""
 
@@ -65,8 +82,15 @@ class Scene:
     unscaled: Parameters | None = None  # before scaling, if `body` scales the parameters
     size: tuple[float, float, float] = (1.0, 1.0, 1.0)  # factors of kg, m and s
     tables: str = ""  # the keys `segments` and `taper` of the file, as JSON; empty: a count
+    chains: tuple[Chain, ...] = ()  # besides the tail
+    chain: str = ""  # the tables `chain` of the file, as JSON
 
     @property
     def passive(self) -> tuple[str, ...]:
         """Parts of the passive tail that the scene has."""
         return parts_of(self.parameters)
+
+    @property
+    def parts(self) -> dict[str, "Scene"]:
+        """Return what describes the tail, and each other chain or pair by its name."""
+        return {"": self} | {chain.name: chain.scene for chain in self.chains}

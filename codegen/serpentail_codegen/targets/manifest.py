@@ -14,8 +14,9 @@ from serpentail_scene.signatures.table import EXACT_DERIVATIVES, SIGNATURES
 from ..functions.function import Function
 from ..functions.tail import Tail
 from ..scene.parse import scene_to_dict
-from ..scene.resolve import parameters_of
-from ..scene.scene import Scene
+from ..scene.resolve import each_parameter
+from ..scene.scene import Parameters, Scene
+from ..scene.variant import Shape
 from .target import Emission
 
 FORMAT = 2
@@ -33,13 +34,12 @@ def manifest(
         "dimensions": {name: getattr(tail, name) for name in sizes} | own_counts(tail),
         "contacts": [{"group": name, "count": count} for name, count in tail.groups.items()],
         "parameters": [
-            parameter_entry(scene, p)
-            for p in parameters_of(
-                scene.kind, scene.contacts, scene.shape, scene.passive, scene.segments
-            )
+            parameter_entry(scene.parameters, part.shape, p) for part, p in each_parameter(scene)
         ],
         "functions": {f.name: function_entry(f, tail, emissions) for f in functions},
     }
+    if tail.branches:
+        described["chains"] = [chain_entry(chain) for chain in tail.chains]
     if scene.unscaled:  # factors of each kg, m and s in the scene
         described["size"] = dict(zip(("kg", "m", "s"), scene.size, strict=True))
     for emission in emissions:
@@ -53,14 +53,25 @@ def own_counts(tail: Tail) -> dict[str, Any]:
     return counts | ({"kinds": list(tail.shape.kinds)} if tail.shape.kinds else {})
 
 
-def parameter_entry(scene: Scene, parameter: Parameter) -> dict[str, Any]:
+def chain_entry(chain: Tail) -> dict[str, Any]:
+    """Return what a caller must know about a chain of a tree: its segments and points among all."""
+    return {
+        "name": chain.name or "tail",
+        "parameters": chain.owner or "tail",
+        "mirrored": chain.mirrored,
+        "segments": [chain.segments_before, chain.segments_before + chain.segments],
+        "points": [chain.points_before, chain.points_before + chain.tail_points],
+    }
+
+
+def parameter_entry(values: Parameters, shape: Shape, parameter: Parameter) -> dict[str, Any]:
     """Return what a caller must know about a parameter; the default is null if it is computed.
 
     pieces: how many links or arcs have their own numbers, in one array for all.
     """
-    value = scene.parameters.get(parameter.name)
+    value = values.get(parameter.name)
     own = parameter.of_pieces
-    pieces = {"pieces": scene.shape.numbers_of(parameter.tail)} if own else {}
+    pieces = {"pieces": shape.numbers_of(parameter.tail)} if own else {}
     default: Any = list(value) if isinstance(value, tuple) else value
     if own and not isinstance(default, list):  # of a single piece
         default = [default]
@@ -71,7 +82,7 @@ def parameter_entry(scene: Scene, parameter: Parameter) -> dict[str, Any]:
         "meaning": parameter.meaning,
         "check": parameter.rule.name,
         "default": default,
-        "in_struct": parameter.name != "link_radius",
+        "in_struct": not parameter.name.endswith("link_radius"),
     }
     # one number may stand for all of them
     return entry | ({"per": "coordinate"} if parameter.needs in PARTS else {})

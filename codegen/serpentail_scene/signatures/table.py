@@ -34,6 +34,12 @@ FIXED = (
     *("inverse_dynamics_parameter_derivatives", "forward_dynamics_parameter_derivatives"),
     *("pfl", "implicit", "rollout"),
 )
+# of several chains
+OF_TREES = (
+    *("mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics"),
+    *("forward_dynamics_external", "energy", "momentum", "tail_points", "center_of_mass"),
+    *("pfl", "implicit", "rollout"),
+)
 AIRBORNE = in_group(PLANNING)
 NEEDS = {name: signature.needs for name, signature in SIGNATURES.items() if signature.needs}
 # functions from which first, then second derivatives of a compiled function are computed

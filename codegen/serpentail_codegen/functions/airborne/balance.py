@@ -12,7 +12,7 @@ from ..draft import Draft
 from ..layout import block
 from ..passive import add_passive_forces
 from ..scope import Vectors
-from ..sweeps.inertia import column_of, tail_inertia
+from ..sweeps.inertia import animal_inertia, column_of
 from ..sweeps.wrenches import core_bias
 from ..tail import Tail
 
@@ -121,7 +121,7 @@ def balance(draft: Draft, arrays: dict[str, Array]) -> Balance:
         return M.part(row * k + other, entries)
 
     columns = draft.array("columns", 6, nt)
-    segments, composite = tail_inertia(draft, draft.state(q, v), M_tail, columns)
+    segments, composite = animal_inertia(draft, draft.state(q, v), M_tail, columns)
     center = draft.vectors(inverse_mass=1, com=3)
     rows = {f"A_{r}": inertia.part(padded(TURN) * r, r + 1) for r in range(TURN)}
     draft.step(translation.without_translation, composite, **center, **rows)
@@ -154,7 +154,7 @@ def balance(draft: Draft, arrays: dict[str, Array]) -> Balance:
 
     bias = draft.array("bias", tail.nv)
     core_bias(draft, segments, bias)
-    add_passive_forces(draft, segments.state, lambda i: tail.segment_v(bias, i))
+    add_passive_forces(draft, segments[0].state, lambda i: draft.tail.segment_v(bias, i))
     tail_momenta = columns, coupling, gain
     return Balance(draft, q, v, quaternion, momentum, inertia, M, *tail_momenta, center, bias)
 

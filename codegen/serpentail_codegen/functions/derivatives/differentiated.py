@@ -9,14 +9,14 @@ from serpentail_scene.signatures.arguments import FORCE, MULTIPLIER, V_DOT, Argu
 from ...ir.program import Array, Ref
 from .. import dynamics, kinematics
 from ..draft import Draft
-from ..dynamics import inertial_forces
 from ..function import Function, signed
 from ..layout import block
 from ..passive import add_passive_forces, add_passive_power
 from ..scope import Motion, State, Vectors
+from ..sweeps.chains import prepared
 from ..sweeps.momentum import gather_moment
 from ..sweeps.pieces import mechanism
-from ..sweeps.wrenches import virtual_power
+from ..sweeps.wrenches import inertial_forces, virtual_power
 
 POWER = Argument("power", (1,), "lambda^T (H v_dot + C)")
 A = Argument("a", (3,), "R^T (p_b_ddot + g z), which stands for v_dot[0:3]")
@@ -43,15 +43,14 @@ def assemble_inertia(draft: Draft, arrays: dict[str, Array]) -> None:
 def core_forces(draft: Draft, state: State, omega: Ref, arrays: dict[str, Array]) -> None:
     """Store H v_dot + C in torso axes."""
     v_dot = arrays["v_dot"]
-    segments = mechanism(draft).prepare(draft, state, False)
+    segments = prepared(draft, state)
     motion = Motion(omega, draft.of_torso(v_dot, OMEGA), arrays["a"][0])
     inertial_forces(draft, segments, motion, v_dot, arrays["force"])
 
 
 def assemble_first_moment(draft: Draft, arrays: dict[str, Array]) -> None:
     """First moment of the animal."""
-    segments = mechanism(draft).prepare(draft, draft.state(arrays["q"]), False)
-    moment = gather_moment(draft, segments)
+    moment = gather_moment(draft, prepared(draft, draft.state(arrays["q"])))
     draft.copy(arrays["moment"][0], moment["h"])
 
 

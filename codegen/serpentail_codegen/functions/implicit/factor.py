@@ -22,6 +22,7 @@ from ..dynamics import fill_mass_matrix
 from ..layout import coordinate
 from ..passive import SLOPES, passive_parameters
 from ..scope import State, Torso, Vectors
+from ..sweeps.chains import each_chain
 from ..sweeps.pieces import each_segment, points_of
 from ..tails.mechanism import Segments
 from .layout import Factors, each_contact, first_tail_point
@@ -44,27 +45,34 @@ def assemble_factor(draft: Draft, arrays: dict[str, Array]) -> None:
 
     # joints
     add_gains(draft, f, weight | {"gains": arrays["gains"][0]})
-    with draft.loop("k", draft.tail.nt) as k:
-        damping = {"damping": arrays["damping"].part(k, 1)}
-        draft.step(stiffness.damped, weight, damping, damped=f("damped", k))
-        add_passive_stiffness(draft, f, state, k)
-        draft.copy(f.tail_entry(k, k), f("damped", k), adds=True)
+    for chain in each_chain(draft):
+        with draft.loop("k", chain.nt) as own:
+            k = coordinate(chain.segments_before) + own
+            damping = {"damping": arrays["damping"].part(k, 1)}
+            draft.step(stiffness.damped, weight, damping, damped=f("damped", k))
+            add_passive_stiffness(draft, f, state, (k, own))
+            draft.copy(f.tail_entry(k, k), f("damped", k), adds=True)
 
     # the ground
     if draft.tail.contacts:
-        add_contacts(draft, f, state, R, segments, arrays)
+        add_contacts(draft, f, state, R, segments[0], arrays)
         add_sliding(draft, f, R)
         draft.factor_pair(f.array, nv)
     else:
         draft.factor(f.array, nv)
 
 
-def add_passive_stiffness(draft: Draft, f: Factors, state: State, k: Index) -> None:
-    """Add springs, damping and stops of coordinate k, except those that tracking cancels."""
+def add_passive_stiffness(
+    draft: Draft, f: Factors, state: State, numbers: tuple[Index, Index]
+) -> None:
+    """Add springs, damping and stops of a coordinate, except those that tracking cancels;
+    ``numbers``: its number among all, and in its chain.
+    """
+    k, of_chain = numbers
     weights = {"weight": f("weight"), "gain_v": f("gain_v")}
 
     def own(array: Array) -> Ref:
-        return array.part(k, 1)
+        return array.part(of_chain, 1)
 
     if "damping" in draft.tail.passive:
         parameters = passive_parameters(draft, passive.damped_coordinate, own)
@@ -77,6 +85,8 @@ def add_passive_stiffness(draft: Draft, f: Factors, state: State, k: Index) -> N
             draft.step(step, reads, passive_parameters(draft, step, own), slope_=slope)
         writes = {"damped_": f("damped", k), "sprung": f("sprung", k)}
         draft.step(passive.sprung_coordinate, weights, {"slope": slope}, **writes)
+    elif f.tail.elastic:
+        draft.fill(f("sprung", k), 0)
 
 
 def add_gains(draft: Draft, f: Factors, weights: dict[str, Ref]) -> None:

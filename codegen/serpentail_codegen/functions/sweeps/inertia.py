@@ -5,11 +5,12 @@ consists of.
 from collections.abc import Callable
 
 from ...ir.program import Array, Index, Ref, as_index
-from ...mechanics import mount, torso
+from ...mechanics import branch, mount, torso
 from ..draft import Draft
 from ..layout import coordinate
 from ..scope import Pose, State, Vectors
 from ..tails.mechanism import Segments
+from .chains import add, each_chain, on_each, prepared, turn_columns
 from .pieces import across, each_segment, mechanism, pieces_of, torso_pose
 
 Block = Callable[..., Ref]  # entries of H: from two tail coordinates and a count
@@ -22,24 +23,34 @@ def gather_inertia(
     columns: Array,
     H_tail: Block | None = None,
 ) -> Vectors:
-    """Composite inertia in ``mass, h, I`` at B; each segment's momentum columns at B and its own
-    block of H.
+    """Composite inertia of a chain in ``mass, h, I`` at its mount, torso axes; each segment's
+    momentum columns at B and its own block of H.
     """
     composite = draft.vectors(mass=1, h=3, I=6)
-    momenta = draft.vectors(pitch=6, yaw=6)
+    momenta, first = draft.vectors(pitch=6, yaw=6), draft.tail.segments_before
     for ref in composite.named.values():
         draft.fill(ref, 0)
     for stretch, i in each_segment(draft, downward=True):
         # the segment's own block of H and its columns start from zero; the sums of all beyond go on
-        own = _own_block(H_tail, i) if H_tail else {}
+        own = _own_block(H_tail, first + i) if H_tail else {}
         for ref in (*momenta.named.values(), *own.values()):
             draft.fill(ref, 0)
         with pieces_of(draft, stretch, i, downward=True) as g:
             step = mechanism(draft).gather
             draft.step(step, segments.at(i, g), composite, momenta, **composite, **momenta, **own)
         root = {name: array[i] for name, array in roots.items()}
-        draft.step(torso.column_at_torso, root, momenta, columns=columns_of(columns, i))
+        draft.step(torso.column_at_torso, root, momenta, columns=columns_of(columns, first + i))
     across(draft, mount.composite_at_mount, composite.only("h", "I").named)
+    return composite
+
+
+def with_torso(draft: Draft, composite: Vectors, total: Vectors) -> Vectors:
+    """Return ``mass, h, I`` of the torso, the chains before and this one at B, given the sums
+    before it, which the tail begins; a fixed base adds nothing.
+    """
+    if draft.tail.name:
+        add(draft, branch.chain_composite, composite, total)
+        return total
     if not draft.tail.fixed:
         draft.step(torso.torso_composite, composite, **composite)
     return composite
@@ -88,40 +99,68 @@ def forward_roots(
     copy_pose(as_index(last))
 
 
-def tail_inertia(
+def animal_inertia(
     draft: Draft, state: State, H_tail: Block, columns: Array, R: Ref | None = None
-) -> tuple[Segments, Vectors]:
+) -> tuple[list[Segments], Vectors]:
     """Compute everything that H consists of (Eqs. 2, 16, 18): ``mass, h, I`` at B, momentum
-    columns, H of the tail (lower triangle).
+    columns, H of the coordinates of all chains (lower triangle), which do not couple.
 
     The columns are in torso axes, or in world axes if the attitude R of the torso is given. Returns
-    the segments, and ``mass, h, I``.
+    the segments of each chain, and ``mass, h, I``.
     """
+    if draft.tail.branches:
+        with draft.loop("k", draft.tail.nt) as k:
+            draft.fill(H_tail(k, as_index(0), draft.tail.nt), 0)
+    found: list[Segments] = []
+    total = Vectors({})
+    for chain in each_chain(draft):
+        segments, total = tail_inertia(draft, state.on(chain), H_tail, columns, total, R)
+        found.append(segments)
+    return found, total
+
+
+def tail_inertia(
+    draft: Draft,
+    state: State,
+    H_tail: Block,
+    columns: Array,
+    total: Vectors,
+    R: Ref | None,
+) -> tuple[Segments, Vectors]:
+    """Compute what one chain gives to H; ``total``: ``mass, h, I`` of the chains before it."""
     segments = mechanism(draft).prepare(draft, state, True)
     pose = torso_pose(draft, R)
     roots = segment_roots(draft)
     S = draft.array("S", 12, max(draft.tail.segments - 1, 1))
     forward_roots(draft, segments, pose, roots, S)
-    composite = gather_inertia(draft, segments, roots, columns, H_tail)
+    composite = with_torso(draft, gather_inertia(draft, segments, roots, columns, H_tail), total)
 
     # blocks of two segments
+    before = draft.tail.segments_before
     with draft.loop("i", draft.tail.segments, start=1) as i, draft.loop("l", i) as other:
-        first = coordinate(other)
+        first, own = coordinate(before + other), before + i
         blocks = {
-            "H_pitch": H_tail(coordinate(i), first, 2),
-            "H_yaw": H_tail(coordinate(i, 1), first, 2),
+            "H_pitch": H_tail(coordinate(own), first, 2),
+            "H_yaw": H_tail(coordinate(own, 1), first, 2),
         }
-        reads = {"S": S[other], "columns": columns_of(columns, i)}
+        reads = {"S": S[other], "columns": columns_of(columns, own)}
         draft.step(torso.segment_coupling, reads, **blocks)
+    turn_columns(draft, columns)
     return segments, composite
 
 
-def columns_and_inertia(draft: Draft, state: State) -> tuple[Segments, Array, Vectors]:
-    """Return the segments, the momentum columns, and ``mass, h, I`` at B, without H."""
-    segments = mechanism(draft).prepare(draft, state, True)
-    columns, roots = draft.array("columns", 12, draft.tail.segments), segment_roots(draft)
-    forward_roots(draft, segments, torso_pose(draft), roots)
-    return segments, columns, gather_inertia(draft, segments, roots, columns)
+def columns_and_inertia(draft: Draft, state: State) -> tuple[list[Segments], Array, Vectors]:
+    """Return the segments of each chain, the momentum columns, and ``mass, h, I`` at B, without
+    H.
+    """
+    found, total = prepared(draft, state, True), Vectors({})
+    columns = draft.array("columns", 12, draft.tail.segments)
+    for segments in on_each(draft, found):
+        roots = segment_roots(draft)
+        forward_roots(draft, segments, torso_pose(draft), roots)
+        total = with_torso(draft, gather_inertia(draft, segments, roots, columns), total)
+        turn_columns(draft, columns)
+    return found, columns, total
 
 
 def column_of(columns: Array, k: Index) -> Ref:

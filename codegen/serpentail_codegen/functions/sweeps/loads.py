@@ -1,10 +1,11 @@
 """Sweeps of loads: forces on the tail's points as a load on the torso and as torques."""
 
 from ...ir.program import Array, Index, Ref
-from ...mechanics import loads
+from ...mechanics import branch, loads
 from ..draft import Draft
-from ..layout import LOAD, coordinates
+from ..layout import LOAD
 from ..scope import State, Vectors
+from .chains import add, each_chain, facing
 from .pieces import each_point, mechanism, torso_pose
 
 
@@ -25,18 +26,30 @@ def gather_loads(draft: Draft, state: State, R: Ref, f_ext: Array, torques: Arra
     """J^T f (Eq. 10) of the loads in ``f_ext``: returns ``load_force, load_moment`` at B; the
     joints' part is added to ``torques``.
     """
+    total, at_torso = Vectors({}), {"R": R, "f_torso": f_ext.part(0, LOAD)}
+    for chain in each_chain(draft):
+        beyond = gather_chain_loads(draft, state.on(chain), facing(draft, R), f_ext, torques)
+        if chain.name:
+            add(draft, branch.chain_load, beyond, total)
+        else:
+            total = draft.store(loads.load_at_torso, at_torso, beyond, load_force=3, load_moment=3)
+    return total
+
+
+def gather_chain_loads(draft: Draft, state: State, R: Ref, f_ext: Array, torques: Array) -> Vectors:
+    """Sum the loads on one chain at B, in ``F_beyond``; R turns its places to the world."""
     S, points = sample_joints(draft, state)
     beyond = draft.vectors(F_beyond=6)
     draft.fill(beyond["F_beyond"], 0)
 
     def add_load(point: Index) -> None:
-        force = f_ext.part(LOAD + 3 * point, 3)
+        force = f_ext.part(LOAD + 3 * (draft.tail.points_before + point), 3)
         reads = {"R": R, "P": points[point], "f_point": force}
         draft.step(loads.load_at_point, reads, beyond, **beyond)
 
     for i, g in each_point(draft, downward=True):
         add_load(g + 1)
-        draft.step(loads.joint_load, {"S": S[g]}, beyond, torque_=coordinates(torques, i))
+        own = draft.tail.segment_tau(torques, i)
+        draft.step(loads.joint_load, {"S": S[g]}, beyond, torque_=own)
     add_load(Index())
-    at_torso = {"R": R, "f_torso": f_ext.part(0, LOAD)}
-    return draft.store(loads.load_at_torso, at_torso, beyond, load_force=3, load_moment=3)
+    return beyond

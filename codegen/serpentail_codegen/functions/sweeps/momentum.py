@@ -1,10 +1,11 @@
 """Sweeps of momentum: mass and first moment, momentum or kinetic energy."""
 
 from ...ir.program import Ref
-from ...mechanics import mount, torso
+from ...mechanics import branch, mount, torso
 from ..draft import Draft
 from ..scope import State, Vectors
 from ..tails.mechanism import Segments, Wrenches
+from .chains import add, on_each, prepared, sided
 from .pieces import across, each_piece, mechanism
 from .wrenches import gather_wrenches
 
@@ -13,31 +14,42 @@ def gather_momentum(draft: Draft, state: State, R: Ref, p_dot: Ref) -> Vectors:
     """``mass`` and first moment ``h`` of the animal, and its momentum ``force, moment``, at B,
     which moves with p_dot.
     """
-    segments, moment, velocity, u_torso = _begin_momentum(draft, state, R, p_dot)
-    momenta = Wrenches(draft.array("momenta", 6, draft.tail.pieces))
-    for place in each_piece(draft):
-        mechanism(draft).momentum(draft, segments, place, velocity, momenta.at(*place).named)
-    total = gather_wrenches(draft, segments, momenta)
-    reads = u_torso, {"w": state.omega}, total
-    momentum = draft.store(torso.torso_momentum, *reads, force=3, moment=3)
+    found, moment, root, u_torso = _begin_momentum(draft, state, R, p_dot)
+    momentum = Vectors({})
+    for segments in on_each(draft, found):
+        velocity = _at_root(draft, state, u_torso) if draft.tail.name else root
+        momenta = Wrenches(draft.array("momenta", 6, draft.tail.pieces))
+        for place in each_piece(draft):
+            mechanism(draft).momentum(draft, segments, place, velocity, momenta.at(*place).named)
+        total = gather_wrenches(draft, segments, momenta)
+        if draft.tail.name:
+            add(draft, branch.chain_wrench, total, momentum)
+        else:
+            reads = u_torso, {"w": state.omega}, total
+            momentum = draft.store(torso.torso_momentum, *reads, force=3, moment=3)
     return Vectors({**moment, **momentum})
 
 
 def gather_kinetic(draft: Draft, state: State, R: Ref, kinetic: Ref) -> Vectors:
     """``mass`` and first moment ``h`` of the animal; sums its energy in ``kinetic``."""
-    segments, moment, velocity, u_torso = _begin_momentum(draft, state, R, state.velocity)
+    found, moment, velocity, u_torso = _begin_momentum(draft, state, R, state.velocity)
     draft.fill(kinetic, 0)
-    for place in each_piece(draft):
-        mechanism(draft).momentum(draft, segments, place, velocity, {"kinetic_": kinetic})
+    for segments in on_each(draft, found):
+        if draft.tail.name:
+            velocity = _at_root(draft, state, u_torso)
+        for place in each_piece(draft):
+            mechanism(draft).momentum(draft, segments, place, velocity, {"kinetic_": kinetic})
     draft.step(torso.torso_momentum, u_torso, {"w": state.omega}, kinetic_=kinetic)
     return moment
 
 
 def _begin_momentum(
     draft: Draft, state: State, R: Ref, p_dot: Ref
-) -> tuple[Segments, Vectors, Vectors, Vectors]:
-    """Return segments, mass and first moment, velocities of the tail mount, and of the torso."""
-    segments = mechanism(draft).prepare(draft, state, False)
+) -> tuple[list[Segments], Vectors, Vectors, Vectors]:
+    """Return the segments of each chain, mass and first moment, velocities of the tail mount, and
+    of the torso.
+    """
+    segments = prepared(draft, state)
     moment = gather_moment(draft, segments)
     velocity = draft.vectors(w=3, u=3)
     if draft.tail.fixed:
@@ -53,13 +65,33 @@ def _begin_momentum(
     return segments, moment, velocity, u_torso
 
 
-def gather_moment(draft: Draft, segments: Segments) -> Vectors:
-    """Sum mass and first moment of torso and tail at B, in ``mass`` and ``h``."""
-    moment = draft.vectors(mass=1, h=3)
-    for ref in moment.named.values():
-        draft.fill(ref, 0)
-    for place in each_piece(draft, downward=True):
-        draft.step(mechanism(draft).gather_moment, segments.at(*place), moment, **moment)
-    across(draft, mount.moment_at_mount, h=moment["h"])
-    draft.step(torso.torso_moment, moment, **moment)
-    return moment
+def _at_root(draft: Draft, state: State, u_torso: Vectors) -> Vectors:
+    """Return the velocities of the mount of a chain besides the tail, in the axes at its root."""
+    velocity = draft.vectors(w=3, u=3)
+    draft.copy(velocity["w"], state.omega)
+    draft.copy(velocity["u"], u_torso["u_torso"])
+    if draft.tail.mirrored:
+        draft.step(sided(draft, branch.mirrored_velocity), velocity, **velocity)
+    draft.step(torso.mount_velocity, velocity, u=velocity["u"])
+    across(draft, mount.velocity_at_root, velocity.named)
+    return velocity
+
+
+def gather_moment(draft: Draft, found: list[Segments]) -> Vectors:
+    """Sum mass and first moment of torso and chains at B, in ``mass`` and ``h``; ``found``: the
+    segments of each chain.
+    """
+    total = Vectors({})
+    for segments in on_each(draft, found):
+        moment = draft.vectors(mass=1, h=3)
+        for ref in moment.named.values():
+            draft.fill(ref, 0)
+        for place in each_piece(draft, downward=True):
+            draft.step(mechanism(draft).gather_moment, segments.at(*place), moment, **moment)
+        across(draft, mount.moment_at_mount, h=moment["h"])
+        if draft.tail.name:
+            add(draft, branch.chain_moment, moment, total)
+        else:
+            draft.step(torso.torso_moment, moment, **moment)
+            total = moment
+    return total

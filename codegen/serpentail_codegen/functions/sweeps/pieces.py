@@ -130,12 +130,11 @@ def mount_axes(draft: Draft) -> dict[str, Ref]:
     """
     if not draft.tail.shape.tilted:
         return {}
-    known = [array[0] for array in draft.arrays if array.name == "mount"]
-    if known:
-        return {"mount": known[0]}
-    axes = {"mount": draft.array("mount", 9)[0]}
-    draft.step(mount.mount_rotation, **axes)
-    return axes
+    owner = draft.tail.owner
+    if owner not in draft.mounts:
+        draft.mounts[owner] = draft.array("mount", 9)[0]
+        draft.step(mount.mount_rotation, mount=draft.mounts[owner])
+    return {"mount": draft.mounts[owner]}
 
 
 def across(

@@ -6,11 +6,12 @@ from dataclasses import replace
 from serpentail_scene.layout import OMEGA, VELOCITY
 
 from ...ir.program import Array, Index, Ref
-from ...mechanics import airborne_power, mount, torso
+from ...mechanics import airborne_power, branch, mount, torso
 from ..draft import Draft
 from ..layout import block
 from ..scope import Motion, State, Vectors
 from ..tails.mechanism import Segments, Wrenches
+from .chains import add, on_each, seen
 from .pieces import across, attitude, each_piece, each_segment, mechanism, pieces_of
 
 
@@ -59,15 +60,28 @@ def gather_wrenches(
     return total
 
 
-def core_bias(draft: Draft, segments: Segments, bias: Array) -> None:
+def inertial_forces(
+    draft: Draft, segments: list[Segments], motion: Motion, v_dot: Array | None, force: Array
+) -> None:
+    """Compute the generalised forces of a motion of the torso and ``v_dot`` of the chains, in torso
+    axes; ``segments`` are those of each chain.
+    """
+    sums = Vectors({"force": block(force, VELOCITY), "moment": block(force, OMEGA)})
+    for own in on_each(draft, segments):
+        wrenches = forward_wrenches(draft, own, seen(draft, motion), v_dot)
+        total = gather_wrenches(draft, own, wrenches, lambda i: draft.tail.segment_v(force, i))
+        if draft.tail.name:
+            add(draft, branch.chain_wrench, total, sums)
+        elif not draft.tail.fixed:
+            draft.step(torso.torso_wrench, motion, total, **sums)
+
+
+def core_bias(draft: Draft, segments: list[Segments], bias: Array) -> None:
     """C without gravity and translation: force and moment at B in torso axes, then the tail's
     forces; on a fixed base those alone, with gravity.
     """
-    motion = torso_without_acceleration(draft, segments.state)
-    wrenches = forward_wrenches(draft, segments, motion, None)
-    total = gather_wrenches(draft, segments, wrenches, lambda i: draft.tail.segment_v(bias, i))
-    if not draft.tail.fixed:
-        torso_wrench(draft, motion, total, bias)
+    motion = torso_without_acceleration(draft, segments[0].state)
+    inertial_forces(draft, segments, motion, None, bias)
 
 
 def torso_without_acceleration(draft: Draft, state: State) -> Motion:
@@ -80,17 +94,6 @@ def torso_without_acceleration(draft: Draft, state: State) -> Motion:
         return motion
     reads = {"R": attitude(draft, state), "p_ddot": zero}
     return replace(motion, a=draft.store(torso.torso_acceleration, reads, a=3)["a"])
-
-
-def torso_wrench(draft: Draft, motion: Motion, total: Vectors, force: Array) -> None:
-    """Store the inertial force and moment of torso and tail, from the tail's at its mount."""
-    draft.step(
-        torso.torso_wrench,
-        motion,
-        total,
-        force=block(force, VELOCITY),
-        moment=block(force, OMEGA),
-    )
 
 
 def virtual_power(

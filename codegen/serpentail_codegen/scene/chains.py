@@ -1,0 +1,161 @@
+"""Reads the tables `[chain.NAME]` of a scene: chains besides the tail, each read as a tail is."""
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from serpentail_scene.keys import CHAIN, NAME
+from serpentail_scene.parameters import (
+    NAMES,
+    PARAMETERS,
+    PASSIVE,
+    key_in_chain,
+    name_in,
+)
+from serpentail_scene.signatures.table import ALL, OF_TREES
+
+from .checks import MOST_SEGMENTS
+from .problems import Problem, SceneError, suggest
+from .scene import Chain, Parameters, Scene
+
+Parse = Callable[[Mapping[str, Any], str], Scene]
+FOUND = [p for p in (*PARAMETERS, *PASSIVE) if p.of_chain]
+OF_CHAINS = {key_in_chain(p.name): p for p in FOUND}
+# keys of a scene with several chains that do not work yet: which values, and what to do
+REFUSED: dict[str, tuple[Callable[[Any], bool], str]] = {
+    "contacts": (bool, "fly without contacts, or remove the chains"),
+    "coordinates": (lambda x: x == "polar", 'use "bend", or remove the chains'),
+    "base": (lambda x: x == "fixed", 'set base = "free", or remove the chains'),
+    "plan": (bool, "remove the table [plan], or the chains"),
+    "identify": (bool, "remove the table [identify], or the chains"),
+}
+TAKEN = ("tail", "torso", "tau")  # words that names of parameters or torques begin with
+
+
+@dataclass(frozen=True)
+class Chains:
+    """The chains that a scene describes, the parameters left for the tail, and problems."""
+
+    chains: tuple[Chain, ...] = ()
+    parameters: Any = None
+    problems: tuple[Problem, ...] = ()
+
+
+def chains_of(values: Mapping[str, Any], parse: Parse) -> Chains:
+    """Return the chains of a scene; ``parse`` reads a table as that of a tail.
+
+    Parameters named after a chain, such as `hind_mass`, replace what its table says.
+    """
+    tables, named = values["chain"], values["parameters"]
+    if not isinstance(tables, Mapping) or not tables:
+        return Chains(parameters=named)
+    given = dict(named) if isinstance(named, Mapping) else {}
+    chains: list[Chain] = []
+    problems: list[Problem] = []
+    for name, table in tables.items():
+        place = f"chain.{name}"
+        if not NAME.holds(name) or name in TAKEN:
+            remedy = f"needs a name of a-z, 0-9 and _, none of {', '.join(TAKEN)}"
+            problems.append(Problem(place, name, remedy))
+        elif not isinstance(table, Mapping):
+            remedy = 'needs a table, such as {kind = "articulated", segments = 1, links = 1, ...}'
+            problems.append(Problem(place, table, remedy))
+        else:
+            own = {n: given.pop(n) for n in [n for n in given if _belongs(n, name)]}
+            problems += _key_problems(place, table)
+            try:
+                chains.append(_chain(name, table, own, parse))
+            except SceneError as error:
+                problems += [replace(p, field=_field(place, p.field)) for p in error.problems]
+    problems += _clashes(chains, list(tables))
+    problems += tree_problems(values, chains)
+    return Chains(tuple(chains), given if isinstance(named, Mapping) else named, tuple(problems))
+
+
+def _belongs(parameter: str, chain: str) -> bool:
+    """Tell if a parameter's name is that of a chain."""
+    return parameter.removeprefix(f"{chain}_") in OF_CHAINS and parameter not in NAMES
+
+
+def _field(place: str, field: str) -> str:
+    """Return where the value of a field is in the table of a chain."""
+    name = field.removeprefix("parameters.")
+    return f"{place}.{key_in_chain(name) if name != field else field}"
+
+
+def _key_problems(place: str, table: Mapping[str, Any]) -> list[Problem]:
+    """Return a problem for each key that no chain has, and for a wrong place or pair."""
+    known = (*CHAIN, *OF_CHAINS)
+    problems = [
+        Problem(f"{place}.{key}", value, f"unknown; {suggest(key, known)}")
+        for key, value in table.items()
+        if key not in known
+    ]
+    if table.get("on", "torso") != "torso":
+        remedy = 'needs "torso": chains on the tips of others do not exist yet'
+        problems.append(Problem(f"{place}.on", table["on"], remedy))
+    if not isinstance(table.get("pair", False), bool):
+        problems.append(Problem(f"{place}.pair", table["pair"], "needs true or false"))
+    return problems
+
+
+def _chain(name: str, table: Mapping[str, Any], own: Mapping[str, Any], parse: Parse) -> Chain:
+    """Return a chain, read as a tail without torso; what a chain must say has no default."""
+    keys = {key: table[key] for key in CHAIN if key in table and key not in ("on", "pair")}
+    values = {p.name: table[key] for key, p in OF_CHAINS.items() if key in table}
+    values |= {OF_CHAINS[n.removeprefix(f"{name}_")].name: value for n, value in own.items()}
+    inner = {**keys, "functions": ["mass_matrix"], "parameters": values}
+    scene = parse(inner, name)
+    needed = [n for n in ("tail_mount", "tail_mass", "tail_length") if n in scene.parameters]
+    missing = [OF_CHAINS[key_in_chain(n)] for n in needed if n not in values]
+    if missing:
+        remedy = "has no default: give it in {}"
+        raise SceneError(
+            Problem(f"parameters.{p.name}", None, remedy.format(p.unit)) for p in missing
+        )
+    return Chain(name, table.get("pair") is True, scene)
+
+
+def _clashes(chains: Collection[Chain], tables: Collection[str]) -> list[Problem]:
+    """Return a problem for each chain whose name, or that of a parameter, another one has, too."""
+    problems, seen = [], {*NAMES}
+    names: list[str] = []
+    for chain in chains:
+        parameters = [name_in(chain.name, p.name) for p in OF_CHAINS.values()]
+        twice = [n for n in chain.names if n in names or (chain.pair and n in tables)]
+        twice += [n for n in parameters if n in seen]
+        if twice:
+            remedy = f"{twice[0]} would mean two things: give the chain another name"
+            problems.append(Problem(f"chain.{chain.name}", chain.name, remedy))
+        seen |= {*parameters}
+        names += chain.names
+    return problems
+
+
+def tree_problems(values: Mapping[str, Any], chains: Collection[Chain]) -> list[Problem]:
+    """Return a problem for each entry that a model with several chains does not have yet."""
+    names = ", ".join(name for chain in chains for name in chain.names)
+    this = f"this needs a tail alone; the model has {names}: "
+    problems = [
+        Problem(key, None if isinstance(values[key], Mapping) else values[key], this + remedy)
+        for key, (has, remedy) in REFUSED.items()
+        if has(values[key])
+    ]
+    listed = values["functions"] if isinstance(values["functions"], list | tuple) else ()
+    others = [name for name in listed if name in ALL and name not in OF_TREES]
+    remedy = f"{this}leave it out; there are {', '.join(OF_TREES)}"
+    problems += [Problem("functions", name, remedy) for name in others]
+    total = sum(chain.scene.segments * len(chain.names) for chain in chains)
+    if total > MOST_SEGMENTS:
+        remedy = f"more than {MOST_SEGMENTS} segments of all chains would take hours; choose fewer"
+        problems.append(Problem("chain", total, remedy))
+    return problems
+
+
+def all_parameters(own: Parameters, chains: Collection[Chain]) -> Parameters:
+    """Return the parameters of torso and tail, then those of each chain under its own names."""
+    found = list(own.entries)
+    for chain in chains:
+        entries = dict(chain.scene.parameters.entries)
+        found += [(p.owned(chain.name).name, entries[p.name]) for p in FOUND if p.name in entries]
+    return Parameters(tuple(found))
