@@ -69,7 +69,7 @@ def tail_of(scene: Scene) -> Tail:
     tail = _chain_of(scene)
     if not scene.chains:
         return tail
-    chains = [replace(tail, contacts=())]
+    chains = [tail]
     for described in scene.chains:
         shape = replace(described.scene.shape, weightless=scene.weightless)
         one = replace(_chain_of(described.scene), shape=shape, owner=described.name)

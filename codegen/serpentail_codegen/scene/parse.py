@@ -74,7 +74,6 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
     chains = chains_of(values, parse_scene)
     problems += chains.problems
     values |= {"chains": chains.chains, "parameters": chains.parameters}
-    values["chain"] = json.dumps(values["chain"], default=str) if values["chain"] else ""
     tail = tail_description(kind, values)
     values |= tail.values
     problems += [*tail.problems, *key_problems(values), *kind_problems(table, kind)]
@@ -87,7 +86,8 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
     body = body_table(values["body"], values["parameters"])
     named = body.with_torso(values["parameters"], contacts)
     problems += body.problems
-    values["body"] = "" if values["body"] is None else json.dumps(values["body"], default=str)
+    for key in ("body", "chain"):
+        values[key] = json.dumps(values[key], default=str) if values[key] else ""
     try:
         values["parameters"] = resolve_parameters(
             named, links, kind, contacts, values["shape"], segments_in(values)

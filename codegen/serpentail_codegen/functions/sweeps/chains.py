@@ -7,7 +7,7 @@ tail serve all. What a chain besides the tail has at its mount is added to the t
 from collections.abc import Callable, Iterable, Iterator
 from typing import TypeVar
 
-from ...ir.program import Array, Ref
+from ...ir.program import Ref
 from ...ir.step import Step, specialised
 from ...mechanics import branch
 from ...mechanics.lower import derive
@@ -61,16 +61,7 @@ def facing(draft: Draft, R: Ref) -> Ref:
     """
     if not draft.tail.mirrored:
         return R
-    return draft.store(sided(draft, branch.mirrored_attitude), {"R": R}, R_mirrored=9)["R"]
-
-
-def turn_columns(draft: Draft, columns: Array) -> None:
-    """Turn the momentum columns of a mirrored chain into the axes of the torso."""
-    if draft.tail.mirrored:
-        step, first = sided(draft, branch.mirrored_columns), draft.tail.segments_before
-        with draft.loop("i", draft.tail.segments) as i:
-            own = columns[first + i]
-            draft.step(step, {"columns": own}, columns=own)
+    return draft.store(sided(draft, branch.mirrored_attitude), {"R": R}, R=9)["R"]
 
 
 def add(draft: Draft, function: Callable[..., dict], own: Vectors, sums: Vectors) -> None:

@@ -10,7 +10,7 @@ from ..draft import Draft
 from ..layout import coordinate
 from ..scope import Pose, State, Vectors
 from ..tails.mechanism import Segments
-from .chains import add, each_chain, on_each, prepared, turn_columns
+from .chains import add, each_chain, on_each, prepared, sided
 from .pieces import across, each_segment, mechanism, pieces_of, torso_pose
 
 Block = Callable[..., Ref]  # entries of H: from two tail coordinates and a count
@@ -147,6 +147,15 @@ def tail_inertia(
         draft.step(torso.segment_coupling, reads, **blocks)
     turn_columns(draft, columns)
     return segments, composite
+
+
+def turn_columns(draft: Draft, columns: Array) -> None:
+    """Turn the momentum columns of a mirrored chain into the axes of the torso."""
+    if draft.tail.mirrored:
+        step, first = sided(draft, branch.mirrored_columns), draft.tail.segments_before
+        with draft.loop("i", draft.tail.segments) as i:
+            own = columns_of(columns, first + i)
+            draft.step(step, {"columns": own}, columns=own)
 
 
 def columns_and_inertia(draft: Draft, state: State) -> tuple[list[Segments], Array, Vectors]:
