@@ -1,4 +1,4 @@
-"""Any torso with any tail as a set of rigid bodies, in 60 digits: own links and arcs, any mount.
+"""Any torso with any chains as a set of rigid bodies, in 60 digits: own links and arcs, any mount.
 
 Nothing is derived. Positions and attitudes of all bodies are functions of time along a motion;
 their velocities and accelerations are differences of these, exact to 20 digits and more. Arcs are
@@ -37,8 +37,18 @@ class Arc:
 
 
 @dataclass(frozen=True)
+class Chain:
+    """A chain besides the tail; a mirrored one is the image of what it says in the plane x = 0."""
+
+    segments: tuple
+    mount: tuple[float, float, float]
+    mount_angles: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    mirrored: bool = False
+
+
+@dataclass(frozen=True)
 class Animal:
-    """A torso and a tail: each segment is a list of links, or an arc."""
+    """A torso and a tail, with other chains: each segment is a list of links, or an arc."""
 
     segments: tuple
     torso_mass: float
@@ -46,19 +56,42 @@ class Animal:
     tail_mount: tuple[float, float, float]
     gravity: float = 9.8
     mount_angles: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    chains: tuple[Chain, ...] = ()
+
+    @property
+    def _all(self):
+        return (Chain(self.segments, self.tail_mount, self.mount_angles), *self.chains)
+
+    @property
+    def _size(self):
+        return 6 + 2 * sum(len(chain.segments) for chain in self._all)
 
     # ---- places ----------------------------------------------------------------------------
 
     def bodies(self, q):
-        """Mass, COM, attitude and moments of all bodies in the world, and the tail's points."""
-        place, R = q[:3], rotation(q[3:7])
-        found = [(MP.mpf(self.torso_mass), place, R, exact(self.torso_inertia))]
-        joint = place + R.dot(exact(self.tail_mount))
-        pitch, roll, yaw = exact(self.mount_angles)
-        frame = R.dot(about(2, yaw)).dot(about(0, pitch)).dot(about(1, roll))
-        points = [joint]
-        for i, segment in enumerate(self.segments):
-            first, second = q[7 + 2 * i], q[8 + 2 * i]
+        """Mass, COM, attitude and moments of all bodies in the world, and the points of all
+        chains.
+        """
+        place, R, at = q[:3], rotation(q[3:7]), 7
+        found, points = [(MP.mpf(self.torso_mass), place, R, exact(self.torso_inertia))], []
+        for chain in self._all:
+            stop = at + 2 * len(chain.segments)
+            flip = (1 - 2 * chain.mirrored, 1, 1) * ONE
+            bodies, own = self._of_chain(chain, q[at:stop])
+            for mass, com, turn, moments in bodies:  # a turn of the image is proper again
+                turned_back = R.dot(flip).dot(turn).dot(flip)
+                found.append((mass, place + R.dot(flip.dot(com)), turned_back, moments))
+            points += [place + R.dot(flip.dot(point)) for point in own]
+            at = stop
+        return found, points
+
+    def _of_chain(self, chain, angles):
+        """The bodies and the points of a chain in torso axes, as if it were not mirrored."""
+        joint, (pitch, roll, yaw) = exact(chain.mount), exact(chain.mount_angles)
+        frame = about(2, yaw).dot(about(0, pitch)).dot(about(1, roll))
+        found, points = [], [joint]
+        for i, segment in enumerate(chain.segments):
+            first, second = angles[2 * i], angles[2 * i + 1]
             if isinstance(segment, Arc):
                 for x, weight in nodes():
                     local, _ = bent(first * x, second * x, segment.length * x)
@@ -89,13 +122,12 @@ class Animal:
         return rates
 
     def _jacobians(self, q):
-        columns = [self._rates(q, unit) for unit in np.eye(6 + 2 * len(self.segments))]
+        columns = [self._rates(q, unit) for unit in np.eye(self._size)]
         return [list(zip(*of_body, strict=True)) for of_body in zip(*columns, strict=True)]
 
     def inertia(self, q):
         """H for (p_dot world, omega body, q_t_dot)."""
-        size = 6 + 2 * len(self.segments)
-        H = np.full((size, size), MP.mpf(0))
+        H = np.full((self._size, self._size), MP.mpf(0))
         for (mass, _, R, moments), (linear, angular) in zip(
             self.bodies(q)[0], self._jacobians(q), strict=True
         ):
@@ -147,7 +179,7 @@ class Animal:
         return linear.astype(float), angular.astype(float)
 
     def tail_points(self, q):
-        """The tail's points in the world."""
+        """The points of all chains in the world."""
         return np.array(self.bodies(exact(q))[1]).astype(float)
 
 

@@ -53,6 +53,36 @@ MIXED = [
     {"kind": "continuum", **OWN_ARCS[1]},
     {"kind": "articulated", **OWN_LINKS[0]},
 ]
+# pairs and single chains, links and arcs, passive parts of some chains alone
+CHAINS = {
+    "leg": {
+        "pair": True,
+        "kind": "articulated",
+        "segments": OWN_LINKS[1:],
+        "mount": [0.01, 0.02, -0.003],
+        "mount_angles": [0.4, -0.2, 1.3],
+        "stiffness": [0.004, 0.006, 0.005, 0.003],
+        "damping": [2e-4, 3e-4, 1e-4, 4e-4],
+    },
+    "second": {
+        "kind": "continuum",
+        "segments": OWN_ARCS,
+        "samples": 3,
+        "mount": [0.002, 0.05, 0.01],
+    },
+    "third": {
+        "kind": "articulated",
+        "segments": 1,
+        "links": 2,
+        "mount": [-0.004, 0.01, 0.02],
+        "mass": "1 g",
+        "length": "40 mm",
+        "damping": 2e-4,
+        "stop_lower": -0.5,
+        "stop_upper": [0.4, 0.6],
+        "stop_stiffness": 0.05,
+    },
+}
 
 
 def _links(segments: int, links: int, **keys: Any) -> dict[str, Any]:
@@ -110,6 +140,8 @@ ZOO: dict[str, dict[str, Any]] = {
     "fixed": _links(2, 2, base="fixed"),
     "fixed_arcs": _arcs(2, base="fixed"),
     "fixed_mixed": _own("mixed", MIXED, base="fixed", parameters=MOUNTED),
+    # several chains
+    "tree": _own("articulated", OWN_LINKS, chain=CHAINS),
     # other numbers
     "weightless": _links(1, 3, weightless=True),
     "single": _links(2, 2, real="float"),

@@ -53,7 +53,7 @@ class Draft(Builder):
 
     def on(self, chain: Tail) -> AbstractContextManager[None]:
         """Stand on one chain: with its sizes, and its parameters under the names of the tail's; its
-        name begins those of local arrays.
+        name ends those of local arrays.
         """
         return self._standing(chain) if self.tail.branches else nullcontext()
 
@@ -68,12 +68,12 @@ class Draft(Builder):
         self.tail, self.parameters = before
 
     def declare(self, array: Array) -> Array:
-        """Declare an array; names of a chain's own begin with its name."""
+        """Declare an array; names of a chain's own end with its name."""
         return super().declare(replace(array, name=self.own(array.name)))
 
     def own(self, name: str) -> str:
         """Return a name with that of the chain that the draft stands on."""
-        return f"{self.tail.name}_{name}" if self.tail.name else name
+        return f"{name}_of_{self.tail.name}" if self.tail.name else name
 
     def state(self, q: Array, v: Array | None = None) -> State:
         """Return a state; leave out the velocity if it is not used."""

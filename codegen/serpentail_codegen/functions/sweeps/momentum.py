@@ -60,8 +60,8 @@ def _begin_momentum(
     u_torso = draft.vectors(u_torso=3)
     draft.copy(u_torso["u_torso"], velocity["u"])
     draft.copy(velocity["w"], state.omega)
-    draft.step(torso.mount_velocity, velocity, u=velocity["u"])
-    across(draft, mount.velocity_at_root, velocity.named)
+    with draft.on(draft.tail.chains[0]):
+        _to_root(draft, velocity)
     return segments, moment, velocity, u_torso
 
 
@@ -72,9 +72,14 @@ def _at_root(draft: Draft, state: State, u_torso: Vectors) -> Vectors:
     draft.copy(velocity["u"], u_torso["u_torso"])
     if draft.tail.mirrored:
         draft.step(sided(draft, branch.mirrored_velocity), velocity, **velocity)
+    _to_root(draft, velocity)
+    return velocity
+
+
+def _to_root(draft: Draft, velocity: Vectors) -> None:
+    """Carry velocities from the torso to a mount, into the axes at the root."""
     draft.step(torso.mount_velocity, velocity, u=velocity["u"])
     across(draft, mount.velocity_at_root, velocity.named)
-    return velocity
 
 
 def gather_moment(draft: Draft, found: list[Segments]) -> Vectors:

@@ -1,0 +1,96 @@
+"""Models of several chains: against sets of bodies in 60 digits and against Pinocchio; limits in
+which they are models of one tail, and what mirror images and conservation say.
+"""
+
+import numpy as np
+import pytest
+
+import serpentail as st
+from serpentail_codegen.functions.catalogue import function_of
+from serpentail_codegen.functions.function import assemble
+from serpentail_codegen.pipeline import tail_of
+from serpentail_codegen.scene.parse import parse_scene
+from tests.functions.test_own_segments import accelerated
+from tests.references.body_set import Animal, Arc, Chain, Link
+from tests.references.metrics import (
+    block_error,
+    equilibrated_condition,
+    force_error,
+    mass_matrix_error,
+)
+from tests.references.pinocchio_tree import PinocchioTree
+from tests.support import own_tails, zoo
+from tests.support.models import folder_of
+from tests.support.program_runs import FLOATS, interpreted
+
+FORWARD = 5e-15  # of v_dot, times the condition number of H
+LEG = own_tails.LINK_BODIES[1:], (0.01, 0.02, -0.003), (0.4, -0.2, 1.3)
+# the same moments as of the ellipsoids that the scene describes
+THIRD = (Link(5e-4, 0.02, 0.01, tuple(1e-4 * np.array([1.0841e-4, 1.682e-5, 1.0841e-4]))),) * 2
+TREE = Animal(
+    segments=own_tails.LINK_BODIES,
+    mount_angles=own_tails.TILT,
+    **own_tails.VALUES,
+    chains=(
+        Chain(*LEG),
+        Chain(*LEG, mirrored=True),
+        Chain(own_tails.ARC_BODIES, (0.002, 0.05, 0.01)),
+        Chain((THIRD,), (-0.004, 0.01, 0.02)),
+    ),
+)
+
+
+def passive(model, q, v):
+    """Generalised forces of springs, damping and stops of the zoo's tree by their definitions."""
+    p, force = model.parameters, np.zeros(model.nv)
+    angles, rates = q[7:], v[6:]
+    for side in (slice(6, 10), slice(10, 14)):
+        elastic = np.array(p["leg_stiffness"]) * (angles[side] - np.array(p["leg_rest"]))
+        force[6:][side] = elastic + np.array(p["leg_damping"]) * rates[side]
+    last = slice(18, 20)
+    force[6:][last] = np.array(p["third_damping"]) * rates[last]
+    for way, end in ((-1, "lower"), (1, "upper")):
+        depth = way * (angles[last] - np.array(p[f"third_stop_{end}"]))
+        width = np.array(p["third_stop_width"])
+        s, beyond = np.clip(depth / width, 0, 1), np.maximum(depth / width - 1, 0)
+        stiffness = np.array(p["third_stop_stiffness"])
+        force[6:][last] += way * stiffness * width * (s**3 - s**4 / 2 + beyond)
+    return force
+
+
+def test_a_tree_is_its_set_of_bodies():
+    model = zoo.model("tree")
+    for q, v, v_dot, tau in own_tails.states(model.nq, 1):
+        H, force, bias = own_tails.dynamics(TREE, q, v, v_dot)
+        own = passive(model, q, v)
+        assert mass_matrix_error(model.mass_matrix(q), H) < 1e-13
+        assert force_error(model.inverse_dynamics(q, v, v_dot), force + own, H) < 1e-13
+        assert force_error(model.bias_force(q, v), bias + own, H) < 1e-13
+        assert (np.abs(H[6:12, 12:]) == 0).all()  # chains do not couple
+
+        expected = accelerated(H, np.concatenate([np.zeros(6), tau]) - bias - own)
+        most = FORWARD * equilibrated_condition(H)
+        assert block_error(model.forward_dynamics(q, v, tau), expected) < most
+        graph = model.casadi.forward_dynamics(q, v, tau).full().ravel()
+        assert block_error(graph, expected) < most
+        np.testing.assert_allclose(model.energy(q, v)[0], TREE.energy(q, v)[0], rtol=1e-14)
+        for found, momentum in zip(model.momentum(q, v), TREE.momentum(q, v), strict=True):
+            assert np.abs(found - momentum).max() < 1e-13 * np.abs(momentum).max()
+        assert np.abs(model.tail_points(q) - TREE.tail_points(q)).max() < 1e-15
+
+
+def test_loads_do_their_work():
+    """J^T f of a force at each point, by the points' velocities along v_dot of a load alone."""
+    model, step = zoo.model("tree"), 1e-6
+    q, v, _, tau = next(own_tails.states(model.nq, 1))
+    q[3:7] /= np.linalg.norm(q[3:7])
+    rng = np.random.default_rng(4)
+    f_ext = rng.normal(size=len(model.external_force()))
+    change = model.forward_dynamics_external(q, v, tau, f_ext) - model.forward_dynamics(q, v, tau)
+    force, way = model.mass_matrix(q) @ change, rng.normal(size=model.nv)
+    ahead, behind = (
+        model.tail_points(model.integrate(q, h * way)) for h in (step, -step)
+    )
+    power = f_ext[:3] @ way[:3] + f_ext[3:6] @ way[3:6]
+    power += np.sum(f_ext[6:].reshape(-1, 3) * (ahead - behind)) / (2 * step)
+    assert way @ force == pytest.approx(power, rel=1e-8)
