@@ -3,7 +3,9 @@
 A velocity, its derivative, a generalised force and a row of H have the same layout.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+from .messages import did_you_mean, shown
 
 POSITION = slice(0, 3)  # of B in q, world (m)
 QUATERNION = slice(3, 7)  # in q, (w, x, y, z)
@@ -44,11 +46,42 @@ class Sizes:
 
 
 @dataclass(frozen=True)
+class ChainLayout:
+    """Where the numbers of one chain lie: in q, v and tau; its segments, and its points among all
+    tail points.
+
+    owner: the beginning of the names of its parameters; a mirrored chain is their mirror image.
+    names: of its coordinates.
+    """
+
+    name: str
+    owner: str
+    mirrored: bool
+    q: slice
+    v: slice
+    tau: slice
+    segments: slice
+    points: slice
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Layout(Sizes):
-    """Where numbers lie in q, v and tau."""
+    """Where numbers lie in q, v and tau; ``layout["hind_left"]`` is that of one chain.
+
+    chains: those of a model, the tail first.
+    """
 
     segments: int
     fixed: bool = False
+    chains: tuple[ChainLayout, ...] = field(default=(), compare=False)
+
+    def __getitem__(self, name: str) -> ChainLayout:
+        found = {chain.name: chain for chain in self.chains}
+        if name not in found:
+            remedy = did_you_mean(name, found) or f"there are {', '.join(found)}"
+            raise KeyError(f"chain: value {shown(name)}: {remedy}")
+        return found[name]
 
     @classmethod
     def of_width(cls, nq: int) -> "Layout | None":

@@ -5,23 +5,21 @@ which they are models of one tail, and what mirror images and conservation say.
 import numpy as np
 import pytest
 
-import serpentail as st
 from serpentail_codegen.functions.catalogue import function_of
 from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.pipeline import tail_of
 from serpentail_codegen.scene.parse import parse_scene
 from tests.functions.test_own_segments import accelerated
-from tests.references.body_set import Animal, Arc, Chain, Link
+from tests.references.body_set import Animal, Chain, Link
 from tests.references.metrics import (
     block_error,
     equilibrated_condition,
     force_error,
     mass_matrix_error,
 )
-from tests.references.pinocchio_tree import PinocchioTree
 from tests.support import own_tails, zoo
-from tests.support.models import folder_of
 from tests.support.program_runs import FLOATS, interpreted
+from tests.support.rows import row
 
 FORWARD = 5e-15  # of v_dot, times the condition number of H
 LEG = own_tails.LINK_BODIES[1:], (0.01, 0.02, -0.003), (0.4, -0.2, 1.3)
@@ -58,6 +56,7 @@ def passive(model, q, v):
     return force
 
 
+@pytest.mark.slow  # 60 digits
 def test_a_tree_is_its_set_of_bodies():
     model = zoo.model("tree")
     for q, v, v_dot, tau in own_tails.states(model.nq, 1):
@@ -86,11 +85,93 @@ def test_loads_do_their_work():
     q[3:7] /= np.linalg.norm(q[3:7])
     rng = np.random.default_rng(4)
     f_ext = rng.normal(size=len(model.external_force()))
-    change = model.forward_dynamics_external(q, v, tau, f_ext) - model.forward_dynamics(q, v, tau)
+    change = model.forward_dynamics(q, v, tau, f_ext) - model.forward_dynamics(q, v, tau)
     force, way = model.mass_matrix(q) @ change, rng.normal(size=model.nv)
-    ahead, behind = (
-        model.tail_points(model.integrate(q, h * way)) for h in (step, -step)
-    )
+    ahead, behind = (model.tail_points(model.integrate(q, h * way)) for h in (step, -step))
     power = f_ext[:3] @ way[:3] + f_ext[3:6] @ way[3:6]
     power += np.sum(f_ext[6:].reshape(-1, 3) * (ahead - behind)) / (2 * step)
     assert way @ force == pytest.approx(power, rel=1e-8)
+
+
+# ---- random trees -------------------------------------------------------------------------------
+
+
+def random_chain(rng):
+    """The table of a chain, and its segments as sets of links."""
+    tables, segments = [], []
+    for _ in range(rng.integers(1, 4)):
+        n = int(rng.integers(1, 4))
+        masses, lengths = 10 ** rng.uniform(-3.5, -2, n), rng.uniform(0.01, 0.05, n)
+        centers = lengths * rng.uniform(0.3, 0.7, n)
+        r = rng.uniform(0.3, 1, (n, 3))
+        moments = (r.sum(axis=1, keepdims=True) - r) * 1e-4 * masses[:, None]
+        tables.append(
+            {
+                "links": n,
+                "link_masses": masses.tolist(),
+                "link_lengths": lengths.tolist(),
+                "link_centers": centers.tolist(),
+                "link_inertias": moments.tolist(),
+            }
+        )
+        rows = zip(masses, lengths, centers, moments, strict=True)
+        segments.append([Link(*row[:3], tuple(row[3])) for row in rows])
+    mount, angles = rng.normal(size=3) * 0.05, rng.uniform(-2, 2, 3)
+    table = {"kind": "articulated", "segments": tables}
+    place = {"mount": mount.tolist(), "mount_angles": angles.tolist()}
+    return table | place, (tuple(segments), tuple(mount), tuple(angles))
+
+
+def random_tree(seed):
+    """A scene of a tail and one to four more chains or pairs, and the same as a set of bodies."""
+    rng = np.random.default_rng(seed)
+    tail, (segments, mount, angles) = random_chain(rng)
+    placed = zoo.TORSO | {"tail_mount": tail.pop("mount"), "mount_angles": tail.pop("mount_angles")}
+    chains, bodies = {}, []
+    for k in range(rng.integers(1, 5)):
+        table, of_chain = random_chain(rng)
+        pair = bool(rng.integers(2))
+        chains[f"c{k}"] = table | {"pair": pair}
+        bodies += [Chain(*of_chain)] + [Chain(*of_chain, mirrored=True)] * pair
+    scene = parse_scene(tail | {"chain": chains, "parameters": placed}, "random")
+    values = own_tails.VALUES | {"tail_mount": mount, "mount_angles": angles}
+    return scene, Animal(segments=segments, chains=tuple(bodies), **values)
+
+
+def check_against_pinocchio(seed):
+    """H, H v_dot + C and v_dot of programs over floats against those of a tree of hinges."""
+    scene, animal = random_tree(seed)
+    from tests.references.pinocchio_tree import PinocchioTree
+
+    tree, tail = PinocchioTree(animal), tail_of(scene)
+    q, v, v_dot, tau = next(own_tails.states(tail.nq, 1))
+    H, force = tree.mass_matrix(q), tree.inverse_dynamics(q, v, v_dot)
+    bias = tree.inverse_dynamics(q, v, 0 * v)
+
+    def result(name, **arguments):
+        program = assemble(function_of(name, tail), tail)
+        values = {a.name: scene.parameters[a.name] for a in program.of_role("parameters")}
+        given = {n: [x] if isinstance(x, float) else list(x) for n, x in values.items()}
+        given |= {n: list(map(float, x)) for n, x in arguments.items()}
+        (found,) = interpreted(program, given, FLOATS).values()
+        return np.array(found)
+
+    assert mass_matrix_error(result("mass_matrix", q=q).reshape(H.shape), H) < 1e-13
+    assert force_error(result("inverse_dynamics", q=q, v=v, v_dot=v_dot), force, H) < 1e-13
+    expected = accelerated(H, np.concatenate([np.zeros(6), tau]) - bias)
+    error = block_error(result("forward_dynamics", q=q, v=v, tau=tau), expected)
+    assert error < FORWARD * equilibrated_condition(H)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_random_trees_are_those_of_pinocchio(seed):
+    pytest.importorskip("pinocchio")
+    check_against_pinocchio(seed)
+
+
+@pytest.mark.slow
+def test_many_random_trees_are_those_of_pinocchio():
+    pytest.importorskip("pinocchio")
+    for seed in range(3, 20):
+        with row(seed):
+            check_against_pinocchio(seed)

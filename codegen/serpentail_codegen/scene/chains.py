@@ -26,6 +26,7 @@ REFUSED: dict[str, tuple[Callable[[Any], bool], str]] = {
     "contacts": (bool, "fly without contacts, or remove the chains"),
     "coordinates": (lambda x: x == "polar", 'use "bend", or remove the chains'),
     "base": (lambda x: x == "fixed", 'set base = "free", or remove the chains'),
+    "baked": (lambda x: x is True, "set baked = false, or remove the chains"),
     "plan": (bool, "remove the table [plan], or the chains"),
     "identify": (bool, "remove the table [identify], or the chains"),
 }

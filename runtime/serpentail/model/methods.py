@@ -101,7 +101,7 @@ class ModelMethods(ModelFunctions):
         f_ext : ndarray, shape (6 + 3 (N + 1),)
             The forces one after another.
         """
-        points = self.manifest["dimensions"]["total"] + 1
+        points = self.layout.chains[-1].points.stop
         tail = np.zeros((points, 3)) if tail is None else tail
         parts = []
         for name, shape, value in (

@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from serpentail_scene.layout import Layout
-
 from ..basics.errors import SerpentailError
 from ..basics.extras import needed
 from ..basics.near_names import NearNames
 from ..compiling.cache import cache_folder
+from .chains import layout_of, of_all_coordinates
 from .growth import Grow, take_over
 from .lazy import lazy_property
 from .library import BatchLibrary
@@ -92,7 +91,8 @@ class Model(ModelMethods, ModelStates, NearNames):
         How the C was compiled; see ``load``.
     layout : Layout
         Where the parts of ``q``, ``v`` and ``tau`` are; ``model.layout.tail_q`` is the slice of
-        the tail coordinates in ``q``.
+        the tail coordinates in ``q``. ``model.layout["hind_left"]`` is the part of one chain: its
+        slices ``q``, ``v``, ``tau`` and ``points``, and the ``names`` of its coordinates.
     folder : Path
         The generated folder.
     manifest : dict
@@ -166,8 +166,8 @@ class Model(ModelMethods, ModelStates, NearNames):
         # how many joints turn by the coordinates of each segment (m,); 1 of an arc
         links = np.broadcast_to(0 if self.links is None else self.links, self.segments)
         self.joints_each = np.maximum(links, 1)
-        self.fixed: bool = manifest["scene"].get("base") == "fixed"
-        self.layout = Layout(self.segments, self.fixed)
+        self.layout = layout_of(manifest, self.kinds)
+        self.fixed: bool = self.layout.fixed
         self.nq, self.nv = self.layout.nq, self.layout.nv
         self.contacts = {entry["group"]: entry["count"] for entry in manifest["contacts"]}
         # its compiled functions
@@ -179,7 +179,11 @@ class Model(ModelMethods, ModelStates, NearNames):
         return f"<serpentail.Model {self.name}: {self.tail_words()}, nv = {self.nv}>"
 
     def tail_words(self) -> str:
-        """Return in words what the tail is made of, such as "3 x 4 links"."""
+        """Return in words what the tail is made of, such as "3 x 4 links", or which chains a tree
+        has.
+        """
+        if len(self.layout.chains) > 1:
+            return ", ".join(chain.name for chain in self.layout.chains)
         if self.links is None:
             return f"{self.segments} continuum segments"
         if isinstance(self.links, int):
@@ -276,6 +280,11 @@ class Model(ModelMethods, ModelStates, NearNames):
             (self.library is not None, self.batch_library.threads),
             self.grow,
         )
+
+    @lazy_property
+    def passive_values(self) -> dict[str, Any]:
+        """The parameters, those of springs, damping and stops for the coordinates of all chains."""
+        return of_all_coordinates(self.layout, self.parameters)
 
     @lazy_property
     def casadi(self) -> CasadiFunctions:

@@ -13,10 +13,7 @@ if TYPE_CHECKING:
 TORSO_Q = dict.fromkeys(("x", "y", "z"), "m") | dict.fromkeys(("qw", "qx", "qy", "qz"), "1")
 TORSO_V = dict.fromkeys(("vx", "vy", "vz"), "m/s")
 TORSO_V |= dict.fromkeys(("omega_x", "omega_y", "omega_z"), "rad/s")
-# coordinates of a segment by its kind; of a motion without model by bend
-TAILS = {"articulated": ("alpha", "beta"), "continuum": ("a", "b")}
-POLAR = ("phi", "theta")
-WITHOUT_MODEL = ("pitch", "yaw")
+WITHOUT_MODEL = ("pitch", "yaw")  # coordinates of a segment, by bend
 
 
 @dataclass(frozen=True)
@@ -34,11 +31,9 @@ class Names:
     @classmethod
     def of(cls, layout: Layout, model: Model | None) -> Names:
         """Return the names of a layout; of a motion without model, whose tail is of no kind."""
-        pairs = [WITHOUT_MODEL] * layout.segments
+        tail = tuple(f"{name}_{i + 1}" for i in range(layout.segments) for name in WITHOUT_MODEL)
         if model is not None:
-            polar = model.manifest["scene"]["coordinates"] == "polar"
-            pairs = [POLAR if polar else TAILS[kind] for kind in model.kinds]
-        tail = tuple(f"{name}_{i + 1}" for i, pair in enumerate(pairs) for name in pair)
+            tail = tuple(name for chain in model.layout.chains for name in chain.names)
         torso_q, torso_v = ({}, {}) if layout.fixed else (TORSO_Q, TORSO_V)
         return cls(
             torso_q | dict.fromkeys(tail, "rad"),

@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 
 from serpentail_scene.messages import did_you_mean, one_line, shown
-from serpentail_scene.parameters import Value, ellipsoid
+from serpentail_scene.parameters import Value, ellipsoid, name_in
 from serpentail_scene.rules import NUMBER_RULES, ROUNDING, NumberRule
 from serpentail_scene.units import in_unit
 
 from ..basics.checks import numbers_in, satisfying
 from ..basics.errors import ModelError
 from ..basics.plausible_values import warn_of_sizes
+from .chains import entries, owner_of
 
 Values = Mapping[str, Any]  # name -> number or numbers, SI; of many runs (k,) or (k, size)
 # parameters that follow from the values of single links or arcs
@@ -22,6 +23,8 @@ TOTALS = {
     "tail_mass": ("link_masses", "arc_masses"),
     "tail_length": ("link_lengths", "arc_lengths"),
 }
+SHAPE_OF_LINKS = ("tail_mass", "tail_length", "link_radius")  # of equal links
+OTHER_CHAINS = "other_chains_mass"  # kg, of all chains but the tail; it follows from their masses
 
 
 def resolve(manifest: dict, changes: Mapping[str, object] | None) -> MappingProxyType[str, Value]:
@@ -74,8 +77,9 @@ class RunParameters:
 
 def warn_of_parameters(manifest: dict, values: Values, calls: int) -> None:
     """Warn of sizes that no animal or robot has; ``calls``: frames above this function."""
-    units = {"tail_mass": "kg", "tail_length": "m", "gravity": "m/s^2"}  # also if links decide
-    units |= {p["name"]: p["unit"] for p in manifest["parameters"]}
+    # masses and lengths also if links decide
+    units = {name: "kg" if name.endswith("_mass") else "m" for name in values}
+    units |= {"gravity": "m/s^2"} | {p["name"]: p["unit"] for p in manifest["parameters"]}
     warn_of_sizes(units, values, calls + 1)
 
 
@@ -85,31 +89,35 @@ def real_type(manifest: dict) -> type[np.floating]:
 
 
 def total_mass(values: Values) -> Any:
-    """Return the mass (kg) of torso and tail, or one of each run; of the tail on a fixed base."""
-    return values.get("torso_mass", 0.0) + values["tail_mass"]
+    """Return the mass (kg) of torso and chains, or one of each run; of the tail on a fixed base."""
+    others = values.get(OTHER_CHAINS, 0.0)
+    return values.get("torso_mass", 0.0) + values["tail_mass"] + others
 
 
 def merged(values: Values, changes: Values) -> dict[str, Any]:
-    """Return values with changes; link_radius and link_inertia replace each other."""
-    other = {"link_inertia": "link_radius", "link_radius": "link_inertia"}
-    replaced = {other[name] for name in changes if name in other}
+    """Return values with changes; link_radius and link_inertia of a chain replace each other."""
+    replaced = set()
+    for end, other in (("link_inertia", "link_radius"), ("link_radius", "link_inertia")):
+        replaced |= {name.removesuffix(end) + other for name in changes if name.endswith(end)}
     return {name: x for name, x in values.items() if name not in replaced} | dict(changes)
 
 
 def independent(manifest: dict, values: Values) -> dict[str, Any]:
     """Return the values that others follow from."""
     own = {p["name"] for p in manifest["parameters"]}
-    computed = "link_inertia" if "link_radius" in values else ""
-    return {name: x for name, x in values.items() if name in own and name != computed}
+    radii = [name for name in own if name.endswith("link_radius") and name in values]
+    own -= {name.replace("link_radius", "link_inertia") for name in radii}
+    return {name: x for name, x in values.items() if name in own}
 
 
-def totals(values: Values) -> dict[str, Any]:
-    """Return mass and length of a tail whose links or arcs have their own, of each run."""
+def totals(values: Values, owner: str = "") -> dict[str, Any]:
+    """Return mass and length of a chain whose links or arcs have their own, of each run."""
     found = {}
     for name, parts in TOTALS.items():
-        own = [np.sum(values[part], axis=-1) for part in parts if part in values]
+        names = [name_in(owner, part) for part in parts]
+        own = [np.sum(values[each], axis=-1) for each in names if each in values]
         if own:
-            found[name] = sum(own)
+            found[name_in(owner, name)] = sum(own)
     return found
 
 
@@ -120,30 +128,40 @@ def completed(manifest: dict, values: Values) -> dict[str, Any]:
     or arcs. ModelError if the weight is not finite, or stops exclude each other.
     """
     absent = {"gravity": 0.0} if manifest["scene"].get("weightless") else {}
-    values = {**absent, **values, **totals(values)}
+    chains = entries(manifest)
+    values = {**absent, **values}
+    for entry in chains:
+        values |= totals(values, owner_of(entry))
+    if len(chains) > 1:
+        masses = [np.asarray(values[name_in(owner_of(e), "tail_mass")]) for e in chains[1:]]
+        values[OTHER_CHAINS] = sum(masses)
     with np.errstate(over="ignore"):
         weight = np.asarray(total_mass(values)) * values["gravity"]
     if not np.isfinite(weight).all():
         raise ModelError(
             "parameters: torso_mass, tail_mass and gravity give no finite weight: use kg and m/s^2"
         )
-    _refuse_stops_without_room(values)
-    if "link_radius" not in values:
-        return dict(values)
-    moments = np.broadcast_arrays(*link_inertia(values, manifest["dimensions"]["total"]))
-    return dict(values) | {"link_inertia": np.stack(moments, axis=-1)}
+    for entry in chains:
+        owner = owner_of(entry)
+        _refuse_stops_without_room(values, owner)
+        if name_in(owner, "link_radius") in values:
+            first, stop = entry["points"]
+            moments = np.broadcast_arrays(*link_inertia(values, stop - first - 1, owner))
+            values[name_in(owner, "link_inertia")] = np.stack(moments, axis=-1)
+    return values
 
 
-def _refuse_stops_without_room(values: Values) -> None:
-    """ModelError unless each lower stop is below the upper one."""
-    if "tail_stop_lower" not in values:
+def _refuse_stops_without_room(values: Values, owner: str) -> None:
+    """ModelError unless each lower stop of a chain is below the upper one."""
+    below, above = (name_in(owner, f"tail_stop_{end}") for end in ("lower", "upper"))
+    if below not in values:
         return
-    lower, upper = (np.asarray(values[f"tail_stop_{end}"]) for end in ("lower", "upper"))
+    lower, upper = np.asarray(values[below]), np.asarray(values[above])
     wrong = np.argwhere(~(lower < upper))
     if len(wrong):
         lower, upper = (each[tuple(wrong[0])] for each in np.broadcast_arrays(lower, upper))
         raise ModelError(
-            f"parameters: tail_stop_lower {lower:.6g} is not below tail_stop_upper {upper:.6g} of "
+            f"parameters: {below} {lower:.6g} is not below {above} {upper:.6g} of "
             f"tail coordinate {wrong[0][-1]}: stops exclude each other, move them apart"
         )
 
@@ -163,8 +181,10 @@ def _checked_changes(manifest: dict, changes: object, runs: int | None) -> dict[
             problems.append(checked)
         else:
             sound[name] = checked
-    if {"link_radius", "link_inertia"} <= sound.keys():
-        problems.append("link_radius and link_inertia: give one of them, not both")
+    for radius in [name for name in sound if name.endswith("link_radius")]:
+        inertia = radius.replace("link_radius", "link_inertia")
+        if inertia in sound:
+            problems.append(f"{radius} and {inertia}: give one of them, not both")
     if sound and manifest["scene"]["baked"]:
         problems.append(
             "the parameters are baked into this model: set `baked = false` in its scene and "
@@ -175,23 +195,23 @@ def _checked_changes(manifest: dict, changes: object, runs: int | None) -> dict[
     return sound
 
 
-def link_inertia(values: Values, links: int) -> tuple[Any, Any, Any]:
+def link_inertia(values: Values, links: int, owner: str = "") -> tuple[Any, Any, Any]:
     """Moments of inertia (kg m^2) of one link along y; ModelError if they are not finite."""
     with np.errstate(over="ignore", invalid="ignore"):
-        across, along, _ = moments = ellipsoid_moments(values, links)
+        across, along, _ = moments = ellipsoid_moments(values, links, owner)
         sound = np.isfinite(across + along).all()
     if not sound:
         raise ModelError(
-            "parameters: tail_mass, tail_length and link_radius give no finite link_inertia: use "
-            "kg and m"
+            f"parameters: {', '.join(name_in(owner, n) for n in SHAPE_OF_LINKS)} give no finite "
+            "link_inertia: use kg and m"
         )
     return moments
 
 
-def ellipsoid_moments(values: Values, links: int) -> tuple[Any, Any, Any]:
-    """Moments of inertia of one of equal links, an ellipsoid; of numbers or symbols."""
-    mass, length = values["tail_mass"] / links, values["tail_length"] / links
-    return ellipsoid(mass, length, values["link_radius"])
+def ellipsoid_moments(values: Values, links: int, owner: str = "") -> tuple[Any, Any, Any]:
+    """Moments of inertia of one of a chain's equal links, an ellipsoid; of numbers or symbols."""
+    mass, length, radius = (values[name_in(owner, name)] for name in SHAPE_OF_LINKS)
+    return ellipsoid(mass / links, length / links, radius)
 
 
 def flat(manifest: dict, values: Mapping[str, Value]) -> list[float]:

@@ -46,7 +46,7 @@ def behind_stops(model: "Model", angles: Any) -> str:
 
     The text is empty if there is none.
     """
-    values = model.parameters
+    values = model.passive_values
     for (name, _), (way, _) in zip(ENDS, _ways(values, angles), strict=False):
         run, coordinate = np.unravel_index(way.argmax(), way.shape)
         if way[run, coordinate] > 1:

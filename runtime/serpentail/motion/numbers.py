@@ -58,7 +58,7 @@ class Number(NamedTuple):
 def com_rise(model: Model, motion: Trajectory) -> float | None:
     """Highest rise (m) of the centre of mass, by the potential energy M g z; None without g."""
     whole = weight(model)
-    lifted = motion.potential - stored_energy(model.parameters, motion.tail)
+    lifted = motion.potential - stored_energy(model.passive_values, motion.tail)
     return float((lifted.max() - lifted[0]) / whole) if whole else None
 
 

@@ -146,4 +146,4 @@ class Energies:
 
     def _stored(self, q: np.ndarray) -> np.ndarray:
         """Return the energy (K,) that the tail stores."""
-        return np.asarray(stored_energy(self.model.parameters, q[:, self.model.layout.tail_q]))
+        return np.asarray(stored_energy(self.model.passive_values, q[:, self.model.layout.tail_q]))

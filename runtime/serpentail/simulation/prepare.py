@@ -10,6 +10,7 @@ import numpy as np
 
 from ..basics.checks import number, shown
 from ..basics.errors import ModelError, SimulationError, StateError
+from ..model.chains import of_all_coordinates
 from ..model.kernel import RunKernel
 from ..model.model import Model
 from ..model.parameters import RunParameters, Values
@@ -99,7 +100,9 @@ def choose(
 def long_and_free(actuations: RunActuations, start: Start, parameters: RunParameters) -> bool:
     """Tell whether it is a single long run in which neither damping nor torques act."""
     long = not start.many and start.end - start.start >= LONG
-    if not long or np.any(parameters.values.get("tail_damping", 0.0)):
+    layout = actuations.model.layout
+    values = of_all_coordinates(layout, parameters.values)
+    if not long or np.any(values.get("tail_damping", 0.0)):
         return False
     return not any(each.acts for each in actuations.distinct)
 
@@ -141,7 +144,7 @@ def fastest_decay(actuations: RunActuations, start: Start, parameters: RunParame
     laws = [each.damping for each in parts if each.damping is not None]
     # tracking compensates the passive tail's own torques
     tracked = bool(parts) and all(each.pfl is not None for each in parts)
-    values = {} if tracked else parameters.values
+    values = {} if tracked else of_all_coordinates(model.layout, parameters.values)
     damping = of_tail(values, "tail_damping", (runs, nt)) + (np.max(laws, axis=0) if laws else 0.0)
     if not damping.any() or "forward_dynamics" not in model.generated:
         return 0.0

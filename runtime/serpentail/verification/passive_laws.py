@@ -24,7 +24,7 @@ def the_tail_itself_asks_for_torques(model: Model, s: Case) -> Errors:
     expected = bare.inverse_dynamics(s.q, s.v, s.v_dot).astype(float)
     size = np.abs(force) + np.abs(expected)
     expected[model.layout.tail_v] += passive_force(
-        model.parameters, s.q[model.layout.tail_q], s.v[model.layout.tail_v]
+        model.passive_values, s.q[model.layout.tail_q], s.v[model.layout.tail_v]
     )
     return relative(force, expected, size + np.abs(expected))
 
@@ -38,7 +38,7 @@ def springs_and_stops_store_potential_energy(model: Model, s: Case) -> Errors:
     bare = rid_of(model, PARTS)
     kinetic, potential = model.energy(s.q, s.v)
     own, height = bare.energy(s.q, s.v)
-    stored = float(stored_energy(model.parameters, s.q[model.layout.tail_q]))
+    stored = float(stored_energy(model.passive_values, s.q[model.layout.tail_q]))
     return {
         "kinetic": relative(kinetic, own),
         "potential": relative(potential, height + stored, abs(float(height)) + stored),
@@ -53,7 +53,7 @@ def stored_energy_changes_by_its_forces(model: Model, s: Case) -> Errors:
     expected = bare.energy_derivatives(s.q, s.v)[2].astype(float)
     size = np.abs(gradient) + np.abs(expected)
     expected[model.layout.tail_v] += passive_force(
-        model.parameters, s.q[model.layout.tail_q], 0 * s.v[model.layout.tail_v]
+        model.passive_values, s.q[model.layout.tail_q], 0 * s.v[model.layout.tail_v]
     )
     return relative(gradient, expected, size)
 
@@ -62,7 +62,7 @@ def stored_energy_changes_by_its_forces(model: Model, s: Case) -> Errors:
 def torques_that_make_up_for_it_rid_a_tail_of_it(model: Model, s: Case) -> Errors:
     """With torques that compensate the passive tail, v_dot is that of a tail without it."""
     bare = rid_of(model, PARTS)
-    force = passive_force(model.parameters, s.q[model.layout.tail_q], s.v[model.layout.tail_v])
+    force = passive_force(model.passive_values, s.q[model.layout.tail_q], s.v[model.layout.tail_v])
     expected = bare.inverse_dynamics(s.q, s.v, bare.forward_dynamics(s.q, s.v, s.tau))
     found = bare.inverse_dynamics(s.q, s.v, model.forward_dynamics(s.q, s.v, s.tau + force))
     scale = np.abs(force).max() + np.abs(expected).max() + np.abs(found).max()

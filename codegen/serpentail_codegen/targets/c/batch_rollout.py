@@ -14,7 +14,6 @@ from ..templating import render
 from .batch import STATES, LaneFunction, lane_function, lanes_context, of_one_state
 from .form import PrintedFunction
 from .records import ROLLOUTS, layout, member_views, steps_record
-from .simulation import own_damping
 from .views import callee_view
 
 FUNCTIONS = {"dynamics": "contact_dynamics", "factor": "implicit_factor", "solve": "implicit_solve"}
@@ -69,10 +68,13 @@ def batch_rollout(
 ) -> BatchRollout | None:
     """Return what advances runs in lanes, of a scene with rollout and a free torso.
 
-    With contacts it needs implicit methods.
+    With contacts it needs implicit methods. Trees with damping have none: their damping is not one
+    array.
     """
     names = {f.function.name for f in printed}
     if "rollout" not in scene.functions or tail.fixed:
+        return None
+    if tail.branches and "damping" in tail.passive:
         return None
     if scene.contacts and "implicit_factor" not in names:
         return None
@@ -161,7 +163,7 @@ def _flights_context(scene: Scene, runs: BatchRollout) -> dict[str, Any]:
     return {
         "way": "steps",
         "arguments": ", ".join(arguments),
-        "damped_in_lanes": f"WIDE({own_damping(scene)}[k])" if scene.baked else damping,
+        "damped_in_lanes": f"WIDE({scene.name}_tail_damping[k])" if scene.baked else damping,
         "runs": f"{scene.name}_side_by_side",  # what explicit methods advance, and lengths of steps
         "lengths": "const real *",
         "method": "run->method",

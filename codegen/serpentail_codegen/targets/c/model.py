@@ -92,11 +92,11 @@ def model_context(scene: Scene, tail: Tail) -> dict[str, Any]:
     """Return the values of templates about the model as a whole: names, sizes, types,
     parameters.
     """
-    pieces, single = PIECES[scene.kind], scene.real == "float"
+    pieces, single = PIECES[tail.kind], scene.real == "float"
     own = tail.shape.counts
     counts = f"of {', '.join(map(str, own))}" if own else f"x {tail.links}"
     return {
-        "title": f"{scene.kind} tail, {tail.segments} segments {counts} {pieces}{words_of(tail)}",
+        "title": f"{chains_of(tail)}, {tail.segments} segments {counts} {pieces}{words_of(tail)}",
         "pieces": pieces,
         "prefix": scene.name,
         "upper": scene.name.upper(),
@@ -118,6 +118,13 @@ def model_context(scene: Scene, tail: Tail) -> dict[str, Any]:
         "vector": VECTOR,
         "widest": VECTOR,
     }
+
+
+def chains_of(tail: Tail) -> str:
+    """Return the kind of a tail, or the names of a tree's chains, in words."""
+    if not tail.branches:
+        return f"{tail.kind} tail"
+    return f"chains {', '.join(chain.name or 'tail' for chain in tail.chains)}"
 
 
 def words_of(tail: Tail) -> str:

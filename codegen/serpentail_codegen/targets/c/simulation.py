@@ -4,6 +4,9 @@ from dataclasses import dataclass
 from itertools import accumulate
 from typing import Any
 
+from serpentail_scene.layout import PER_SEGMENT
+from serpentail_scene.parameters import name_in
+
 from ...functions.tail import Tail
 from ...scene.scene import Scene
 from .records import DESCRIPTIONS, record_views
@@ -35,11 +38,28 @@ MACROS = (
 )
 
 
-def own_damping(scene: Scene) -> str:
-    """Print the position of the tail's own damping in a run; empty if it has none."""
-    if "damping" not in scene.passive:
+def own_damping(scene: Scene, tail: Tail) -> str:
+    """Print the position of the tail's own damping in a run, of a tree that of all parameters;
+    empty if there is none.
+    """
+    if "damping" not in tail.passive:
         return ""
+    if tail.branches:
+        return "run->parameters"
     return f"{scene.name}_tail_damping" if scene.baked else "run->parameters->tail_damping"
+
+
+def damped_chains(tail: Tail) -> list[tuple[str, int, int]]:
+    """Return the damping parameter of each chain of a tree, and its coordinates from which to
+    which.
+    """
+    return [
+        (name_in(chain.owner, "tail_damping"), first, first + chain.nt)
+        for chain, first in (
+            (chain, PER_SEGMENT * chain.segments_before) for chain in tail.branches
+        )
+        if "damping" in chain.passive
+    ]
 
 
 def simulation_context(
@@ -66,7 +86,8 @@ def simulation_context(
         if tail.kind == "articulated"
         else 1 / tail.links,  # of a segment's turn, a piece
         "ledger": ledger,
-        "damped": own_damping(scene),
+        "damped": own_damping(scene, tail),
+        "damped_chains": damped_chains(tail),
         "looks": LOOKS,
         "resolution": resolution,
         "level": level,

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...basics.errors import SimulationError, StateError
 from ...compiling.threads import in_turn
+from ...model.chains import of_all_coordinates
 from ...model.kernel import RunKernel
 from ...model.passive import stored_energy
 from ...motion.trajectory import Trajectory
@@ -144,7 +145,7 @@ class EnergiesOfRuns:
 
     def _stored(self, tails: Iterable[np.ndarray]) -> np.ndarray:
         """Return the energy (runs, samples) that tails store, given as (runs, 2m) by sample."""
-        values = self.runs.parameters.values
+        values = of_all_coordinates(self.model.layout, self.runs.parameters.values)
         return np.stack([stored_energy(values, tail) for tail in tails], axis=1)
 
     @property

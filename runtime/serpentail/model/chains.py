@@ -1,0 +1,82 @@
+"""The chains of a model: where the numbers of each lie, and what their parameters add up to."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from serpentail_scene.layout import PER_SEGMENT, ChainLayout, Layout
+from serpentail_scene.parameters import PASSIVE, name_in
+
+from .passive import OUT_OF_REACH
+
+# coordinates of a segment by its kind
+COORDINATES = {"articulated": ("alpha", "beta"), "continuum": ("a", "b"), "polar": ("phi", "theta")}
+# what stands for springs, damping and stops where a chain has none
+NONE = dict.fromkeys(("tail_stiffness", "tail_rest", "tail_damping", "tail_stop_stiffness"), 0.0)
+NONE |= {"tail_stop_lower": -OUT_OF_REACH, "tail_stop_upper": OUT_OF_REACH, "tail_stop_width": 1.0}
+
+
+def entries(manifest: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the manifest's entry of each chain, also where the tail is the only one."""
+    sizes = manifest["dimensions"]
+    alone = {
+        "name": "tail",
+        "parameters": "tail",
+        "mirrored": False,
+        "segments": [0, sizes["segments"]],
+        "points": [0, sizes["total"] + 1],
+    }
+    return list(manifest.get("chains") or [alone])
+
+
+def owner_of(entry: Mapping[str, Any]) -> str:
+    """Return what the names of a chain's parameters begin with; empty for the tail's own."""
+    return "" if entry["parameters"] == "tail" else str(entry["parameters"])
+
+
+def layout_of(manifest: Mapping[str, Any], kinds: tuple[str, ...]) -> Layout:
+    """Return the layout of a model whose segments are of these kinds."""
+    fixed = manifest["scene"].get("base") == "fixed"
+    layout = Layout(len(kinds), fixed)
+    polar = manifest["scene"]["coordinates"] == "polar"
+    chains = []
+    for entry in entries(manifest):
+        first, stop = (PER_SEGMENT * end for end in entry["segments"])
+        start = f"{entry['name']}_" if owner_of(entry) else ""
+        pairs = [
+            COORDINATES["polar" if polar else kind] for kind in kinds[slice(*entry["segments"])]
+        ]
+        chains.append(
+            ChainLayout(
+                name=entry["name"],
+                owner=owner_of(entry),
+                mirrored=entry["mirrored"],
+                q=slice(layout.nq - layout.nt + first, layout.nq - layout.nt + stop),
+                v=slice(layout.nv - layout.nt + first, layout.nv - layout.nt + stop),
+                tau=slice(first, stop),
+                segments=slice(*entry["segments"]),
+                points=slice(*entry["points"]),
+                names=tuple(
+                    f"{start}{name}_{i + 1}" for i, pair in enumerate(pairs) for name in pair
+                ),
+            )
+        )
+    return Layout(len(kinds), fixed, tuple(chains))
+
+
+def of_all_coordinates(layout: Layout, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return parameters in which those of the passive tail are of the coordinates of all chains,
+    (..., nt); a chain without springs, damping or stops has none.
+    """
+    found = dict(values)
+    for p in PASSIVE:
+        own = [values.get(name_in(chain.owner, p.name)) for chain in layout.chains]
+        if len(own) == 1 or all(value is None for value in own):
+            continue
+        sizes = [chain.tau.stop - chain.tau.start for chain in layout.chains]
+        each = [np.asarray(NONE[p.name] if x is None else x, float) for x in own]
+        runs = np.broadcast_shapes(*(x.shape[:-1] for x in each))
+        parts = [np.broadcast_to(x, (*runs, n)) for x, n in zip(each, sizes, strict=True)]
+        found[p.name] = np.concatenate(parts, axis=-1)
+    return found
