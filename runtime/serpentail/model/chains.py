@@ -44,9 +44,8 @@ def layout_of(manifest: Mapping[str, Any], kinds: tuple[str, ...]) -> Layout:
     for entry in entries(manifest):
         first, stop = (PER_SEGMENT * end for end in entry["segments"])
         start = f"{entry['name']}_" if owner_of(entry) else ""
-        pairs = [
-            COORDINATES["polar" if polar else kind] for kind in kinds[slice(*entry["segments"])]
-        ]
+        own = kinds[slice(*entry["segments"])]
+        pairs = [COORDINATES["polar" if polar else kind] for kind in own]
         chains.append(
             ChainLayout(
                 name=entry["name"],

@@ -53,11 +53,10 @@ def damped_chains(tail: Tail) -> list[tuple[str, int, int]]:
     """Return the damping parameter of each chain of a tree, and its coordinates from which to
     which.
     """
+    starts = [PER_SEGMENT * chain.segments_before for chain in tail.branches]
     return [
         (name_in(chain.owner, "tail_damping"), first, first + chain.nt)
-        for chain, first in (
-            (chain, PER_SEGMENT * chain.segments_before) for chain in tail.branches
-        )
+        for chain, first in zip(tail.branches, starts, strict=True)
         if "damping" in chain.passive
     ]
 
