@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import Any, Unpack
 
+from serpentail_scene.parameters import NAMES, name_in
 from serpentail_scene.purposes import functions_of
 
 from ..basics.errors import ModelError
@@ -97,18 +98,11 @@ def build(
     >>> model = st.build(tail="articulated", segments=3, links=4)  # doctest: +SKIP
     >>> heavy = st.build("righting_m1_n3", torso_mass=0.06)  # doctest: +SKIP
     """
-    keys, parameters = separated(options)
-    if scene is None:
-        try:
-            chosen = built(keys, _name(keys), parameters)
-        except ModelError as error:
-            error.args = (re.sub(r"(: |\n)kind: ", r"\1tail: ", str(error)),)  # our word
-            raise
-    else:
-        tables, path = tables_of_scene(scene)
-        if "contacts" in keys:
-            tables = with_contacts(tables, keys["contacts"])
-        chosen = built(tables | keys, path.stem, parameters)
+    tables, path = tables_of_scene(scene) if scene is not None else ({}, None)
+    keys, parameters = separated(options, _chains({**tables, **options}))
+    if "contacts" in keys and path is not None:
+        tables = with_contacts(tables, keys["contacts"])
+    chosen = built(tables | keys, path.stem if path else _name(keys), parameters)
     return model_from(*chosen, compiled=compiled, threads=threads)
 
 
@@ -151,7 +145,11 @@ def built(
 
 
 def _shapes(name: str, scene: Mapping[str, Any], own: Mapping[str, Any]) -> bool:
-    """Tell if a parameter that the scene lacks needs other code, because it changes the tail."""
+    """Tell if a parameter that the scene lacks needs other code, because it changes a chain."""
+    for chain, table in _chains(scene).items():
+        if name.startswith(f"{chain}_") and name not in NAMES and isinstance(table, Mapping):
+            full = {name_in(chain, n): n for n in NAMES}.get(name, name)
+            return _shapes(full, table, {f"tail_{key}": key for key in table} | table)
     if name == "mount_angles" or name in PASSIVE:
         return name not in own
     if name not in PIECES or name in own:
@@ -159,6 +157,12 @@ def _shapes(name: str, scene: Mapping[str, Any], own: Mapping[str, Any]) -> bool
     segments = scene.get("segments")
     tables = segments if isinstance(segments, list | tuple) else []
     return "taper" not in scene and all(set(table) <= {"kind", "links"} for table in tables)
+
+
+def _chains(scene: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the tables of a scene's chains; none in place of what is no table."""
+    chains = scene.get("chain", {})
+    return chains if isinstance(chains, Mapping) else {}
 
 
 def with_contacts(tables: Mapping[str, Any], contacts: Any) -> dict[str, Any]:

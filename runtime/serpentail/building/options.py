@@ -1,6 +1,6 @@
 """What ``build`` accepts: the keys of a scene, and the parameters of the body."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any, TypedDict
 
 from ..basics.checks import did_you_mean, shown
@@ -73,6 +73,7 @@ class SceneKeys(TypedDict, total=False):
     base: str
     weightless: bool
     targets: Sequence[str]
+    chain: Mapping[str, Mapping[str, Any]]
     name: str
 
 
@@ -80,8 +81,11 @@ class Options(SceneKeys, ParameterOptions, total=False):
     """All keyword arguments of ``serpentail.build`` for scenes and bodies."""
 
 
-def separated(options: Options) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the keys of the scene, as scene files name them, and the parameters.
+def separated(
+    options: Options, chains: Collection[str] = ()
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the keys of the scene, as scene files name them, and the parameters, among them those
+    of chains with these names.
 
     ModelError names an option that is neither.
     """
@@ -89,7 +93,9 @@ def separated(options: Options) -> tuple[dict[str, Any], dict[str, Any]]:
     for name, value in options.items():
         if name in SceneKeys.__annotations__:
             keys["kind" if name == "tail" else name] = value
-        elif name in ParameterOptions.__annotations__:
+        elif name in ParameterOptions.__annotations__ or name.startswith(
+            tuple(f"{chain}_" for chain in chains)
+        ):
             parameters[name] = value
         else:
             raise _unknown(name, value)
