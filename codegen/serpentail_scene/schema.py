@@ -3,10 +3,10 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .keys import BODY, KEYS, ONLY, SEGMENT, TAPER, TORSOS, Key, foreign_to, one_word
-from .parameters import PARAMETERS, PASSIVE, Parameter
+from .keys import BODY, CHAIN, KEYS, ONLY, SEGMENT, TAPER, TORSOS, Key, foreign_to, one_word
+from .parameters import PARAMETERS, PASSIVE, Parameter, key_in_chain
 from .purposes import ADDED
-from .rules import COUNT
+from .rules import COUNT, FLAG
 from .signatures.table import ALL
 from .units import MEASURES, choices, pattern, plain
 
@@ -34,6 +34,11 @@ def scene_schema(verbs: Mapping[str, Key]) -> Schema:
         for shape, lengths in TORSOS.items()
     }
     keys["body"] = key_schema(Key(keys={**BODY, "torso": Key(kinds=torsos)}))
+    of_chain: Schema = {name: keys[name] for name in CHAIN if name in keys}
+    of_chain |= {"on": {"const": "torso"}, "pair": dict(FLAG.schema)}
+    of_chain |= {key_in_chain(p.name): _parameter(p) for p in (*PARAMETERS, *PASSIVE) if p.of_chain}
+    needed = ["kind", "segments", "mount"]
+    keys["chain"] = {"type": "object", "additionalProperties": _table(of_chain, needed)}
     for name, key in KEYS.items():
         keys[name] |= {"description": key.rule.text} if key.rule.text else {}
     for name, verb in verbs.items():

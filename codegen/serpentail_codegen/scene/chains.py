@@ -14,7 +14,7 @@ from serpentail_scene.parameters import (
 )
 from serpentail_scene.signatures.table import ALL, OF_TREES
 
-from .checks import MOST_SEGMENTS
+from .checks import MOST_SEGMENTS, MOST_STRAIGHT, segments_in
 from .problems import Problem, SceneError, suggest
 from .scene import Chain, Parameters, Scene
 
@@ -30,6 +30,7 @@ REFUSED: dict[str, tuple[Callable[[Any], bool], str]] = {
     "plan": (bool, "remove the table [plan], or the chains"),
     "identify": (bool, "remove the table [identify], or the chains"),
 }
+REQUIRED = ("tail_mount", "tail_mass", "tail_length")  # where a chain has them
 TAKEN = ("tail", "torso", "tau")  # words that names of parameters or torques begin with
 
 
@@ -67,7 +68,7 @@ def chains_of(values: Mapping[str, Any], parse: Parse) -> Chains:
             try:
                 chains.append(_chain(name, table, own, parse))
             except SceneError as error:
-                problems += [replace(p, field=_field(place, p.field)) for p in error.problems]
+                problems += [_in_table(place, p) for p in error.problems]
     problems += _clashes(chains, list(tables))
     problems += tree_problems(values, chains)
     return Chains(tuple(chains), given if isinstance(named, Mapping) else named, tuple(problems))
@@ -78,10 +79,13 @@ def _belongs(parameter: str, chain: str) -> bool:
     return parameter.removeprefix(f"{chain}_") in OF_CHAINS and parameter not in NAMES
 
 
-def _field(place: str, field: str) -> str:
-    """Return where the value of a field is in the table of a chain."""
-    name = field.removeprefix("parameters.")
-    return f"{place}.{key_in_chain(name) if name != field else field}"
+def _in_table(place: str, problem: Problem) -> Problem:
+    """Return a problem of a tail as that of the table of a chain, where sizes have no default."""
+    name = problem.field.removeprefix("parameters.")
+    key = key_in_chain(name) if name != problem.field else name
+    sizes = name in REQUIRED and " (default" in problem.remedy
+    remedy = problem.remedy.partition(" (default")[0] if sizes else problem.remedy
+    return replace(problem, field=f"{place}.{key}", remedy=remedy)
 
 
 def _key_problems(place: str, table: Mapping[str, Any]) -> list[Problem]:
@@ -107,7 +111,7 @@ def _chain(name: str, table: Mapping[str, Any], own: Mapping[str, Any], parse: P
     values |= {OF_CHAINS[n.removeprefix(f"{name}_")].name: value for n, value in own.items()}
     inner = {**keys, "functions": ["mass_matrix"], "parameters": values}
     scene = parse(inner, name)
-    needed = [n for n in ("tail_mount", "tail_mass", "tail_length") if n in scene.parameters]
+    needed = [n for n in REQUIRED if n in scene.parameters]
     missing = [OF_CHAINS[key_in_chain(n)] for n in needed if n not in values]
     if missing:
         remedy = "has no default: give it in {}"
@@ -146,9 +150,12 @@ def tree_problems(values: Mapping[str, Any], chains: Collection[Chain]) -> list[
     others = [name for name in listed if name in ALL and name not in OF_TREES]
     remedy = f"{this}leave it out; there are {', '.join(OF_TREES)}"
     problems += [Problem("functions", name, remedy) for name in others]
-    total = sum(chain.scene.segments * len(chain.names) for chain in chains)
-    if total > MOST_SEGMENTS:
-        remedy = f"more than {MOST_SEGMENTS} segments of all chains would take hours; choose fewer"
+    segments = values["segments"]
+    total = len(segments) if isinstance(segments, list | tuple) else segments_in(values)
+    total += sum(chain.scene.segments * len(chain.names) for chain in chains)
+    most = MOST_STRAIGHT[0] if values["emission"] == "straight" else MOST_SEGMENTS
+    if total > most:
+        remedy = f"more than {most} segments of all chains would take hours; choose fewer"
         problems.append(Problem("chain", total, remedy))
     return problems
 

@@ -1,14 +1,17 @@
 """The chains of a model: where the numbers of each lie, and what their parameters add up to."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from serpentail_scene.layout import PER_SEGMENT, ChainLayout, Layout
-from serpentail_scene.parameters import PASSIVE, name_in
+from serpentail_scene.parameters import NAMES, PASSIVE, name_in
 
 from .passive import OUT_OF_REACH
+
+if TYPE_CHECKING:
+    from .model import Model
 
 # coordinates of a segment by its kind
 COORDINATES = {"articulated": ("alpha", "beta"), "continuum": ("a", "b"), "polar": ("phi", "theta")}
@@ -62,6 +65,19 @@ def layout_of(manifest: Mapping[str, Any], kinds: tuple[str, ...]) -> Layout:
             )
         )
     return Layout(len(kinds), fixed, tuple(chains))
+
+
+def values_of(chain: ChainLayout, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the parameters of a chain under the names of the tail's."""
+    names = {name_in(chain.owner, name): name for name in NAMES}
+    return {names[name]: value for name, value in values.items() if name in names}
+
+
+def refuse_several(model: "Model", field: str, remedy: str, error: type[Exception]) -> None:
+    """Raise an error about what works only for a tail alone, if the model has more chains."""
+    names = ", ".join(chain.name for chain in model.layout.chains[1:])
+    if names:
+        raise error(f"{field}: needs a tail alone, and {model.name} has {names}: {remedy}")
 
 
 def of_all_coordinates(layout: Layout, values: Mapping[str, Any]) -> dict[str, Any]:

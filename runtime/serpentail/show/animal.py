@@ -4,15 +4,18 @@ Torso and head are balls, that is ellipsoids, in the torso's axes; tail and legs
 points.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from serpentail_scene.layout import POSITION
+from serpentail_scene.layout import POSITION, ChainLayout
 
 from ..basics.attitude import Array, pose_of
+from ..model.chains import values_of
 from ..model.model import Model
 from ..model.polar import polar_to_bend
 from ..motion.body import semi_axes
@@ -48,7 +51,7 @@ class Ball:
 
 @dataclass(frozen=True)
 class Animal:
-    """The drawn animal of a model: semi-axes of the torso and radii of the tail's rods, m.
+    """The drawn animal of a model: semi-axes of the torso and radii of the rods of all chains, m.
 
     alike: whether all parts of the tail are equally thick but for its taper.  jointed: whether its
     joints are marked.  fixed: a ball at the tail's mount stands for the torso, without a head.
@@ -93,55 +96,60 @@ def animal_of(model: Model) -> Animal:
     p, axes = model.parameters, semi_axes(model)
     if model.fixed:
         reach = float(np.linalg.norm(p["tail_mount"]))
-        axes = np.full(3, max(reach, 2 * usual_radius(model)))
+        axes = np.full(3, max(reach, 2 * usual_radius(p)))
     few = model.manifest["dimensions"]["total"] <= MOST_JOINTS
     return Animal(
         semi_axes=tuple(np.maximum(axes, THINNEST * axes.max()).tolist()),
         tail_radii=tuple(_tail_radii(model).tolist()),
         tail_length=float(p["tail_length"]),
-        alike=not {"link_masses", "arc_masses"} & p.keys(),
+        alike=len(model.layout.chains) == 1 and not {"link_masses", "arc_masses"} & p.keys(),
         jointed=model.kind == "articulated" and few,
         fixed=model.fixed,
     )
 
 
-def usual_radius(model: Model) -> float:
-    """Return the radius (m) of a tail whose links are all alike."""
-    p = model.parameters
+def usual_radius(p: Mapping[str, Any]) -> float:
+    """Return the radius (m) of a tail whose links are all alike, from its parameters."""
     return float(p.get("link_radius") or SLENDER * p["tail_length"])
 
 
 def _tail_radii(model: Model) -> Array:
-    """Return the radius (m) of the tail between its points.
+    """Return the radius (m) of the tail between its points, then of other chains; 0 between two
+    chains.
+    """
+    each = [np.append(0.0, _radii_of(model, chain)) for chain in model.layout.chains]
+    return np.concatenate(each)[1:]
+
+
+def _radii_of(model: Model, chain: ChainLayout) -> Array:
+    """Return the radius (m) of a chain between its points.
 
     Links with inertias of their own are as thick as cylinders of that inertia, arcs with masses of
-    their own as thick as that mass of water. Other tails become thinner towards the tip.
+    their own as thick as that mass of water. Other chains become thinner towards the tip.
     """
-    p, count = model.parameters, model.manifest["dimensions"]["total"]
-    usual, radii = usual_radius(model), np.zeros(count)
+    p, points = values_of(chain, model.parameters), model.manifest["dimensions"]["links"]
+    counts = np.broadcast_to(points, model.segments)[chain.segments]
+    count = int(counts.sum())
+    usual, radii = usual_radius(p), np.zeros(count)
     if not {"link_masses", "arc_masses"} & p.keys():
         return usual * (THICKER - np.arange(count) / (2 * count + 2))
-    jointed = _jointed_points(model)
+    jointed = np.repeat(np.array(model.kinds[chain.segments]) == "articulated", counts)
     if "link_masses" in p:
         along, masses = np.reshape(p["link_inertias"], (-1, 3))[:, 1], np.array(p["link_masses"])
         radii[jointed] = np.where(along > 0, np.sqrt(2 * along / masses), usual)
     if "arc_masses" in p:
         sections = np.array(p["arc_masses"]) / p["arc_lengths"] / WATER
-        radii[~jointed] = np.repeat(np.sqrt(sections / np.pi), model.samples or 1)
+        arcs = np.array(model.kinds[chain.segments]) == "continuum"
+        radii[~jointed] = np.repeat(np.sqrt(sections / np.pi), counts[arcs])
     return radii
-
-
-def _jointed_points(model: Model) -> NDArray[np.bool_]:
-    """Return of each tail point but the first whether a link leads to it, not a part of an arc."""
-    links = np.broadcast_to(0 if model.links is None else model.links, model.segments)
-    return np.repeat(links > 0, np.where(links > 0, links, model.samples or 1))
 
 
 @dataclass(frozen=True, eq=False)
 class Poses:
     """Where the animal is in K samples: m, world.
 
-    torso (K, 7): centre and quaternion.  tail (K, P + 1, 3): points from the mount to the tip.
+    torso (K, 7): centre and quaternion.  tail (K, P + 1, 3): points from the mount to the tip,
+    then those of other chains.
     legs (K, 2, 6, 3): their joints; None where their angles or the model's function
     ``leg_points`` are missing.
     """

@@ -116,7 +116,7 @@ def _bodies(model: Model, count: int) -> Iterable[tuple]:
     p = model.parameters
     if "link_masses" not in p:
         length = p["tail_length"] / count
-        body = (length, p["tail_mass"] / count, length / 2, p["link_inertia"], usual_radius(model))
+        body = (length, p["tail_mass"] / count, length / 2, p["link_inertia"], usual_radius(p))
         return [body] * count
     lengths, masses, centers = (
         np.ravel(p[f"link_{name}"]).tolist() for name in ("lengths", "masses", "centers")

@@ -8,6 +8,7 @@ from typing import Any
 from ...basics.checks import one_of, shown
 from ...basics.errors import ExportError
 from ...basics.files import refuse_unwritable, replacing
+from ...model.chains import refuse_several
 from ...model.model import Model
 from .bundle import name_of
 
@@ -56,6 +57,9 @@ def export(model: Model, kind: str, path: str | os.PathLike[str] | None = None) 
     one_of("kind", kind, SUFFIXES, ExportError)
     if not isinstance(model, Model):
         raise ExportError(f"model: value {shown(model)}: needs a model, as st.load returns it")
+    if kind != "bundle":
+        remedy = 'export a "bundle", or a scene without tables [chain.NAME]'
+        refuse_several(model, f"kind: value {kind!r}", remedy, ExportError)
     name = name_of(model) if kind == "bundle" else model.name
     target = checked_path(kind, f"{name}{SUFFIXES[kind][0]}" if path is None else path)
     content: bytes = getattr(import_module(f".{kind}", __package__), kind)(model)

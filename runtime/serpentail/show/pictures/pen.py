@@ -165,8 +165,9 @@ def _draw_tail(pen: Pen) -> None:
         pen.line(tail, color=TAIL, linewidth=WIDTH)
         return
     for k, thickness in enumerate(np.divide(animal.tail_radii, np.mean(animal.tail_radii))):
-        width = WIDTH * min(max(thickness, THIN), THICK)
-        pen.line(tail[k : k + 2], color=TAIL, linewidth=width)
+        if thickness:  # not between two chains
+            width = WIDTH * min(max(thickness, THIN), THICK)
+            pen.line(tail[k : k + 2], color=TAIL, linewidth=width)
 
 
 def _draw_marks(pen: Pen) -> None:
