@@ -62,10 +62,12 @@ def add_passive_forces(draft: Draft, state: State, force: Callable[[Index], Ref]
 
 def add_passive_power(draft: Draft, state: State, multiplier: Array, power: Ref) -> None:
     """Add the power of the passive parts, when the tail moves with a multiplier."""
-    if draft.tail.passive:
-        with each_passive_force(draft, state) as (i, passive_force):
-            reads = {"passive": passive_force, "virtual_rates": draft.tail.segment_v(multiplier, i)}
-            draft.step(passive.virtual_power, reads, power_=power)
+    for chain in each_chain(draft):
+        if chain.passive:
+            with each_passive_force(draft, state.on(chain)) as (i, passive_force):
+                rates = {"virtual_rates": chain.segment_v(multiplier, i)}
+                reads = {"passive": passive_force} | rates
+                draft.step(passive.virtual_power, reads, power_=power)
 
 
 def net_torques(draft: Draft, state: State, tau: Array) -> Array:

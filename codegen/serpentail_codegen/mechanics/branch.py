@@ -69,6 +69,11 @@ def mirrored_motion(let, side: V1, w: V3, w_dot: V3, a: V3) -> dict:
     return {"w": axial(side, w), "w_dot": axial(side, w_dot), "a": polar(side, a)}
 
 
+def mirrored_virtual(let, side: V1, w_virtual: V3, u_virtual: V3) -> dict:
+    """A virtual motion of the torso, seen from the other side."""
+    return {"w_virtual": axial(side, w_virtual), "u_virtual": polar(side, u_virtual)}
+
+
 def mirrored_velocity(let, side: V1, w: V3, u: V3) -> dict:
     """The torso's angular and linear velocity, seen from the other side."""
     return {"w": axial(side, w), "u": polar(side, u)}

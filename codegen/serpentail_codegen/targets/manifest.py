@@ -94,7 +94,7 @@ def function_entry(function: Function, tail: Tail, emissions: Sequence[Emission]
     entry = {
         "doc": function.doc,
         "group": SIGNATURES[function.name].group,
-        "exact_derivatives": [] if tail.fixed else list(map(list, exact)),
+        "exact_derivatives": [] if tail.fixed or tail.branches else list(map(list, exact)),
         "inputs": [argument_entry(a, tail) for a in function.inputs],
         "outputs": [argument_entry(a, tail) for a in function.outputs],
     }

@@ -38,7 +38,10 @@ FIXED = (
 OF_TREES = (
     *("mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics"),
     *("forward_dynamics_external", "energy", "momentum", "tail_points", "center_of_mass"),
-    *("pfl", "implicit", "rollout"),
+    *("inverse_dynamics_derivatives", "forward_dynamics_derivatives", "energy_derivatives"),
+    *("momentum_derivatives", "inverse_dynamics_vjp", "forward_dynamics_vjp"),
+    *("inverse_dynamics_parameter_derivatives", "forward_dynamics_parameter_derivatives"),
+    *("forward_dynamics_jvp", "pfl", "implicit", "rollout"),
 )
 AIRBORNE = in_group(PLANNING)
 NEEDS = {name: signature.needs for name, signature in SIGNATURES.items() if signature.needs}

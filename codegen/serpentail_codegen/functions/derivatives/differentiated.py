@@ -15,7 +15,6 @@ from ..passive import add_passive_forces, add_passive_power
 from ..scope import Motion, State, Vectors
 from ..sweeps.chains import prepared
 from ..sweeps.momentum import gather_moment
-from ..sweeps.pieces import mechanism
 from ..sweeps.wrenches import inertial_forces, virtual_power
 
 POWER = Argument("power", (1,), "lambda^T (H v_dot + C)")
@@ -60,7 +59,7 @@ def assemble_virtual_power(draft: Draft, arrays: dict[str, Array]) -> None:
     """
     v_dot, multiplier = arrays["v_dot"], arrays["multiplier"]
     state = draft.state(arrays["q"], arrays["v"])
-    segments = mechanism(draft).prepare(draft, state, False)
+    segments = prepared(draft, state)
 
     # the torso moves by v and v_dot, and virtually by the multiplier
     motion = {"w": state.omega, "w_dot": block(v_dot, OMEGA), "a": arrays["a"][0]}

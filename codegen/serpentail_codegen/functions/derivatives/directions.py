@@ -47,9 +47,10 @@ class Directions:
 
     def outward(self, loops: tuple[Loop, ...]) -> Index | None:
         """Return how many lanes a sweep outward needs: segment i depends only on the segments up to
-        i.
+        i. In a tree loops count the segments of one chain, and sweeps take all lanes.
         """
-        return None if any(loop.downward for loop in loops) else self.up_to(loops)
+        everywhere = self.tail.branches or any(loop.downward for loop in loops)
+        return None if everywhere else self.up_to(loops)
 
     def up_to(self, loops: tuple[Loop, ...]) -> Index | None:
         """Lanes of the torso and the segments up to i, within a loop over segments."""

@@ -55,6 +55,18 @@ def seen(draft: Draft, motion: Motion) -> Motion:
     return Motion(**draft.store(sided(draft, branch.mirrored_motion), motion, **sizes).named)
 
 
+def seen_virtually(draft: Draft, start: Vectors) -> Vectors:
+    """Return the torso's motion and its virtual velocities in the axes in which the chain is
+    computed.
+    """
+    if not draft.tail.mirrored:
+        return start
+    motion = seen(draft, Motion(start["w"], start["w_dot"], start["a"]))
+    step, virtual = sided(draft, branch.mirrored_virtual), start.only("w_virtual", "u_virtual")
+    turned = draft.store(step, virtual, w_virtual=3, u_virtual=3)
+    return Vectors({**motion.vectors(), **turned})
+
+
 def facing(draft: Draft, R: Ref) -> Ref:
     """Return the matrix that turns places from the axes in which the chain is computed to the
     world.

@@ -11,7 +11,7 @@ from ..draft import Draft
 from ..layout import block
 from ..scope import Motion, State, Vectors
 from ..tails.mechanism import Segments, Wrenches
-from .chains import add, on_each, seen
+from .chains import add, on_each, seen, seen_virtually
 from .pieces import across, attitude, each_piece, each_segment, mechanism, pieces_of
 
 
@@ -97,23 +97,42 @@ def torso_without_acceleration(draft: Draft, state: State) -> Motion:
 
 
 def virtual_power(
-    draft: Draft, segments: Segments, start: Vectors, multiplier: Array, v_dot: Array, power: Ref
+    draft: Draft,
+    segments: list[Segments],
+    start: Vectors,
+    multiplier: Array,
+    v_dot: Array,
+    power: Ref,
 ) -> None:
     """Sum the power of all inertial wrenches when the animal moves with the velocity
-    ``multiplier``.
+    ``multiplier``; ``segments`` are those of each chain.
 
     ``start``: ``w``, ``w_dot``, ``a`` of the torso and ``w_virtual``, ``u_virtual``, its virtual
     velocities. With ``w_rigid``, ``u_rigid`` and ``drift``, the power of the momentum of omega,
-    drift and rates under a motion as one rigid body is added.
+    drift and rates under a motion as one rigid body is added, of a tail alone.
     """
     rigid = "w_rigid" in start.named
-    turning = ("w", "w_dot", "w_virtual", "w_rigid") if rigid else ("w", "w_dot", "w_virtual")
-    virtual = [("w_virtual", "u_virtual")] + [("w_rigid", "u_rigid")] * rigid
     draft.step(torso.torso_power, start, power=power)
     if rigid:
         draft.step(airborne_power.torso_momentum_power, start, power_=power)
+    for own in on_each(draft, segments):
+        carried = _virtual_at_root(draft, seen_virtually(draft, start), rigid)
 
-    # from B to the tail mount
+        # from the mount to the tip
+        for i, g in each_piece(draft):
+            rates = (
+                own.motion(i, v_dot),
+                {"virtual_rates": draft.tail.segment_v(multiplier, i)},
+            )
+            tail = mechanism(draft)
+            step = tail.power_and_momentum if rigid else tail.power
+            draft.step(step, own.at(i, g), *rates, carried, power_=power, **carried)
+
+
+def _virtual_at_root(draft: Draft, start: Vectors, rigid: bool) -> Vectors:
+    """Carry the torso's motion and its virtual velocities to a mount, into the axes at the root."""
+    turning = ("w", "w_dot", "w_virtual", "w_rigid") if rigid else ("w", "w_dot", "w_virtual")
+    virtual = [("w_virtual", "u_virtual")] + [("w_rigid", "u_rigid")] * rigid
     names = ("w", "w_dot", "a", "w_virtual", "u_virtual", *("u", "w_rigid", "u_rigid") * rigid)
     carried = Vectors({name: draft.vector(f"{name}_here", 3) for name in names})
     draft.step(torso.mount_acceleration, start, a_mount=carried["a"])
@@ -124,21 +143,10 @@ def virtual_power(
         draft.step(torso.mount_velocity, reads, u=carried["u"])
     for name in turning:
         draft.copy(carried[name], start[name])
-
-    # into the tail's root axes
     across(draft, mount.motion_at_root, carried.only("w", "w_dot", "a").named)
     if rigid:
         across(draft, mount.velocity_at_root, carried.only("u").named)
     for w, u in virtual:
         turned = {"w_virtual": carried[w], "u_virtual": carried[u]}
         across(draft, mount.virtual_velocity_at_root, turned)
-
-    # from the mount to the tip
-    for i, g in each_piece(draft):
-        rates = (
-            segments.motion(i, v_dot),
-            {"virtual_rates": draft.tail.segment_v(multiplier, i)},
-        )
-        tail = mechanism(draft)
-        step = tail.power_and_momentum if rigid else tail.power
-        draft.step(step, segments.at(i, g), *rates, carried, power_=power, **carried)
+    return carried

@@ -52,7 +52,7 @@ def externals(scene: Scene, tail: Tail, works: dict[str, int]) -> list[External]
     for name in works:
         plain(begin(name), name, sizes)
     # derivatives by CasADi's q exist only for a free torso
-    for f in () if tail.fixed else DYNAMICS:
+    for f in () if tail.fixed or tail.branches else DYNAMICS:
         for kind, make in (("jac_", jacobian), ("adj1_", adjoint), ("jac_adj1_", hessian)):
             if f.has(works, kind):
                 make(begin(f.name, kind), f, sizes)
