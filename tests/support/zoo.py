@@ -58,15 +58,15 @@ CHAINS = {
     "leg": {
         "pair": True,
         "kind": "articulated",
-        "segments": OWN_LINKS[1:],
+        "segments": OWN_LINKS[1:2],
         "mount": [0.01, 0.02, -0.003],
         "mount_angles": [0.4, -0.2, 1.3],
-        "stiffness": [0.004, 0.006, 0.005, 0.003],
-        "damping": [2e-4, 3e-4, 1e-4, 4e-4],
+        "stiffness": [0.004, 0.006],
+        "damping": [2e-4, 3e-4],
     },
     "second": {
         "kind": "continuum",
-        "segments": OWN_ARCS,
+        "segments": OWN_ARCS[:1],
         "samples": 3,
         "mount": [0.002, 0.05, 0.01],
     },
@@ -141,7 +141,7 @@ ZOO: dict[str, dict[str, Any]] = {
     "fixed_arcs": _arcs(2, base="fixed"),
     "fixed_mixed": _own("mixed", MIXED, base="fixed", parameters=MOUNTED),
     # several chains
-    "tree": _own("articulated", OWN_LINKS, chain=CHAINS),
+    "tree": _own("articulated", OWN_LINKS[:2], chain=CHAINS),
     # other numbers
     "weightless": _links(1, 3, weightless=True),
     "single": _links(2, 2, real="float"),
