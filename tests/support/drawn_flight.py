@@ -6,8 +6,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from serpentail.basics.attitude import rotation_matrix
+from serpentail.model.chains import layout_of
 from serpentail.motion.trajectory import Trajectory
-from serpentail_scene.layout import Layout
 
 SEMI_AXES = np.array([0.0315, 0.0495, 0.027])
 MOUNT = np.array([0, -0.0405, 0.0045])
@@ -30,9 +30,12 @@ class Drawn:
     kernels: dict = field(default_factory=dict)
 
     def __post_init__(self):
-        self.layout = Layout(self.segments)
+        sizes = {"segments": self.segments, "links": self.links}
+        sizes["total"] = self.segments * self.links
+        self.manifest = {"dimensions": sizes, "scene": {"coordinates": "joint"}}
+        self.kinds = (self.kind,) * self.segments
+        self.layout = layout_of(self.manifest, self.kinds)
         self.nq = self.layout.nq
-        self.manifest = {"dimensions": {"total": self.segments * self.links}}
         self.parameters = {
             "torso_mass": 0.1,
             "torso_inertia": (1e-4, 1e-4, 1e-4),

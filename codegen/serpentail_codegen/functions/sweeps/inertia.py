@@ -127,7 +127,9 @@ def tail_inertia(
     total: Vectors,
     R: Ref | None,
 ) -> tuple[Segments, Vectors]:
-    """Compute what one chain gives to H; ``total``: ``mass, h, I`` of the chains before it."""
+    """Compute what one chain gives to H (Eqs. 2, 16, 18); ``total``: ``mass, h, I`` of the chains
+    before it.
+    """
     segments = mechanism(draft).prepare(draft, state, True)
     pose = torso_pose(draft, R)
     roots = segment_roots(draft)

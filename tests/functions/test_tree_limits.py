@@ -1,0 +1,116 @@
+"""Limits in which models of several chains are models of one tail; what mirror images and
+conservation say; how far a gecko swings its tail to roll over.
+"""
+
+import numpy as np
+import pytest
+
+import serpentail as st
+from serpentail_codegen.scene.parse import parse_scene
+from tests.functions.test_trees import FORWARD
+from tests.references.metrics import (
+    block_error,
+    equilibrated_condition,
+    force_error,
+    mass_matrix_error,
+)
+from tests.support import own_tails, zoo
+from tests.support.models import folder_of
+from tests.support.rows import row
+
+FEW = ["mass_matrix", "bias_force", "forward_dynamics"]
+ALONE = {"kind": "articulated", "segments": 1, "links": 3, "parameters": zoo.TORSO | zoo.MOUNTED}
+
+
+def built(name="limit", **changes):
+    """A model of a tail and the given chains."""
+    tables = {"functions": FEW, "targets": ["c"]} | ALONE | changes
+    return st.load(folder_of(parse_scene(tables, name)))
+
+
+def test_legs_without_mass_change_nothing():
+    link = {"links": 1, "length": 0.03, "mass": 1e-11, "link_inertia": [1e-16, 1e-17, 1e-16]}
+    leg = zoo.CHAINS["leg"] | {"segments": [link]}
+    leg = {key: x for key, x in leg.items() if key not in ("stiffness", "damping")}
+    tree, alone = built(chain={"leg": leg}), built()
+    q, v, _, tau = next(own_tails.states(tree.nq, 1))
+    tau[2:] = 0
+    v_dot = alone.forward_dynamics(q[:9], v[:8], tau[:2])
+    assert block_error(tree.forward_dynamics(q, v, tau)[:8], v_dot) < 1e-6
+
+
+def test_it_does_not_matter_which_chain_is_the_tail():
+    """The same animal with the chains exchanged: the same H, C and v_dot with exchanged rows."""
+    second = {"kind": "continuum", "segments": 1, "mass": "2 g", "length": "90 mm"}
+    placed = {"mount": [0.0, 0.05, 0.01], "mount_angles": [0.2, 0.1, 3.0]}
+    first = {"kind": "articulated", "segments": 1, "links": 3, "mass": "3 g", "length": "0.2 m"}
+    first |= {"mount": zoo.MOUNTED["tail_mount"], "mount_angles": zoo.MOUNTED["mount_angles"]}
+    one = built(
+        chain={"second": second | placed},
+        parameters=ALONE["parameters"] | {"tail_mass": 3e-3, "tail_length": 0.2},
+    )
+    of_tail = {"tail_mass": 2e-3, "tail_length": 0.09, "tail_mount": placed["mount"]}
+    parameters = zoo.TORSO | of_tail | {"mount_angles": placed["mount_angles"]}
+    keys = {"kind": "continuum", "segments": 1, "samples": 5, "parameters": parameters}
+    tables = {"functions": FEW, "targets": ["c"]} | keys | {"chain": {"first": first}}
+    other = st.load(folder_of(parse_scene(tables, "other")))
+    q, v, _, tau = next(own_tails.states(one.nq, 1))
+    swap = np.r_[0:6, 8:10, 6:8]
+    q2, v2, tau2 = q[np.r_[0:7, 9:11, 7:9]], v[swap], tau[[2, 3, 0, 1]]
+    H = one.mass_matrix(q)
+    assert mass_matrix_error(other.mass_matrix(q2), H[np.ix_(swap, swap)]) < 1e-14
+    assert force_error(other.bias_force(q2, v2), one.bias_force(q, v)[swap], H) < 1e-13
+    most = FORWARD * equilibrated_condition(H)
+    expected = one.forward_dynamics(q, v, tau)[swap]
+    assert block_error(other.forward_dynamics(q2, v2, tau2), expected) < most
+
+
+# ---- the gecko -----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def gecko():
+    """The packaged gecko with legs of mass."""
+    return st.build("gecko_legs", functions=["+implicit"], targets=["c"])
+
+
+def test_a_pair_at_equal_angles_neither_yaws_nor_rolls(gecko):
+    q, v, tau = np.zeros(gecko.nq), np.zeros(gecko.nv), np.zeros(gecko.layout.nt)
+    q[3], q[7], v[6] = 1, 0.4, 3.0  # the tail turns upward alone
+    for pair in ("hind", "fore"):
+        for side in ("right", "left"):
+            chain = gecko.layout[f"{pair}_{side}"]
+            q[chain.q], v[chain.v], tau[chain.tau] = (0.3, -0.5), (2.0, -7.0), (1e-6, 3e-6)
+    v_dot = gecko.forward_dynamics(q, v, tau)
+    assert np.abs(v_dot[[0, 4, 5]]).max() < 1e-12 * np.abs(v_dot).max()
+    for pair in ("hind", "fore"):
+        right, left = (v_dot[gecko.layout[f"{pair}_{side}"].v] for side in ("right", "left"))
+        np.testing.assert_allclose(left, right, rtol=1e-11)
+
+
+@pytest.mark.parametrize("method", ["tsit5", "dp8", "rk4", "ros34pw2", "implicit_euler"])
+def test_a_flight_keeps_momentum_and_energy(gecko, method):
+    v = 3 * np.random.default_rng(2).normal(size=gecko.nv)
+    q = gecko.state(height=1.0).q
+    fixed = {"rk4": {"step": 1e-4}, "implicit_euler": {"step": 2e-6}}
+    settings = fixed.get(method, {"rtol": 1e-8})
+    motion = st.simulate(gecko, q, v, t_span=0.05, method=method, **settings)
+    (_, before), (_, after) = (gecko.momentum(motion.q[k], motion.v[k]) for k in (0, -1))
+    most = 1e-3 if method == "implicit_euler" else 1e-6
+    assert np.abs(after - before).max() < most * np.abs(before).max()
+    energy = motion.kinetic + motion.potential
+    assert abs(energy[-1] - energy[0]) < most * motion.kinetic[0]
+
+
+def test_rolling_over_takes_a_gecko_more_tail_because_it_has_legs():
+    """The roll by momentum of a straight tail at right angles that circles about the body's axis,
+    with B and the root on the axis: Siddall's gecko needs 345 degrees for 180, without legs 217.
+    """
+    tail = {"links": 1, "functions": ["mass_matrix"], "targets": ["c"]}  # which does not curl
+    for chains, expected, error in ({}, 345, 4), ({"chain": {}}, 217, 2):
+        model = st.build("gecko_legs", **tail, **chains)
+        q = np.zeros(model.nq)
+        q[3], q[7] = 1, np.pi / 2  # beta_1 then turns the tail about the body's axis
+        H = model.mass_matrix(q)
+        with row(expected):
+            assert 180 * abs(H[4, 4] / H[4, 7]) == pytest.approx(expected, abs=error)
