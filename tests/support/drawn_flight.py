@@ -45,6 +45,7 @@ class Drawn:
             "tail_mass": 0.009,
             "gravity": 9.8,
         }
+        self.passive_values = self.parameters
 
     @property
     def joints_each(self):
