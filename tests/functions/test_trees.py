@@ -7,6 +7,7 @@ from serpentail_codegen.functions.catalogue import function_of
 from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.pipeline import tail_of
 from serpentail_codegen.scene.parse import parse_scene
+from serpentail_scene.parameters import PASSIVE
 from tests.functions.test_own_segments import accelerated
 from tests.references.body_set import Animal, Chain, Link
 from tests.references.metrics import (
@@ -15,6 +16,7 @@ from tests.references.metrics import (
     force_error,
     mass_matrix_error,
 )
+from tests.references.passive import PassiveTail
 from tests.support import own_tails, zoo
 from tests.support.program_runs import FLOATS, interpreted
 from tests.support.rows import row
@@ -37,20 +39,13 @@ TREE = Animal(
 
 
 def passive(model, q, v):
-    """Generalised forces of springs, damping and stops of the zoo's tree by their definitions."""
-    p, force = model.parameters, np.zeros(model.nv)
-    angles, rates = q[7:], v[6:]
-    for side in (slice(4, 6), slice(6, 8)):
-        elastic = np.array(p["leg_stiffness"]) * (angles[side] - np.array(p["leg_rest"]))
-        force[6:][side] = elastic + np.array(p["leg_damping"]) * rates[side]
-    last = slice(10, 12)
-    force[6:][last] = np.array(p["third_damping"]) * rates[last]
-    for way, end in ((-1, "lower"), (1, "upper")):
-        depth = way * (angles[last] - np.array(p[f"third_stop_{end}"]))
-        width = np.array(p["third_stop_width"])
-        s, beyond = np.clip(depth / width, 0, 1), np.maximum(depth / width - 1, 0)
-        stiffness = np.array(p["third_stop_stiffness"])
-        force[6:][last] += way * stiffness * width * (s**3 - s**4 / 2 + beyond)
+    """Generalised forces of springs, damping and stops of the zoo's tree, chain by chain."""
+    force = np.zeros(model.nv)
+    for first, owner in ((4, "leg"), (6, "leg"), (10, "third")):
+        names = {f"{owner}_{p.name.removeprefix('tail_')}": p.name for p in PASSIVE}
+        own = {names[n]: x for n, x in model.parameters.items() if n in names}
+        angles, rates = q[7 + first : 9 + first], v[6 + first : 8 + first]
+        force[6 + first : 8 + first] = PassiveTail(own, 2).force(angles, rates)
     return force
 
 

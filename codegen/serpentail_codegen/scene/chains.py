@@ -5,13 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from serpentail_scene.keys import CHAIN, NAME
-from serpentail_scene.parameters import (
-    NAMES,
-    PARAMETERS,
-    PASSIVE,
-    key_in_chain,
-    name_in,
-)
+from serpentail_scene.parameters import NAMES, PARAMETERS, PASSIVE, key_in_chain, name_in
 from serpentail_scene.signatures.table import ALL, OF_TREES
 
 from .checks import MOST_SEGMENTS, MOST_STRAIGHT, segments_in
@@ -111,13 +105,14 @@ def _chain(name: str, table: Mapping[str, Any], own: Mapping[str, Any], parse: P
     values |= {OF_CHAINS[n.removeprefix(f"{name}_")].name: value for n, value in own.items()}
     inner = {**keys, "functions": ["mass_matrix"], "parameters": values}
     scene = parse(inner, name)
-    needed = [n for n in REQUIRED if n in scene.parameters]
-    missing = [OF_CHAINS[key_in_chain(n)] for n in needed if n not in values]
+    needed = [p for p in FOUND if p.name in REQUIRED and p.name in scene.parameters]
+    missing = [
+        Problem(f"parameters.{p.name}", None, f"has no default: give it in {p.unit}")
+        for p in needed
+        if p.name not in values
+    ]
     if missing:
-        remedy = "has no default: give it in {}"
-        raise SceneError(
-            Problem(f"parameters.{p.name}", None, remedy.format(p.unit)) for p in missing
-        )
+        raise SceneError(missing)
     return Chain(name, table.get("pair") is True, scene)
 
 

@@ -100,8 +100,7 @@ def choose(
 def long_and_free(actuations: RunActuations, start: Start, parameters: RunParameters) -> bool:
     """Tell whether it is a single long run in which neither damping nor torques act."""
     long = not start.many and start.end - start.start >= LONG
-    layout = actuations.model.layout
-    values = of_all_coordinates(layout, parameters.values)
+    values = of_all_coordinates(actuations.model.layout, parameters.values)
     if not long or np.any(values.get("tail_damping", 0.0)):
         return False
     return not any(each.acts for each in actuations.distinct)
