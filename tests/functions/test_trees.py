@@ -207,7 +207,7 @@ def check_against_pinocchio(seed):
     assert force_error(result("inverse_dynamics", q=q, v=v, v_dot=v_dot), force, H) < 1e-13
     expected = accelerated(H, np.concatenate([np.zeros(6), tau]) - bias)
     error = block_error(result("forward_dynamics", q=q, v=v, tau=tau), expected)
-    assert error < FORWARD * equilibrated_condition(H)
+    assert error < FORWARD * max(100, equilibrated_condition(H))  # both round
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -59,6 +59,7 @@ def chain_entry(chain: Tail) -> dict[str, Any]:
         "name": chain.name or "tail",
         "parameters": chain.owner or "tail",
         "mirrored": chain.mirrored,
+        "bend_range": chain.bend_range,
         "segments": [chain.segments_before, chain.segments_before + chain.segments],
         "points": [chain.points_before, chain.points_before + chain.tail_points],
     }

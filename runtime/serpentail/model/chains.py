@@ -38,6 +38,16 @@ def owner_of(entry: Mapping[str, Any]) -> str:
     return "" if entry["parameters"] == "tail" else str(entry["parameters"])
 
 
+def bend_ranges(manifest: Mapping[str, Any]) -> np.ndarray:
+    """Return the range (m,), rad, within which the bend of each segment stays if it is an arc."""
+    usual = manifest["scene"].get("bend_range", np.inf)
+    parts = [
+        [entry.get("bend_range", usual)] * (entry["segments"][1] - entry["segments"][0])
+        for entry in entries(manifest)
+    ]
+    return np.concatenate(parts)
+
+
 def layout_of(manifest: Mapping[str, Any], kinds: tuple[str, ...]) -> Layout:
     """Return the layout of a model whose segments are of these kinds."""
     fixed = manifest["scene"].get("base") == "fixed"

@@ -16,6 +16,7 @@ from serpentail_scene.layout import PER_SEGMENT, QUATERNION
 from ..basics.checks import real_array, refuse_not_finite
 from ..basics.errors import StateError
 from ..compiling.threads import shared
+from .chains import bend_ranges
 from .fast_call import Call, fast_call, no_call
 from .library import NOT_POSITIVE_DEFINITE, OUT_OF_RANGE, BatchLibrary, RecordFunction
 from .memory import Out, address_of, aligned, aligned_rows, received
@@ -113,7 +114,7 @@ class Kernel:
         self.function = getattr(library, f"{manifest['prefix']}_batch_{name}")
         self.function.argtypes = [ctypes.c_void_p]
         self.parameters, self.work = parameters, manifest["work"][name]
-        self.bend_range = manifest["scene"].get("bend_range")
+        self.bend_ranges = bend_ranges(manifest)
         self.polar = manifest["scene"]["coordinates"] == "polar"
         self.kinds = manifest["dimensions"].get("kinds") or ("continuum",)  # of all: arcs alone
         self.thread = threading.local()  # buffers of each thread
@@ -271,8 +272,8 @@ class Kernel:
         first, second = tail[::PER_SEGMENT], tail[1::PER_SEGMENT]
         bends = abs(second) if self.polar else np.hypot(first, second)
         bends = np.where(np.array(self.kinds) == "continuum", bends, 0.0)  # only arcs have a range
-        least, worst = int(bends.argmin()), int(bends.argmax())
-        if self.polar and bends[worst] <= self.bend_range:
+        least, worst = int(bends.argmin()), int((bends / self.bend_ranges).argmax())
+        if self.polar and bends[worst] <= self.bend_ranges[worst]:
             what = f"segment {least + 1}{state} has theta = {bends[least]:.6g} rad"
             return (
                 f"{what}: polar coordinates have no value at theta = 0; use "
@@ -280,5 +281,6 @@ class Kernel:
             )
         return (
             f"segment {worst + 1}{state} is bent by {bends[worst]:.6g} rad, beyond the scene's "
-            f"{self.bend_range:.6g}: set a larger `bend_range`, then generate the model again"
+            f"{self.bend_ranges[worst]:.6g}: set a larger `bend_range`, then generate the model "
+            "again"
         )

@@ -9,6 +9,7 @@ import numpy as np
 from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, Layout
 
 from ..basics.errors import ModelError
+from ..model.chains import bend_ranges
 from ..model.model import Model
 from ..model.parameters import total_mass
 
@@ -100,14 +101,14 @@ def tail_angles(model: Model, rng: np.random.Generator, kind: str, k: int) -> np
     continuum stay within its range, also where a law moves on from the state.
     """
     size = model.layout.nt
-    reach = model.manifest["scene"].get("bend_range", np.inf)
+    reach = bend_ranges(model.manifest)
     if kind == "straight":
         return np.zeros(size)
     if kind == "random":
-        return rng.uniform(-1, 1, size) * min(1, reach / 4)
+        return rng.uniform(-1, 1, size) * np.repeat(np.minimum(1, reach / 4), 2)
     bent, turned = np.zeros(size), np.zeros(size)
     if "continuum" in model.kinds:
-        bends = [rng.uniform(0.3, 0.6) * reach * direction(rng, 2) for _ in range(model.segments)]
+        bends = [rng.uniform(0.3, 0.6) * most * direction(rng, 2) for most in reach]
         bent = np.concatenate(bends)
     if "articulated" in model.kinds:
         near_pi = rng.choice([-np.pi, np.pi], size) + rng.uniform(-0.01, 0.01, size)
