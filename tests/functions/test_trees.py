@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from serpentail.verification.report import laws
 from serpentail_codegen.functions.catalogue import function_of
 from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.pipeline import tail_of
@@ -138,6 +139,11 @@ def test_torques_of_pfl_give_the_accelerations():
     torques = model.pfl(q, v, v_dot[6:])
     found = model.forward_dynamics(q, v, torques)[6:]
     assert np.abs(found - v_dot[6:]).max() < 1e-9 * np.abs(v_dot).max()
+
+
+def test_every_law_holds():
+    wrong = [check for check in laws(zoo.model("tree")) if check.error > check.limit]
+    assert not wrong
 
 
 # ---- random trees -------------------------------------------------------------------------------

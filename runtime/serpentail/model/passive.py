@@ -60,14 +60,14 @@ def behind_stops(model: "Model", angles: Any) -> str:
 
 
 def idle(values: Mapping[str, Any], parts: tuple[str, ...]) -> dict[str, float]:
-    """Return changes of parameters under which "stops", "damping" and "spring" do nothing."""
-    changes: dict[str, float] = {}
-    if "stops" in parts and "tail_stop_lower" in values:
-        changes |= {name: sign * OUT_OF_REACH for name, sign in ENDS}
-    for part, name in (("damping", "tail_damping"), ("spring", "tail_stiffness")):
-        if part in parts and name in values:
-            changes[name] = 0.0
-    return changes
+    """Return changes of parameters under which "stops", "damping" and "spring" of all chains do
+    nothing.
+    """
+    idling = {"stops": {"_stop_lower": -OUT_OF_REACH, "_stop_upper": OUT_OF_REACH}}
+    idling |= {"damping": {"_damping": 0.0}, "spring": {"_stiffness": 0.0}}
+    ends = [pair for part in parts for pair in idling[part].items()]
+    names = [name for name in values if not name.endswith("_stop_stiffness")]
+    return {name: value for end, value in ends for name in names if name.endswith(end)}
 
 
 def _of(values: Mapping[str, Any], name: str) -> np.ndarray:

@@ -74,7 +74,7 @@ def passive_tails_change_energy_by_their_damping_alone(model: Model, s: Case) ->
     """In flight, momentum changes by - M g t and energy by the work of the tail's damping; springs
     and stops store energy and give it back. The tail starts between its stops.
     """
-    values, q = model.parameters, s.q.copy()
+    values, q = model.passive_values, s.q.copy()
     tail = np.clip(q[model.layout.tail_q], -1, 1)
     if "tail_stop_lower" in values:
         tail = np.clip(tail, values["tail_stop_lower"], values["tail_stop_upper"])
@@ -98,7 +98,7 @@ def implicit_steps_know_the_passive_tail(model: Model, s: Case) -> Errors:
     """High up and untracked, (1 - w J) k = r with J of springs and both dampings, relative to
     cond(H).
     """
-    w, damping, values = 1e-3, np.linspace(1e-3, 2e-3, len(s.tau)), model.parameters
+    w, damping, values = 1e-3, np.linspace(1e-3, 2e-3, len(s.tau)), model.passive_values
     H = model.mass_matrix(s.q).astype(float)
     k_q, k_v, *_ = implicit_step(model, s, w, damping, np.zeros(2))
 

@@ -150,7 +150,7 @@ def energy_changes_by_the_power_of_the_torques(model: Model, s: Case) -> Errors:
 
     power, largest = slope(energy, rate)
     rates = s.v[model.layout.tail_v]
-    damped = np.asarray(model.parameters.get("tail_damping", 0.0)) * rates
+    damped = np.asarray(model.passive_values.get("tail_damping", 0.0)) * rates
     return relative(power.sum(), rates @ (s.tau - damped), rate * largest.sum())
 
 
