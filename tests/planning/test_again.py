@@ -94,8 +94,8 @@ def test_interrupt_and_time_limit_end_a_solve_inside_and_return_its_iterate(name
     timer.join()
     assert plan.report["stopped"] == "interrupt" and signal.getsignal(signal.SIGINT) is before
     begun = time.perf_counter()
-    cut = endless(time_limit=0.2)
-    assert time.perf_counter() - begun >= 0.2
+    cut = endless(time_limit=1.0)
+    assert time.perf_counter() - begun >= 1.0
     assert cut.report["stopped"] == "time limit" and cut.report["iterations"] > 1
     for each in (plan, cut):
         assert not each.success and np.isfinite(numbers(each)).all()
