@@ -102,7 +102,12 @@ def build(
     keys, parameters = separated(options, _chains({**tables, **options}))
     if "contacts" in keys and path is not None:
         tables = with_contacts(tables, keys["contacts"])
-    chosen = built(tables | keys, path.stem if path else _name(keys), parameters)
+    try:
+        chosen = built(tables | keys, path.stem if path else _name(keys), parameters)
+    except ModelError as error:
+        if path is None:
+            error.args = (re.sub(r"(: |\n)kind: ", r"\1tail: ", str(error)),)  # our word
+        raise
     return model_from(*chosen, compiled=compiled, threads=threads)
 
 
