@@ -77,7 +77,11 @@ def real_array(
             "filled() to choose some"
         )
     if array.dtype.kind not in "fiu":
-        raise error(f"{field}: type {array.dtype}: needs real numbers")
+        if array.dtype.kind == "U":
+            raise refusal(field, value, "real numbers, not texts: remove the quotes", error)
+        own = ": take its .q or .v" if hasattr(value, "q") else ""
+        kind = type(value).__name__ if array.dtype == object else array.dtype
+        raise error(f"{field}: type {kind}: needs real numbers{own}")
     with np.errstate(
         over="ignore"
     ):  # numbers too large for float become inf, which is refused later

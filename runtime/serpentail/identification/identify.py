@@ -10,7 +10,7 @@ import numpy as np
 from ..basics.checks import number, refusal
 from ..basics.errors import IdentificationError, ModelError
 from ..basics.progress import Stage
-from ..model.model import Model
+from ..model.model import Model, checked_model
 from ..model.state import Quantity
 from .data_checks import refuse_scale, refuse_too_few, warn_of_swaps
 from .marker_files import read_markers
@@ -148,8 +148,7 @@ def identify(
 
 def check_model(model: Any, estimate: Any) -> None:
     """Raise an error if a model cannot be identified, because of its kind or missing functions."""
-    if not isinstance(model, Model):
-        raise refusal("model", model, "a Model, as serpentail.load returns", IdentificationError)
+    checked_model(model, IdentificationError)
     refuse_unlike(model, "identify")
     model.serve("identify")
     model.need(*FUNCTIONS)

@@ -201,7 +201,7 @@ class Identification(NearNames):
         return as_text(rows)
 
     def __repr__(self) -> str:
-        head = f"<Identification of {self.model.name}: {len(self.trials)} trials, noise "
+        head = f"<Identification of {self.model.name}, trials: {len(self.trials)}, noise "
         head += f"{1e3 * self.noise:.3g} mm, {'converged' if self.success else 'NOT converged'}"
         lines = [*map(str, self.parameters), *(f"undetermined: {x}" for x in self.undetermined)]
         return "\n  ".join([head, *lines]) + ">"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict, get_type_hints
 
 import numpy as np
 
@@ -27,17 +27,27 @@ Quantities = Quantity | Sequence[Any] | np.ndarray  # also rows of these
 Span = Quantity | Sequence[Quantity] | np.ndarray  # s
 WIDTH = 96  # characters of a line in a REPL
 ANGLES = ("pitch", "roll", "yaw")
-START = {  # the words, with the units of their numbers
-    "height": Key("m"),
-    "position": Key("m", depth=1),
-    **dict.fromkeys(ANGLES, Key("rad")),
-    "velocity": Key("m/s", depth=1),
-    "spin": Key("rad/s", depth=1),
-    "bend": Key("rad", depth=2),
-    "bend_rate": Key("rad/s", depth=2),
-}
 OTHER_WORDS = {"rate": "spin", "bends": "bend"}  # which say the same
-START |= {other: START[word] for other, word in OTHER_WORDS.items()}
+
+
+class StateWords(TypedDict, total=False):
+    """The words, with the units of their numbers."""
+
+    height: Annotated[Quantity, Key("m")]
+    position: Annotated[Quantities, Key("m", depth=1)]
+    pitch: Annotated[Quantity, Key("rad")]
+    roll: Annotated[Quantity, Key("rad")]
+    yaw: Annotated[Quantity, Key("rad")]
+    velocity: Annotated[Quantities, Key("m/s", depth=1)]
+    spin: Annotated[Quantities, Key("rad/s", depth=1)]
+    bend: Annotated[Quantities, Key("rad", depth=2)]
+    bend_rate: Annotated[Quantities, Key("rad/s", depth=2)]
+    rate: Annotated[Quantities, Key("rad/s", depth=1)]
+    bends: Annotated[Quantities, Key("rad", depth=2)]
+
+
+_HINTS = get_type_hints(StateWords, include_extras=True)
+START: dict[str, Key] = {word: hint.__metadata__[0] for word, hint in _HINTS.items()}
 OF_TAIL = ("bend", "bend_rate")
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, Unpack, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,7 +17,7 @@ from .functions import Array
 from .lazy import lazy_property
 from .names import Names
 from .parameters import total_mass
-from .state import State, state_of
+from .state import State, StateWords, state_of
 
 if TYPE_CHECKING:
     from .model import Model
@@ -59,7 +59,7 @@ class ModelStates:
         """Mass of torso and tail (kg)."""
         return float(total_mass(self.parameters))
 
-    def state(self, **words: Any) -> State:
+    def state(self, **words: Unpack[StateWords]) -> State:
         """Describe a state by words, as ``[simulate.start]`` of a scene does; the rest is 0.
 
         Parameters

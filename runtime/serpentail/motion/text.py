@@ -121,4 +121,4 @@ def _ended(motion: "Trajectory") -> list[str]:
     if "failure" in motion.info:
         return [f"failed: {motion.info['failure']}"]
     warnings = motion.info.get("warnings", [])
-    return [f"{len(warnings)} warnings, the first: {warnings[0]}"] if warnings else []
+    return [f"warnings of the run: {len(warnings)}, the first: {warnings[0]}"] if warnings else []

@@ -10,7 +10,7 @@ from serpentail_scene.messages import nearest
 from ..basics import extras
 from ..basics.checks import Refusals
 from ..basics.errors import PlanningError
-from ..model.model import Model
+from ..model.model import Model, checked_model
 from ..model.state import Quantities, Quantity, State
 from ..motion.trajectory import Trajectory
 from ..simulation.controllers.schedules import Legs
@@ -134,7 +134,7 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     >>> plan.success, plan.report["effort"]  # doctest: +SKIP
     """
     extras.needed("casadi", "plan")
-    model.refuse_fixed("plan")
+    checked_model(model, PlanningError).refuse_fixed("plan")
     refused = Refusals(PlanningError)
     known: dict[str, Any] = {name: old[name] for name in old if name in PLACES}
     for name in known:

@@ -55,7 +55,7 @@ def _with(part: Any, path: list[str], value: Any, name: str) -> Any:
     if isinstance(part, list) and PLACE.fullmatch(first) and int(first) < len(part):
         k = int(first)
         return [*part[:k], _with(part[k], rest, value, name), *part[k + 1 :]]
+    needed = f"a place from 0 to {len(part) - 1}" if isinstance(part, list) else "a name in a table"
     raise SimulationError(
-        f"change {shown(name)}: {shown(first)} is not in {shown(part)}: name a key, or a place "
-        "from 0"
+        f"change {shown(name)}: {shown(first)} is not in {shown(part, 70)}: needs {needed}"
     )

@@ -5,6 +5,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 from serpentail_scene.messages import one_line
@@ -27,7 +28,7 @@ Row = dict[str, Any]  # of the table, or of a run's numbers
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Two runs or more beside each other; ``print`` shows all numbers that differ.
+    """Two runs or more beside each other; ``print`` shows what differs, and warnings.
 
     Attributes
     ----------
@@ -46,7 +47,8 @@ class Comparison:
         return _table(list(self.motions), [row for row in self.rows if row["number"] in LABELS])
 
     def __str__(self) -> str:
-        return _table(list(self.motions), self.rows)
+        doubts = [f"{name}: {each}" for name, run in self.motions.items() for each in run.warnings]
+        return "\n".join([_table(list(self.motions), self.rows), *doubts])
 
     def plot(self, *panels: str, **options: Any) -> Any:
         """Draw the runs over time, as ``serpentail.plot`` does; return figure and axes."""
@@ -146,4 +148,4 @@ def _table(names: list[str], rows: list[Row]) -> str:
     table = [[line[0], *(one_line(cell.strip(), WIDEST) for cell in line[1:])] for line in table]
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     lines = ["  ".join(map(str.ljust, line, widths)).rstrip() for line in table]
-    return "\n".join([*lines, one_line(f"equal: {', '.join(equal) or 'none'}", WIDTH)])
+    return "\n".join([*lines, *wrap(f"equal: {', '.join(equal) or 'none'}", WIDTH)])

@@ -9,7 +9,7 @@ from typing import Any
 from ..basics.errors import ModelError, ViewError
 from ..model.load import model_from
 from ..model.manifest import read_folder, restored
-from ..model.model import Model
+from ..model.model import Model, checked_model
 from ..model.parameters import independent
 from ..motion.trajectory import Trajectory
 
@@ -68,10 +68,7 @@ def checked_models(motions: list[Trajectory], model: Any) -> list[Model]:
                 f"motions[{k}]: was loaded from a file, which has no model: give "
                 "model=st.load(folder)"
             )
-        if used is model and not isinstance(model, Model):
-            raise ViewError(
-                f"model: type {type(model).__name__}: needs a Model, as st.load returns"
-            )
+        checked_model(used, ViewError)
         if motion.q.shape[1] != used.nq:
             raise ViewError(
                 f"motions[{k}]: q has {motion.q.shape[1]} numbers, {used.name} has {used.nq}: "

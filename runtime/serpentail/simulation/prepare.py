@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ..basics.checks import number, shown
+from serpentail_scene.messages import nearest
+
+from ..basics.checks import none_of, number, shown
 from ..basics.errors import ModelError, SimulationError, StateError
 from ..model.chains import of_all_coordinates
 from ..model.kernel import RunKernel
@@ -29,6 +31,7 @@ from .methods import (
 )
 from .records import Records
 from .runs.single import RunSet
+from .settings import RunSettings
 from .start import EPS, MOST_STEPS, Start, refuse_endless
 
 # what others call settings of ours, and what these are
@@ -112,7 +115,7 @@ def place_of(model: Model) -> str:
 
 
 def refuse_misplaced(model: Model, settings: dict[str, Any]) -> None:
-    """SimulationError about a setting that belongs elsewhere."""
+    """SimulationError about a setting that belongs elsewhere, or is misspelt."""
     for key, value in settings.items():
         if key in model.parameters:
             given = f"model.with_parameters({key}={shown(value)})"
@@ -120,6 +123,8 @@ def refuse_misplaced(model: Model, settings: dict[str, Any]) -> None:
         if key in ELSEWHERE:
             given = shown(value) if key in T_SPAN else ""
             raise SimulationError(f"{key}: is no setting: {ELSEWHERE[key]}{given}")
+        if key not in RunSettings.__annotations__ and nearest(key, RunSettings.__annotations__):
+            raise SimulationError(none_of("setting", key, RunSettings.__annotations__))
 
 
 def refuse_vanishing(start: Start, name: str, step: float) -> None:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ..basics.errors import SimulationError
 from ..basics.plausible_values import warn_of_degrees
 from ..compiling.threads import checked_threads
-from ..model.model import Model
+from ..model.model import Model, checked_model
 from ..model.state import SPAN, Quantity, Span, State, parted
 from ..motion.derived import AGAIN
 from ..motion.trajectory import Trajectory
@@ -189,7 +189,7 @@ def simulate(
     >>> law = st.Damping(1e-4)
     >>> motion = st.simulate(model, q0, v0, controller=law, t_span=0.4)  # doctest: +SKIP
     """
-    model.need("rollout", "energy", "momentum")
+    checked_model(model, SimulationError).need("rollout", "energy", "momentum")
     state, t_span = parted(model, q0, v0, t_span)
     start = Start.checked(model, state, t_span, settings.pop("output_step", None))
     watch = checked_watch(settings.pop("watch", None), start.many)

@@ -2,10 +2,9 @@
 
 from typing import TYPE_CHECKING
 
-from ...basics.checks import shown
 from ...basics.errors import ModelError
 from ...basics.extras import needed
-from ...model.model import Model
+from ...model.model import Model, checked_model
 
 if TYPE_CHECKING:
     from .jax_functions import JaxFunctions
@@ -45,7 +44,7 @@ def jax_functions(model: Model) -> "JaxFunctions":
     >>> functions = st.jax_functions(model)  # doctest: +SKIP
     >>> jax.grad(lambda tau: functions.forward_dynamics(q, v, tau)[3])(tau)  # doctest: +SKIP
     """
-    _refuse_others(model)
+    checked_model(model, ModelError)
     needed("jax", "jax")
     from .jax_functions import JaxFunctions
 
@@ -76,14 +75,8 @@ def torch_functions(model: Model) -> "TorchFunctions":
         When a function is called: the scene left it out; a shape or type is wrong, or a value is
         not finite.
     """
-    _refuse_others(model)
+    checked_model(model, ModelError)
     needed("torch", "torch")
     from .torch_functions import TorchFunctions
 
     return TorchFunctions(model)
-
-
-def _refuse_others(model: object) -> None:
-    """ModelError unless it is a model."""
-    if not isinstance(model, Model):
-        raise ModelError(f"model: value {shown(model)}: needs a model, as st.load returns it")

@@ -24,8 +24,8 @@ def bundle(model: Model) -> bytes:
         if value != defaults.get(name):
             raise ExportError(
                 f"{name}: value {shown(value)}: a bundle has the scene's, "
-                f"{shown(defaults.get(name))}: export the model as st.load(folder) returns it, and "
-                "give the change to st.load where the bundle is unpacked"
+                f"{shown(defaults.get(name))}: write it below [parameters] of a scene file and "
+                "export that, or export st.load(folder) and change what st.load makes of it there"
             )
     return zipped({f"{name_of(model)}/{n}": x for n, x in model.checked.contents().items()})
 

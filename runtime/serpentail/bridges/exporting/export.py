@@ -9,7 +9,7 @@ from ...basics.checks import one_of, shown
 from ...basics.errors import ExportError
 from ...basics.files import refuse_unwritable, replacing
 from ...model.chains import refuse_several
-from ...model.model import Model
+from ...model.model import Model, checked_model
 from .bundle import name_of
 
 SUFFIXES = {  # the first of a kind is the usual one
@@ -55,8 +55,7 @@ def export(model: Model, kind: str, path: str | os.PathLike[str] | None = None) 
     >>> st.export(model, "mjcf", "rat.xml")  # doctest: +SKIP
     """
     one_of("kind", kind, SUFFIXES, ExportError)
-    if not isinstance(model, Model):
-        raise ExportError(f"model: value {shown(model)}: needs a model, as st.load returns it")
+    checked_model(model, ExportError)
     if kind != "bundle":
         remedy = 'export a "bundle", or a scene without tables [chain.NAME]'
         refuse_several(model, f"kind: value {kind!r}", remedy, ExportError)

@@ -4,10 +4,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...basics.checks import one_of, shown, whole_number
+from ...basics.checks import one_of, whole_number
 from ...basics.errors import ModelError, SimulationError
 from ...basics.extras import needed
-from ...model.model import Model
+from ...model.model import Model, checked_model
 from .tasks import TASKS
 from .worlds import Worlds
 
@@ -118,8 +118,7 @@ def environments(model: Model, task: str, count: int, **settings: Any) -> "Envir
 def _worlds(model: Model, task: str, count: int, settings: dict[str, Any]) -> Worlds:
     """Return the episodes of a task, once all arguments are checked."""
     needed("gymnasium", "gym")
-    if not isinstance(model, Model):
-        raise ModelError(f"model: value {shown(model)}: needs a model, as st.load returns it")
+    checked_model(model, ModelError)
     chosen = TASKS[one_of("task", task, list(TASKS), SimulationError)]
     model.refuse_fixed(chosen.name)
     checked = chosen.checked(model, settings)

@@ -95,7 +95,7 @@ class Plan(NearNames):
                 f"degree {self.rule.degree}, {len(self.trajectory.t)} samples; {SI}",
                 f"effort {effort} N^2 m^2 s, energy {energy} J, peak power {power} W",
                 f"true attitude at the end: {to_plan} deg from the plan, {to_goal} from the goal",
-                f"{told['rounds']} rounds, {told['iterations']} iterations; processor time "
+                f"rounds: {told['rounds']}, iterations: {told['iterations']}; processor time "
                 f"{told['call_cpu_s']:.3g} s, of it {told['solve_cpu_s']:.3g} s in the solver",
                 *([f"design: {chosen}"] if chosen else []),
                 *([str(told["advice"])] if told.get("advice") else []),

@@ -12,7 +12,7 @@ from serpentail_scene.layout import TORSO_V
 
 from ...basics.checks import number, numbers, refusal
 from ...basics.errors import SimulationError
-from ...model.model import Model
+from ...model.model import Model, checked_model
 from ...model.state import Quantity
 from .parts import Parts
 from .piecewise import Piecewise, checked_nodes, spline
@@ -68,7 +68,7 @@ class Pfl:
         feedforward: bool = True,
         torque: Any = None,
     ):
-        self.model = model
+        self.model = checked_model(model, SimulationError)
         needed = NEEDED[:1] if model.fixed else NEEDED
         if not model.has("pfl"):
             model.need(*needed)
