@@ -71,6 +71,7 @@ def test_a_model_is_made_once_and_anew_for_what_shapes_its_code(generations, tmp
 
 REFUSED = [
     (None, {"segmens": 3}, "segmens: value 3: .*'segments'"),
+    (None, {"kind": "mixed"}, "kind: value 'mixed': .*'tail'"),
     (None, {"m": 2}, "m: value 2.*'segments'"),
     (None, {**TINY, "torso_mas": 1}, "torso_mas: .*'torso_mass'"),
     (None, {**TINY, "mu": 1}, "mu: value 1: nothing touches the ground by it"),

@@ -44,6 +44,8 @@ WRONG = """\
 import serpentail as st
 model = st.load("generated/rat", {"tail_mass": "3 g"})
 start = model.state(height=0.3)
+model.state(heigth=0.3)  # wrong
+st.compare([st.simulate(model, start), 3])  # wrong
 st.nonsense()  # wrong
 st.simulate(model, start, controler=st.Damping(1e-4))  # wrong
 st.plan(model, start=start, duration=0.3, bound=st.Bounds(torque=0.01))  # wrong
@@ -98,6 +100,16 @@ def test_a_name_that_does_not_exist_tells_the_nearest_three():
             getattr(whole, asked)
         near = str(caught.value).split(" are ")[1].split(", ")
         assert near[0] == meant and len(near) == 3 and {*near} <= {*dir(whole)}
+    for whole, name, place in (
+        (model, "tail_mass", ".parameters['tail_mass']"),
+        (motion, "tau_alpha_1", "['tau_alpha_1']"),
+        (motion.end, "z", "['z']"),
+    ):
+        with row(name), pytest.raises(AttributeError, match=re.escape(f"take {place}")):
+            getattr(whole, name)
+        eval(f"whole{place}", {"whole": whole})  # is there
+    with pytest.raises(KeyError, match=r"'tilt_end'.*are tilt_end_deg, "):
+        motion.summary()["tilt_end"]
     assert not hasattr(motion, "_ipython_display_")  # asked in silence, by notebooks
     with pytest.raises(AttributeError, match="not given"):  # what a property raises stays
         _ = object.__new__(st.Trajectory).energy

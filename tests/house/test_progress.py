@@ -196,7 +196,7 @@ def test_what_the_package_gives_fills_no_screen_and_says_what_it_is_and_how_it_e
         (motion, rf"{tails}.*\n  by switching: .*steps"),
         (motion.contact, "forces=array of 51 x 6 x 3"),
         (st.Trajectory.load(motion.save(tmp_path / "run.npz")), "without its model"),
-        (warned, r"\n(?=.{9,100}$)[^\n]*2 warnings, the first: word word[^\n]*\.\.\.>$"),
+        (warned, r"\n(?=.{9,100}$)[^\n]*run: 2, the first: word word[^\n]*\.\.\.>$"),
         (caught.value.trajectory, "failed: it is tired"),
         (failed, "3 runs of 21 samples, 0 to 0.05 s.*1 failed, the first run 2: it is tired"),
         (plan, f": success\n.*{plan.mesh.intervals} intervals"),

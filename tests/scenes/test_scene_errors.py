@@ -122,16 +122,17 @@ def test_changes_that_name_nothing_are_one_line():
         "x=": "--set x=",
         "x": "--set x",
         "legs.moves.²=5": "'legs.moves.²': '²' is not in [1]",
-        "legs.moves.1=5": "'legs.moves.1': '1' is not in [1]",
+        "legs.moves.1=5": "'legs.moves.1': '1' is not in [1]: needs a place from 0 to 0",
+        "x.y=5": "'x.y': 'y' is not in 2.0: needs a name in a table",
         "legs.moves.99999999999999999999=5": "is not in [1]",
         "a." * 8 + "a=5": "9 names: needs at most 8",
     }
-    table = {"legs": {"moves": [1]}}
+    table = {"legs": {"moves": [1]}, "x": 2.0}
     for text, words in rows.items():
         with row(text):
             assert words in told(st.SimulationError, lambda t: changed(table, parsed([t])), text)
     found = changed(table, {"legs.moves.0": 5, "a.b": 1})
-    assert found == {"legs": {"moves": [5]}, "a": {"b": 1}}
+    assert found == {"legs": {"moves": [5]}, "x": 2.0, "a": {"b": 1}}
     for value in ("9" * 5000, "[" * 5000, "{" + "a." * 3000 + "a=1}", "kick"):  # words: no TOML
         assert parsed([f"x={value}"]) == {"x": value}
 

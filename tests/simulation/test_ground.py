@@ -186,7 +186,7 @@ LEGS = [
     (lambda: st.Legs([0, 1], [1, 2, 3], 0), r"gamma .*\(3,\)"),
     (lambda: st.Legs([0, 1], 1, [[1, 2, 3]] * 2), r"delta .*\(2, 3\)"),
     (lambda: st.Legs([0, np.nan], 1, 2), "value nan"),
-    (lambda: st.Legs(["0"], 1, 2), "times: type"),
+    (lambda: st.Legs(["0"], 1, 2), r"times: value \['0'\].*not texts"),
     (lambda: st.Legs.ramp(1, (1, 1), 0, 1), "two angles that differ"),
     (lambda: st.Legs.ramp(1, (1, 2), 0, 0), "rate: value 0"),
 ]

@@ -1,5 +1,8 @@
 """Habits of other programs: one state in place of two, texts with units, other names."""
 
+from functools import partial
+from types import SimpleNamespace
+
 import casadi
 import numpy as np
 import pytest
@@ -87,6 +90,22 @@ def test_what_cannot_be_is_told_with_our_names():
         model.step(state, np.zeros(4), dt=1e-3)
     with pytest.raises(st.StateError, match=r"x: type MX: .*model\.casadi"):
         model.x_dot(casadi.MX.sym("x", 21), np.zeros(4))
+    for whole in (st.simulate(model, state, 0.1), [state]):
+        with row(whole), pytest.raises(st.StateError, match=r"q0: type (Traj.* \.q |list)"):
+            st.simulate(model, whole, 0.1)
+    with pytest.raises(st.StateError, match=r"mass_matrix: q: type State: .*its \.q or \.v"):
+        model.mass_matrix(state)
+    for other, words in ((SimpleNamespace(model=model), r"its \.model"), (state, r"st\.build")):
+        for call in (
+            partial(st.simulate, other, state),
+            partial(st.plan, other, start=state, duration=0.3),
+            partial(st.Pfl, other, state),
+            partial(st.export, other, "fmu"),
+            partial(st.identify, other, None, {}),
+            partial(st.environment, other, "righting"),
+        ):
+            with row(call), pytest.raises(st.SerpentailError, match=f"model: .*{words}"):
+                call()
     with pytest.raises(st.SimulationError, match=r"folder: .*changes={"):
         st.scenario("kick", {"duration": 0.1})
 

@@ -78,7 +78,7 @@ def real_array(
         )
     if array.dtype.kind not in "fiu":
         if array.dtype.kind == "U":
-            raise refusal(field, value, "real numbers, not texts: remove the quotes", error)
+            raise refusal(field, value, f"real numbers{_no_text(value) or ', not texts'}", error)
         own = ": take its .q or .v" if hasattr(value, "q") else ""
         kind = type(value).__name__ if array.dtype == object else array.dtype
         raise error(f"{field}: type {kind}: needs real numbers{own}")

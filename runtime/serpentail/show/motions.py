@@ -4,7 +4,7 @@ import dataclasses
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from ..basics.errors import ModelError, ViewError
 from ..model.load import model_from
@@ -15,8 +15,8 @@ from ..motion.trajectory import Trajectory
 
 GENERATED = Path("generated")
 FILE = (str, os.PathLike)
-Shown = Trajectory | str | os.PathLike[str]  # a motion, or the file that has it
-Motions = Shown | Sequence[Shown] | Mapping[str, Shown]
+Shown: TypeAlias = Trajectory | str | os.PathLike[str]  # a motion, or the file that has it
+Motions: TypeAlias = Shown | Sequence[Shown] | Mapping[str, Shown]
 
 
 def checked_motions(motions: Any, names: Any, model: Any) -> tuple[list[Trajectory], Any]:
@@ -68,7 +68,8 @@ def checked_models(motions: list[Trajectory], model: Any) -> list[Model]:
                 f"motions[{k}]: was loaded from a file, which has no model: give "
                 "model=st.load(folder)"
             )
-        checked_model(used, ViewError)
+        if used is model:
+            checked_model(model, ViewError)
         if motion.q.shape[1] != used.nq:
             raise ViewError(
                 f"motions[{k}]: q has {motion.q.shape[1]} numbers, {used.name} has {used.nq}: "

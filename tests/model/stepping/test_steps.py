@@ -206,7 +206,7 @@ REFUSED = [
     ("q", np.outer(np.arange(9) < 5, UPRIGHT), "q[3:7] of run 5 is the zero"),
     ("v", np.zeros((9, 2, 10)), "v has shape (9, 2, 10)"),
     ("tau", 0.0, "tau has shape ()"),
-    ("tau", ["a"] * 4, "tau: type <U1"),
+    ("tau", ["a"] * 4, "tau: value ['a', 'a', 'a', 'a']: needs real numbers, not texts"),
     ("v", np.zeros((8, 10)), "numbers of runs differ (q 9, v 8, tau 9)"),
     ("v", np.where(np.arange(90).reshape(9, 10) == 32, np.nan, 0), "v[3, 2]: value nan"),
     ("tau", [0, np.inf, 0, 0], "tau[1]: value inf"),
