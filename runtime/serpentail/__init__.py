@@ -89,9 +89,9 @@ __all__ = list(_HOME)
 def __getattr__(name: str) -> Any:
     """Import a public name when it is first used: importing the package loads nothing else."""
     if name not in _HOME:
-        from .basics.near_names import no_attribute
+        from .basics.near_names import none_such
 
-        raise no_attribute(f"module {__name__!r}", name, __all__)
+        raise AttributeError(none_such(f"module {__name__!r} has no attribute", name, __all__))
     value = getattr(import_module(f".{_HOME[name]}", __name__), name)
     globals()[name] = value
     return value

@@ -105,8 +105,8 @@ def separated(
 def _unknown(name: str, value: object) -> ModelError:
     """Return the error about a name that is neither a scene key nor a parameter."""
     known = Options.__annotations__
-    meant = did_you_mean("tail" if name == "kind" else name, known)
-    remedy = meant or f"give some of {', '.join(known)}"
+    name_of = "tail" if name == "kind" else name  # as it is called in a scene
+    remedy = did_you_mean(name_of, known) or f"give some of {', '.join(known)}"
     return ModelError(
         f"{name}: value {shown(value)}: is neither a scene key nor a parameter; {remedy}"
     )

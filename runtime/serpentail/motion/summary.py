@@ -13,7 +13,7 @@ import numpy as np
 from serpentail_scene.layout import POSITION
 
 from ..basics.errors import SimulationError
-from ..basics.near_names import nearest_three
+from ..basics.near_names import none_such
 from ..model.model import Model
 from .body import semi_axes
 from .derived import AGAIN
@@ -43,7 +43,7 @@ class Summary(dict[str, Any]):
         return as_text(self, UNITS, self.errors)
 
     def __missing__(self, name: object) -> Any:
-        raise KeyError(f"number: value {name!r}: {nearest_three(str(name), self)}")
+        raise KeyError(none_such("number: value", name, self))
 
     def described(self) -> dict[str, dict[str, Any]]:
         """Return value, error, unit and meaning of each number by name, ready for JSON."""
