@@ -123,7 +123,7 @@ def test_motions_models_and_a_page_that_is_not_there(tmp_path, flight, monkeypat
         (None, None, r"motions\[0\]: type NoneType"),
         ([], None, "motions: none"),
         (loaded, None, r"motions\[0\]: .*model"),
-        (loaded, "generated", "model: type str"),
+        (loaded, "generated", "model: value 'generated'"),
         (loaded, zoo.model("m1_n3"), r"motions\[0\]: .*11 .*m1_n3 .*9"),
         (silent(), None, "tail_points"),
     ):
