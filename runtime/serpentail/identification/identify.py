@@ -10,7 +10,8 @@ import numpy as np
 from ..basics.checks import number, refusal
 from ..basics.errors import IdentificationError, ModelError
 from ..basics.progress import Stage
-from ..model.model import Model, checked_model
+from ..model.checked import checked_model
+from ..model.model import Model
 from ..model.state import Quantity
 from .data_checks import refuse_scale, refuse_too_few, warn_of_swaps
 from .marker_files import read_markers

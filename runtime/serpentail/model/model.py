@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..basics.checks import refusal
 from ..basics.errors import SerpentailError
 from ..basics.extras import needed
 from ..basics.near_names import NearNames
@@ -299,11 +298,3 @@ class Model(ModelMethods, ModelStates, NearNames):
         from .casadi import CasadiFunctions
 
         return CasadiFunctions(self)
-
-
-def checked_model(model: object, error: type[Exception]) -> Model:
-    """Return a model; the error about anything else says where a model is."""
-    if not isinstance(model, Model):
-        own = "such as its .model" if isinstance(getattr(model, "model", 0), Model) else ""
-        raise refusal("model", model, f"a Model, {own or 'as st.build or st.load gives'}", error)
-    return model

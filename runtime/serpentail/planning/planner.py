@@ -10,7 +10,8 @@ from serpentail_scene.messages import nearest
 from ..basics import extras
 from ..basics.checks import Refusals
 from ..basics.errors import PlanningError
-from ..model.model import Model, checked_model
+from ..model.checked import checked_model
+from ..model.model import Model
 from ..model.state import Quantities, Quantity, State
 from ..motion.trajectory import Trajectory
 from ..simulation.controllers.schedules import Legs

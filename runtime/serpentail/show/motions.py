@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from ..basics.errors import ModelError, ViewError
+from ..model.checked import checked_model
 from ..model.load import model_from
 from ..model.manifest import read_folder, restored
-from ..model.model import Model, checked_model
+from ..model.model import Model
 from ..model.parameters import independent
 from ..motion.trajectory import Trajectory
 

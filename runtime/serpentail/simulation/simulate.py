@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike
 from ..basics.errors import SimulationError
 from ..basics.plausible_values import warn_of_degrees
 from ..compiling.threads import checked_threads
-from ..model.model import Model, checked_model
+from ..model.checked import checked_model
+from ..model.model import Model
 from ..model.state import SPAN, Quantity, Span, State, parted
 from ..motion.derived import AGAIN
 from ..motion.trajectory import Trajectory

@@ -95,7 +95,7 @@ def test_other_things_than_real_numbers_are_refused(model):
         if argument == "f_ext" and value is None:
             continue  # no load
         with row(name, argument, value):
-            refuse(model, name, state() | {argument: value}, f"{argument}: type .*real numbers")
+            refuse(model, name, state() | {argument: value}, f"{argument}: .*real numbers")
     for name, argument, given in of_arguments([state(), states(5)]):
         with row(name, argument):
             masked = np.ma.masked_array(given[argument], np.zeros(given[argument].shape, bool))

@@ -4,7 +4,8 @@ from typing import TYPE_CHECKING
 
 from ...basics.errors import ModelError
 from ...basics.extras import needed
-from ...model.model import Model, checked_model
+from ...model.checked import checked_model
+from ...model.model import Model
 
 if TYPE_CHECKING:
     from .jax_functions import JaxFunctions

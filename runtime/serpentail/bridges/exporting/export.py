@@ -9,7 +9,8 @@ from ...basics.checks import one_of, shown
 from ...basics.errors import ExportError
 from ...basics.files import refuse_unwritable, replacing
 from ...model.chains import refuse_several
-from ...model.model import Model, checked_model
+from ...model.checked import checked_model
+from ...model.model import Model
 from .bundle import name_of
 
 SUFFIXES = {  # the first of a kind is the usual one

@@ -7,7 +7,8 @@ import numpy as np
 from ...basics.checks import one_of, whole_number
 from ...basics.errors import ModelError, SimulationError
 from ...basics.extras import needed
-from ...model.model import Model, checked_model
+from ...model.checked import checked_model
+from ...model.model import Model
 from .tasks import TASKS
 from .worlds import Worlds
 

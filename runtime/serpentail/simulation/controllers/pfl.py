@@ -12,7 +12,8 @@ from serpentail_scene.layout import TORSO_V
 
 from ...basics.checks import number, numbers, refusal
 from ...basics.errors import SimulationError
-from ...model.model import Model, checked_model
+from ...model.checked import checked_model
+from ...model.model import Model
 from ...model.state import Quantity
 from .parts import Parts
 from .piecewise import Piecewise, checked_nodes, spline
