@@ -37,7 +37,7 @@ def assemble_factored_dynamics(draft: Draft, arrays: dict[str, Array]) -> None:
     if not tail.fixed:
         quaternion = {"quaternion": state.quaternion}
         draft.step(rotations.quaternion_rotation, quaternion, R=arrays["R"].part(0, 9))
-    if draft.dynamics != "composite" and tail.kind == "articulated":
+    if draft.dynamics != "composite":
         factored_dynamics_by_columns(draft, arrays, entry)
         draft.factor(A, size)
         return
@@ -169,7 +169,8 @@ def factored_dynamics(draft: Draft, q: Array, v: Array) -> FactoredDynamics:
     """Call the function that factors H, and return what it gives."""
     function = FACTORED_DYNAMICS.of(draft.tail)
     arrays = {a.name: draft.array(a.name, a.length(draft.tail)) for a in function.outputs}
-    draft.call(assemble(function, draft.tail, draft.dynamics), q=q, v=v, **arrays)
+    dynamics = "composite" if draft.dynamics == "composite" else "lanes"  # segments have no H
+    draft.call(assemble(function, draft.tail, dynamics), q=q, v=v, **arrays)
     if draft.tail.fixed:
         body = {"R": draft.fixed("identity", IDENTITY), "inverse_mass": draft.zero(1)}
     else:
