@@ -3,7 +3,9 @@
 from serpentail_scene.keys import Key, one_word
 
 from ..model.state import START as WORDS
-from ..simulation.controllers.schedules import BLENDS, MOVE
+from ..simulation.controllers.moves import MOVE, TOUCH_DOWN
+from ..simulation.controllers.piecewise import SHAPES
+from ..simulation.controllers.schedules import BLENDS
 from ..simulation.methods import SETTINGS
 
 SECONDS, METRES, ANGLE = Key("s"), Key("m"), Key("rad")
@@ -17,6 +19,7 @@ SETTING = {name: SECONDS if name.endswith("step") else PURE for name in NUMBERS}
 
 START = WORDS | {"settle": Key(keys={"rounds": WHOLE, "duration": SECONDS})}
 MOVES = {name: Key(unit) for name, unit in MOVE.items()}
+MOVES |= {"at": Key("s", words=(TOUCH_DOWN,)), "shape": one_word(*SHAPES)}
 LEGS = {
     "gamma": Key("rad", depth=2),
     "delta": Key("rad", depth=2),

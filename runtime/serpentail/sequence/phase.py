@@ -4,13 +4,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..basics.checks import measured, number, one_of, refusal
+from ..basics.checks import number, one_of, refusal
 from ..basics.errors import SimulationError
 from ..basics.short_repr import brief
 from ..model.model import Model
 from ..simulation.controllers.controller import CHOICES, Controller, Phases
+from ..simulation.controllers.moves import MOVE, move_value
 from ..simulation.controllers.pfl import KD, KP
-from ..simulation.controllers.schedules import MOVE
 from ..simulation.ground import KINDS
 
 AIRBORNE, LANDING = "airborne", "landing"
@@ -91,7 +91,8 @@ class Phase:
         How the plan is tracked.
     moves : iterable of mapping, optional
         Moves of the legs, as in ``Legs.moves``. In a phase with a plan, ``before_landing`` (s)
-        may replace ``at``.
+        may replace ``at``. A move at "touch_down" begins at once if the phase before ended with
+        the touch-down of the feet.
 
     Raises
     ------
@@ -112,7 +113,7 @@ class Phase:
     controller: Controller = None
     plan: Any = None
     tracking: Tracking = field(default_factory=Tracking)
-    moves: Iterable[Mapping[str, float]] = ()
+    moves: Iterable[Mapping[str, Any]] = ()
     __repr__ = brief
 
     def __post_init__(self) -> None:
@@ -160,7 +161,7 @@ def _until(where: str, until: Any) -> Any:
     return events
 
 
-def _moves(where: str, moves: Any, planned: bool) -> tuple[Mapping[str, float], ...]:
+def _moves(where: str, moves: Any, planned: bool) -> tuple[Mapping[str, Any], ...]:
     """Return moves whose keys are known; of their numbers ``Legs.moves`` takes care."""
     if isinstance(moves, str | Mapping) or not isinstance(moves, Iterable):
         raise refusal(f"{where}: moves", moves, "an array of tables", SimulationError)
@@ -175,7 +176,7 @@ def _moves(where: str, moves: Any, planned: bool) -> tuple[Mapping[str, float], 
             raise refusal(f"{where}: moves[{k}]", dict(move), needs, SimulationError)
         listed.append(
             {
-                key: measured(f"{where}: moves[{k}].{key}", value, keys[key], SimulationError)
+                key: move_value(f"{where}: moves[{k}].{key}", key, value, keys[key])
                 for key, value in move.items()
             }
         )

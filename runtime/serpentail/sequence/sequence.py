@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,12 +17,15 @@ from ..model.model import Model
 from ..model.state import State, parted
 from ..motion.trajectory import Trajectory
 from ..simulation.controllers.controller import Controller, Phases, parts_of
+from ..simulation.controllers.moves import TOUCH_DOWN
 from ..simulation.controllers.schedules import Legs
+from ..simulation.ground import LANDED_AT
 from ..simulation.simulate import simulate
 from .flight import planned_flight
 from .phase import AIRBORNE, BEFORE, Event, Phase
 from .run import PhaseRun, SequenceRun, motion_until, whole
 
+TOUCH = f"{TOUCH_DOWN} of feet"  # what ends a phase after which legs yield at once
 SAMPLES = 400  # of a phase, to find when it is clear of the ground
 
 
@@ -134,7 +137,7 @@ class Sequence(NearNames):
         start = PhaseStart(0.0, q, v, bristles0)
         parts: list[Trajectory] = []
         runs: list[PhaseRun] = []
-        moves: list[dict[str, float]] = []
+        moves: list[dict[str, Any]] = []
         complete = True
         for phase in self.phases:
             controller, plan, landing = phase.controller, None, None
@@ -144,7 +147,8 @@ class Sequence(NearNames):
                     angles = self._last_angles(phase, moves)
                     flight = planned_flight(self.model, phase, (start.q, start.v), angles)
                     controller, plan, landing = flight.controller, flight.plan, flight.landing
-                moves += [_timed(move, start.time, landing) for move in phase.moves]
+                touches = bool(runs) and runs[-1].ended_by == TOUCH
+                moves += [_timed(move, start.time, landing, touches) for move in phase.moves]
                 motion, ended_by = self._made(phase, controller, start, moves)
             except (SimulationError, PlanningError) as error:
                 named = type(error)(f"phase {phase.name!r}: {error}")
@@ -157,6 +161,7 @@ class Sequence(NearNames):
 
             # the next phase begins where this one ends
             parts.append(motion)
+            moves = [*_begun(moves, motion.info.get(LANDED_AT))]
             end = float(motion.t[-1])
             runs.append(PhaseRun(phase.name, start.time, end, ended_by, plan))
             bristles = None if motion.contact is None else motion.contact.bristles[-1]
@@ -166,16 +171,16 @@ class Sequence(NearNames):
                 break
         return SequenceRun(whole(parts, runs, self.phases), tuple(runs), complete)
 
-    def legs(self, moves: Iterable[Mapping[str, float]]) -> dict[str, Legs]:
+    def legs(self, moves: Iterable[Mapping[str, Any]]) -> dict[str, Legs]:
         """Return the setting ``legs`` of a run with these moves; empty without feet."""
         if self.gamma is None or self.delta is None:
             return {}
         return {"legs": Legs.moves(self.gamma, self.delta, moves)}
 
-    def _last_angles(self, phase: Phase, moves: Iterable[Mapping[str, float]]) -> np.ndarray:
+    def _last_angles(self, phase: Phase, moves: Iterable[Mapping[str, Any]]) -> np.ndarray:
         """Return gamma, delta (rad) after all moves up to the end of a phase."""
         gamma, delta = self.gamma or 0.0, self.delta or 0.0
-        for move in (*moves, *phase.moves):
+        for move in (*moves, *(each for each in phase.moves if each.get("at") != TOUCH_DOWN)):
             gamma, delta = move.get("gamma", gamma), move.get("delta", delta)
         return np.array([gamma, delta])
 
@@ -184,7 +189,7 @@ class Sequence(NearNames):
         phase: Phase,
         controller: Controller,
         start: PhaseStart,
-        moves: Iterable[Mapping[str, float]],
+        moves: Iterable[Mapping[str, Any]],
     ) -> tuple[Trajectory, str]:
         """Return the motion of a phase, and what ended it."""
         settings = dict(self.settings) | self.legs(moves)
@@ -242,10 +247,26 @@ def _ended_by(motion: Trajectory, events: list[Event], end: float) -> str:
     return "duration"
 
 
-def _timed(move: Mapping[str, float], begin: float, landing: float | None) -> dict[str, float]:
-    """Return a move on the clock of the motion, from one on its phase's clock."""
+def _begun(moves: Iterable[dict[str, Any]], at: float | None) -> Iterator[dict[str, Any]]:
+    """Yield moves, that at a touch-down with the time at which it began, or not if it did not."""
+    for move in moves:
+        if move["at"] != TOUCH_DOWN:
+            yield move
+        elif at is not None:
+            yield move | {"at": at}
+
+
+def _timed(
+    move: Mapping[str, Any], begin: float, landing: float | None, touches: bool
+) -> dict[str, Any]:
+    """Return a move on the clock of the motion, from one on its phase's clock.
+
+    touches: whether the phase begins with a touch-down of the feet.
+    """
     rest = {name: value for name, value in move.items() if name not in ("at", BEFORE)}
     if landing is not None and BEFORE in move:
         before = number(f"moves.{BEFORE}", move[BEFORE], SimulationError, least=0)
         return rest | {"at": begin + max(landing - before, 0.0)}
+    if move["at"] == TOUCH_DOWN:
+        return {**move} | ({"at": begin} if touches else {})
     return rest | {"at": begin + number("moves.at", move["at"], SimulationError, least=0)}

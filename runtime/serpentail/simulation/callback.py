@@ -12,7 +12,7 @@ from ..basics.errors import SimulationError, StateError
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
 from .energies import measured
-from .ground import GroundSettings
+from .ground import LANDED_AT, GroundSettings
 from .runs.outcomes import Samples
 
 EVERY = 0.1  # s from the end of one call to the next, at least
@@ -62,4 +62,5 @@ def samples_from(samples: Samples, first: int) -> Samples:
     arrays: dict[str, Any] = {
         name: getattr(samples, name)[first:] for name in ("t", "q", "v", "tau", "bristles")
     }
-    return replace(samples, **arrays, ledger=np.zeros(0), info={}, failure=None)
+    info = {name: at for name, at in samples.info.items() if name == LANDED_AT}
+    return replace(samples, **arrays, ledger=np.zeros(0), info=info, failure=None)

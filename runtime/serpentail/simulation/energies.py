@@ -17,7 +17,7 @@ from ..model.passive import behind_stops, stored_energy
 from ..motion.archive import origin
 from ..motion.trajectory import Trajectory
 from .audit import BALANCED, Between, allowance, audited, warnings_of
-from .ground import GroundSettings
+from .ground import LANDED_AT, GroundSettings
 from .methods import ADAPTIVE, FIXED
 from .runs.outcomes import Samples
 
@@ -99,7 +99,8 @@ class Energies:
             return {"info": json.loads(json.dumps(self._info()))}
         if name == "contact":
             given = *state, samples.tau, samples.bristles
-            return {"contact": self.ground.contact(self.model, samples.t, given)}
+            landed_at = samples.info.get(LANDED_AT, np.inf)
+            return {"contact": self.ground.contact(self.model, samples.t, given, landed_at)}
         function, names = next(row for row in MEASURES.items() if name in row[1])
         found = getattr(self.model, function)(*state)
         measures = {k: np.asarray(array, float) for k, array in zip(names, found, strict=True)}

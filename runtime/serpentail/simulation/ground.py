@@ -13,7 +13,6 @@ from ..model.kernel import RunKernel
 from ..model.model import Model
 from ..model.parameters import RunParameters, total_mass
 from ..motion.contact import Contact
-from .controllers.piecewise import Piecewise
 from .controllers.schedules import Legs
 from .start import Start
 
@@ -21,6 +20,7 @@ KINDS = ("touch_down", "take_off")
 MAX_STATIC_LOAD = (
     5.0  # weights: a static force of one point beyond it means a start inside the ground
 )
+LANDED_AT = "landed_at"  # in a run's info: the time (s) at which the legs' landing began
 LEG_ANGLES = 4  # of both legs, which their rates follow
 MOST_EVENTS = 10_000  # that are kept
 
@@ -60,20 +60,25 @@ class GroundSettings:
         """Number of points that can touch the ground."""
         return sum(self.groups.values())
 
-    @property
-    def leg_curve(self) -> Piecewise | None:
-        """Leg angles as a function of time; None without feet."""
-        return None if self.legs is None else self.legs.curve
-
     def near(self, record: Any) -> dict[str, Any]:
         """The pass above the ground, of a record of C, that is the closest for its error."""
         point = {"group": self._group_of(record.near_point), "point": record.near_point}
         numbers = {name: getattr(record, f"near_{name}") for name in ("time", "height", "error")}
         return point | numbers
 
-    def legs_at(self, t: ArrayLike) -> tuple[np.ndarray, ...]:
-        """Return the argument ``legs`` (8,) or (K, 8) at t (s); nothing without feet."""
-        return () if self.legs is None else (np.concatenate(self.legs.curve.at(t)[:2], axis=-1),)
+    def legs_at(self, t: ArrayLike, landed_at: float = np.inf) -> tuple[np.ndarray, ...]:
+        """Return the argument ``legs`` (8,) or (K, 8) at t (s); nothing without feet.
+
+        landed_at: the time (s) at which the landing of the legs began, if it did.
+        """
+        if self.legs is None:
+            return ()
+        found = np.concatenate(self.legs.curve.at(t)[:2], axis=-1)
+        if self.legs.landing is not None and np.isfinite(landed_at):
+            since = np.asarray(t, float) - landed_at
+            late = np.concatenate(self.legs.landing.at(since)[:2], axis=-1)
+            found = np.where((since >= 0)[..., None], late, found)
+        return (found,)
 
     def refuse_deep(self, model: Model, start: Start, parameters: RunParameters) -> None:
         """SimulationError if a point begins deeper than a static force could press it."""
@@ -110,12 +115,17 @@ class GroundSettings:
         ends = np.cumsum(list(self.groups.values()))
         return list(self.groups)[int(np.searchsorted(ends, k, "right"))]
 
-    def contact(self, model: Model, t: np.ndarray, state: tuple[np.ndarray, ...]) -> Contact | None:
-        """Return the contact at times (K,) of (q, v, tau, bristles); None without contacts."""
+    def contact(
+        self, model: Model, t: np.ndarray, state: tuple[np.ndarray, ...], landed_at: float
+    ) -> Contact | None:
+        """Return the contact at times (K,) of (q, v, tau, bristles); None without contacts.
+
+        landed_at: as of ``legs_at``.
+        """
         if not self.groups:
             return None
         q, v, tau, bristles = state
-        legs = self.legs_at(t)
+        legs = self.legs_at(t, landed_at)
         positions, _ = model.contact_points(q, v, *legs)
         stretch = bristles.reshape(len(bristles), -1)
         forces = model.kernel("contact_rates")(q, v, tau, stretch, *legs)[2]

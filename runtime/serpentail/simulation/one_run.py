@@ -41,7 +41,7 @@ def _look(run: CompiledRun, stage: Stage, watched: Watched | None) -> None:
     done = run.record.done
     stage.tell(done / len(run.runs.start.times))
     if watched is not None:
-        watched.look(done, lambda first: run.runs.part(run.k, first, done))
+        watched.look(done, lambda first: run.part(first, done))
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +88,6 @@ class RunAgain:
     def _made(self, start: Start, ground: GroundSettings, method: IntegrationMethod) -> Samples:
         """Return the samples of a run."""
         model = start.model
-        actuations = RunActuations(Records(model), self.controller, start, ground.leg_curve)
+        actuations = RunActuations(Records(model), self.controller, start, ground.legs)
         parameters = model.parameters_of_runs(None, 1)
         return integrate(RunSet(actuations, start, ground, parameters, method))

@@ -54,11 +54,13 @@ def prepared(
         )
     parameters = model.parameters_of_runs(changes, start.runs)
     ground = GroundSettings.checked(model, start, parameters, settings)
-    actuations = RunActuations(Records(model), controller, start, ground.leg_curve)
+    actuations = RunActuations(Records(model), controller, start, ground.legs)
     choice = choose(actuations, start, parameters, method, settings)
-    if ground.stop_at and choice.name in SCIPY:
+    landing = ground.legs is not None and ground.legs.landing is not None
+    if choice.name in SCIPY and (ground.stop_at or landing):
         raise SimulationError(
-            f"stop_at: {choice.name} does not detect events: use tsit5 or ros34pw2"
+            f"{'stop_at' if ground.stop_at else 'legs: a move at touch_down'}: {choice.name} does "
+            "not detect events: use tsit5 or ros34pw2"
         )
     return RunSet(actuations, start, ground, parameters, choice)
 

@@ -12,6 +12,7 @@ from ..basics.errors import SimulationError, StateError
 from ..model.model import Model
 from ..model.state import Quantity, State
 from ..motion.trajectory import Trajectory
+from .controllers.schedules import Legs
 from .settings import RunSettings
 from .simulate import simulate
 
@@ -76,6 +77,8 @@ def settle(
     at = number("at", at, SimulationError, unit="s")
     q, v = np.asarray(q0), np.zeros(model.nv)
     given: dict[str, Any] = {"output_step": duration, "t_span": (at - duration, at), **settings}
+    if isinstance(given.get("legs"), Legs):
+        given["legs"] = given["legs"].before_landing()
     bristles = given.pop("bristles0", None)
     for _ in range(rounds):
         motion = simulate(model, q, v, bristles0=bristles, **given)

@@ -47,7 +47,8 @@ def records(has: SimulationFeatures) -> dict[str, list[Field]]:
         + SAMPLES
         + (contact_samples(has))
         + KEPT
-        + (CONTACT_KEPT if has.contacts else []),
+        + (CONTACT_KEPT if has.contacts else [])
+        + (LANDED if has.legs else []),
     }
 
 
@@ -118,7 +119,16 @@ DRIVE = fields(
     ("stops", "int", "number of times at which a torque or leg motion is not smooth"),
     ("stop_times", "const real *", "[stops] these times, increasing (s); steps end there"),
 )
-LEGS = fields(("legs", "const piecewise *", "4 channels: gamma_1, delta_1, gamma_2, delta_2 (rad)"))
+LEGS = fields(
+    ("legs", "const piecewise *", "4 channels: gamma_1, delta_1, gamma_2, delta_2 (rad)"),
+    (
+        "landing",
+        "const piecewise *",
+        "the same from a touch-down of the feet on, in one piece over the time since then; NULL: "
+        "`legs` go on",
+    ),
+    ("landing_from", "real", "the first touch-down from this time (s) on counts"),
+)
 START = fields(
     ("parameters", "const parameters *", "parameters of the model"),
     ("drive", "const drive *", "controllers and leg motion"),
@@ -204,6 +214,7 @@ CONTACT_KEPT = fields(
     ("near_height", "real", "height of the point (m)"),
     ("near_error", "real", "estimated error of the height (m), larger than it; 0: no such pass"),
 )
+LANDED = fields(("landed_at", "real", "time (s) at which `landing` began; far off: not yet"))
 
 
 def contact_samples(has: SimulationFeatures) -> list[Field]:

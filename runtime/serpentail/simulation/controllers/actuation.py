@@ -14,6 +14,7 @@ from .controller import Controller, controllers_of, parts_of, phases_of
 from .ctrl_c import CtrlC
 from .parts import NativeTorque, Parts, TorqueFunction
 from .piecewise import Piecewise
+from .schedules import Legs
 
 
 class Actuation:
@@ -24,7 +25,7 @@ class Actuation:
         records: Records,
         controller: Controller,
         span: tuple[float, float],
-        legs: Piecewise | None = None,
+        legs: Legs | None = None,
     ):
         self.records = records
         self.error: BaseException | None = None
@@ -39,10 +40,13 @@ class Actuation:
             self.float_errors = np.geterr()
         # times at which something is not smooth; steps end there
         stops = {*self._kinks(begins, span)}
-        members = {}
+        members: dict[str, Any] = {}
         if legs is not None:
-            stops |= {*legs.kinks(2).tolist()}
-            members["legs"] = self._table(legs)
+            stops |= {*legs.curve.kinks(2).tolist()}
+            members["legs"] = self._table(legs.curve)
+            if legs.landing is not None:
+                members["landing"] = self._table(legs.landing)
+                members["landing_from"] = legs.landing_from
         self.stops = records.array(sorted(stops))
         self.record = records.record(
             "drive",
@@ -196,7 +200,7 @@ class RunActuations:
     """
 
     def __init__(
-        self, records: Records, controller: object, start: Start, legs: Piecewise | None = None
+        self, records: Records, controller: object, start: Start, legs: Legs | None = None
     ):
         self.records = records
         self.span = start.start, start.end
@@ -221,7 +225,7 @@ class RunActuations:
         """The model whose tails are driven."""
         return self.records.model
 
-    def _of(self, controller: Controller, legs: Piecewise | None, k: int | None) -> Actuation:
+    def _of(self, controller: Controller, legs: Legs | None, k: int | None) -> Actuation:
         """Return the actuation of run k, or of all; SimulationError if it is impossible."""
         try:
             return Actuation(self.records, controller, self.span, legs)

@@ -10,6 +10,10 @@ from ...basics.checks import finite_array, refusal
 from ...basics.errors import SimulationError
 from ...basics.short_repr import brief
 
+# shares of the way over shares of the time, coefficients of their powers: at a constant rate; at a
+# constant acceleration, so that the rate is largest at the end; from rest to rest
+SHAPES = {"linear": (0, 1), "accelerate": (0, 0, 1), "quintic": (0, 0, 0, 10, -15, 6)}
+FASTEST = {"linear": 1.0, "accelerate": 2.0, "quintic": 1.875}  # their largest rates
 JUMP_TOLERANCE = 1e-9  # a jump that is smaller, over the largest value, is rounding
 
 
@@ -140,13 +144,25 @@ def checked_nodes(
 
 def linear(times: np.ndarray, values: np.ndarray) -> Piecewise:
     """Return straight lines between nodes; a single node gives a constant."""
+    return shaped(times, values, "linear")
+
+
+def shaped(times: np.ndarray, values: np.ndarray, *shapes: str) -> Piecewise:
+    """Return ways from node to node, each of a shape of SHAPES, or all of one; a single node gives
+    a constant.
+    """
     if len(times) == 1:
         return constant(times[0], values[0])
-    with np.errstate(over="ignore"):
-        slopes = np.diff(values, axis=0) / np.diff(times)[:, None]
-    if not np.isfinite(slopes).all():
+    rise, width = np.diff(values, axis=0), np.diff(times)[:, None]
+    shares = np.zeros((len(rise), 1, max(len(SHAPES[shape]) for shape in shapes)))
+    for piece, shape in zip(shares, np.broadcast_to(shapes, len(rise)), strict=True):
+        piece[0, : len(SHAPES[shape])] = SHAPES[shape]
+    with np.errstate(all="ignore"):
+        rows = [values[:-1]]
+        rows += [shares[..., k] * rise / width**k for k in range(1, shares.shape[-1])]
+    if not np.isfinite(rows).all():
         raise SimulationError(f"times {times.tolist()!s:.60}: too close to each other for values")
-    return Piecewise(times, np.stack([values[:-1], slopes], axis=-1))
+    return Piecewise(times, np.stack(rows, axis=-1))
 
 
 def constant(time: float, values: np.ndarray) -> Piecewise:
@@ -160,23 +176,3 @@ def spline(times: np.ndarray, values: np.ndarray, ends: object = "not-a-knot") -
 
     coefficients = CubicSpline(times, values, bc_type=ends).c  # highest powers first
     return Piecewise(times, np.moveaxis(coefficients[::-1], 0, -1))
-
-
-def blends(times: np.ndarray, values: np.ndarray) -> Piecewise:
-    """Return quintics 10 s^3 - 15 s^4 + 6 s^5 between nodes, each from rest to rest."""
-    if len(times) == 1:
-        return constant(times[0], values[0])
-    rise, width = np.diff(values, axis=0), np.diff(times)[:, None]
-    zero = np.zeros_like(rise)
-    with np.errstate(all="ignore"):
-        rows = [
-            values[:-1],
-            zero,
-            zero,
-            10 * rise / width**3,
-            -15 * rise / width**4,
-            6 * rise / width**5,
-        ]
-    if not np.isfinite(rows).all():
-        raise SimulationError(f"times {times.tolist()!s:.60}: too close to each other for a blend")
-    return Piecewise(times, np.stack(rows, axis=-1))

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from copy import copy
 from dataclasses import dataclass, field
 from typing import Any, Self
 
 import numpy as np
 
-from ...basics.checks import finite_array, number, one_of, refusal, shown
+from ...basics.checks import finite_array, number, one_of, refusal
 from ...basics.errors import SimulationError
 from ...basics.plausible_values import warn_of_degrees
 from ...basics.short_repr import brief
 from ...model.model import Model
 from ...model.state import Quantities, Quantity, shared_among_links
-from .piecewise import Piecewise, blends, checked_nodes, linear, spline
+from .moves import Moves, moves_of
+from .piecewise import Piecewise, checked_nodes, linear, shaped, spline
 
-BLENDS = {"linear": linear, "quintic": blends, "spline": spline}
+BLENDS = ("linear", "quintic", "spline")
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +68,8 @@ class Reference:
         nodes = checked_nodes("Reference", "angles", (self.times, angles), width)
         if len(nodes[0]) < 2:
             raise SimulationError("Reference: one node only: give two or more")
-        object.__setattr__(self, "curve", BLENDS[self.blend](*nodes))
+        curve = spline(*nodes) if self.blend == "spline" else shaped(*nodes, self.blend)
+        object.__setattr__(self, "curve", curve)
 
     @classmethod
     def of_bends(
@@ -128,6 +131,10 @@ class Legs:
     ----------
     curve : Piecewise
         gamma and delta of the right leg, then of the left, as a function of time.
+    landing : Piecewise or None
+        The same from a touch-down of the feet on, over the time since then; only of moves.
+    landing_from : float
+        The first touch-down from this time (s) on begins the landing.
 
     Raises
     ------
@@ -150,6 +157,8 @@ class Legs:
     gamma: Quantities
     delta: Quantities
     curve: Piecewise = field(init=False)
+    landing: Piecewise | None = field(init=False, default=None)
+    landing_from: float = field(init=False, default=0.0)
     __repr__ = brief
 
     def __post_init__(self) -> None:
@@ -222,7 +231,11 @@ class Legs:
             First angles (rad).
         moves : iterable of mapping
             Moves in the order of time. Each has ``at`` (s), the last ``gamma``, ``delta`` or both
-            (rad), and either ``duration`` (s) or ``rate`` (rad/s, of the angle that changes more).
+            (rad), and either ``duration`` (s) or ``rate`` (rad/s, the largest of the angle that
+            changes more). ``shape`` is "linear", at a constant rate; "accelerate", from rest at a
+            constant acceleration, so that the rate is largest at the end; or "quintic", from rest
+            to rest. The last move may have ``at="touch_down"``: it begins when the feet first
+            touch down after the moves before it, from t = 0 on.
 
         Returns
         -------
@@ -234,14 +247,23 @@ class Legs:
         SimulationError
             A move is incomplete, or begins before the last one ends.
         """
-        if isinstance(moves, str | Mapping) or not isinstance(moves, Iterable):
-            raise refusal("legs.moves", moves, "an array of tables", SimulationError)
-        first = finite_array("legs", [gamma, delta], SimulationError, "rad").tolist()
-        nodes: list[Node] = [(-math.inf, (first[0], first[1]))]
-        for index, move in enumerate(moves):
-            nodes += _move(f"legs.moves[{index}]", move, nodes[-1])
-        times, angles = zip(*(nodes[1:] or [(0.0, nodes[0][1])]), strict=True)
-        return cls(times, *np.array(angles, float).T)
+        first = finite_array("legs", [gamma, delta], SimulationError, "rad")
+        made: Moves = moves_of(first, moves)
+        legs = cls(made.times, *made.angles.T)
+        both = np.tile(made.angles, 2)
+        object.__setattr__(legs, "curve", shaped(made.times, both, *made.shapes))
+        if made.landing is not None:
+            goal, duration, shape = made.landing
+            ways = np.tile([made.angles[-1], goal], 2)
+            object.__setattr__(legs, "landing", shaped(np.array([0.0, duration]), ways, shape))
+            object.__setattr__(legs, "landing_from", made.landing_from)
+        return legs
+
+    def before_landing(self) -> Self:
+        """Return the same legs without what begins at a touch-down."""
+        legs = copy(self)
+        object.__setattr__(legs, "landing", None)
+        return legs
 
 
 def _both_legs(name: str, value: Quantities, times: np.ndarray) -> np.ndarray:
@@ -253,47 +275,3 @@ def _both_legs(name: str, value: Quantities, times: np.ndarray) -> np.ndarray:
     if angles.ndim == 1:
         angles = angles[:, None]
     return np.broadcast_to(angles, (len(times), 2))
-
-
-Node = tuple[float, tuple[float, float]]  # time (s), gamma and delta (rad)
-MOVE = {"at": "s", "gamma": "rad", "delta": "rad", "duration": "s", "rate": "rad/s"}  # units
-
-
-def _checked_move(field: str, move: object) -> Mapping[str, float]:
-    """Return a move whose keys and numbers are complete; SimulationError otherwise."""
-    if not isinstance(move, Mapping):
-        raise refusal(field, move, f"a table of {', '.join(MOVE)}", SimulationError)
-    for name in move:
-        one_of(f"{field}: key", name, MOVE, SimulationError)
-    move = {
-        name: number(f"{field}.{name}", value, SimulationError, unit=MOVE[name])
-        for name, value in move.items()
-    }
-    goes = "gamma" in move or "delta" in move
-    if "at" not in move or not goes or ("rate" in move) == ("duration" in move):
-        needs = "at, gamma or delta, and one of rate, duration"
-        raise refusal(field, dict(move), needs, SimulationError)
-    return move
-
-
-def _move(field: str, move: Mapping[str, float], last: Node) -> list[Node]:
-    """Return the nodes that a move adds after the last one; SimulationError if it is impossible."""
-    move = _checked_move(field, move)
-    # where it goes, and how long that takes
-    (end, angles), at = last, move["at"]
-    goal = move.get("gamma", angles[0]), move.get("delta", angles[1])
-    if "duration" in move:
-        duration = move["duration"]
-    else:
-        way = max(abs(float(x) - float(y)) for x, y in zip(goal, angles, strict=True))
-        duration = way / number(f"{field}.rate", move["rate"], SimulationError, above=0)
-    if not 0 < duration < math.inf:
-        needs = "a duration above 0, and another angle than before"
-        raise SimulationError(f"{field}: takes {duration!r} s: needs {needs}")
-    if at < end:
-        remedy = f"value {shown(at)}: the move before it ends at {end:.6g} s: move it after that"
-        raise SimulationError(f"{field}.at: {remedy}")
-    # a move that follows at once begins at the last node
-    if at == end:
-        return [(at + duration, goal)]
-    return [(at, angles), (at + duration, goal)]

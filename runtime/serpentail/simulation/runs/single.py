@@ -14,7 +14,7 @@ from ...model.memory import address_of, aligned
 from ...model.parameters import RunParameters
 from ...model.structures import rows_of
 from ..controllers.actuation import RunActuations
-from ..ground import MOST_EVENTS, GroundSettings
+from ..ground import LANDED_AT, MOST_EVENTS, GroundSettings
 from ..methods import IntegrationMethod
 from ..start import Start
 from .outcomes import COUNTS, RunOutcome, Samples, failed, sampled
@@ -70,12 +70,6 @@ class RunSet:
         for member, array in arrays.items():
             if records.has("run", member):
                 self.places.append((member, address_of(array), array.strides[0]))
-
-    def part(self, k: int, first: int, done: int) -> Samples:
-        """Return what run k has written so far, from a sample on."""
-        arrays = {name: a[k, first:done] for name, a in self.out.items()}
-        outcome = RunOutcome(done - first, 0, np.zeros(0), {})
-        return sampled(self.start.times[first:], arrays, outcome)
 
     def samples(self, k: int, outcome: RunOutcome) -> Samples:
         """Return what run k wrote."""
@@ -167,6 +161,7 @@ class CompiledRun:
             info["events"] = self.runs.ground.events(times, kinds)
             info["unfelt"] = record.unfelt
             info["peaks"] = self._peaks()
+            info |= self._landed()
             if record.near_error > 0:
                 info["near"] = self.runs.ground.near(record)
         failure = self.actuation.error
@@ -175,6 +170,17 @@ class CompiledRun:
         stop = self._stop() if status == STOPPED_AT_EVENT else None
         ledger = self.state["ledger"].copy()
         return RunOutcome(record.done, record.t, ledger, info, failure, stop)
+
+    def part(self, first: int, done: int) -> Samples:
+        """Return what the run has written so far, from a sample on."""
+        arrays = {name: a[self.k, first:done] for name, a in self.runs.out.items()}
+        outcome = RunOutcome(done - first, 0, np.zeros(0), self._landed())
+        return sampled(self.runs.start.times[first:], arrays, outcome)
+
+    def _landed(self) -> dict[str, float]:
+        """Return the time (s) at which the legs' landing began, if it has."""
+        legs, at = self.runs.ground.legs, getattr(self.record, LANDED_AT, np.inf)
+        return {LANDED_AT: at} if legs and legs.landing and at <= self.record.t else {}
 
     def _peaks(self) -> dict[str, list[float]]:
         """Return the largest force (N) at steps, and its time (s), of parts that numbers hold."""
