@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..model.model import Model
-from ..planning.goal import Bounds
+from ..planning.goal import Bounds, middle
 from ..planning.problem import PlanningProblem
 from ..planning.program.end import goal_matrix
 from ..planning.result.curve import Curve, fitted
@@ -121,7 +121,7 @@ def _goal(problem: PlanningProblem, size: int) -> dict[str, np.ndarray]:
         (goal.torso_rate, 3, TURN_RATE),
     )
     values = np.concatenate(
-        [np.full(count, np.nan) if part is None else part for part, count, _ in parts]
+        [np.full(count, np.nan) if part is None else middle(part) for part, count, _ in parts]
     )
     units = np.repeat([unit for *_, unit in parts], [count for _, count, _ in parts])
     given = np.isfinite(values)

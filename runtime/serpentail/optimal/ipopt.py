@@ -108,11 +108,11 @@ class _Sparse:
         )
         return blocks[self.upper] * np.nan if failed else blocks[self.upper]
 
-    def limits(self, goal: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return least and most of the constraints; goal: its rows, which give nothing."""
+    def limits(self, room: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return least and most of the constraints; room: of the goal's rows, at the end."""
         least, most = np.zeros((2, self.rows))
         self.code.sparse_limits(self.program, least.ctypes.data, most.ctypes.data)
-        least[self.rows - goal :] = most[self.rows - goal :] = 0.0
+        least[self.rows - len(room) :], most[self.rows - len(room) :] = -room, room
         return least, most
 
 
@@ -241,7 +241,7 @@ def solve(
             raise PlanningError(
                 f"options: value {shown(dict(asked))}: ipopt refuses them: {_reason(error)}"
             ) from error
-        least, most = sparse.limits(0 if problem.at_end is None else problem.at_end.rows)
+        least, most = sparse.limits(problem.end_room)
         with one_thread():
             found = engine(x0=w, lbg=least, ubg=most, p=np.zeros((0, 0)))
         stats, w_found = engine.stats(), np.array(found["x"]).ravel()

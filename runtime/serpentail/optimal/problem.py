@@ -59,7 +59,10 @@ class OcpRecord(ctypes.Structure):
         ("start_equalities", _int),
         *(
             (name, _pointer)
-            for name in ("start_values", "end_values", "least_start", "most_start", "fixed")
+            for name in (
+                *("start_values", "end_values", "end_room"),
+                *("least_start", "most_start", "fixed"),
+            )
         ),
         *((name, _double) for name in ("give", "scale")),
     )
@@ -121,7 +124,8 @@ class OptimalProblem:
     duration_is_free; limits, each (2, n), least and most: control_limits, state_limits of the
     states whose indices are bounded, row_limits of the node's rows, constant_limits, start_limits
     of rows at the start after the first start_equalities, which are start_values. at_end: its
-    rows are end_values at the end; fixed (bounded,): bounded states that the goal gives there.
+    rows are end_values at the end, or as far off as end_room; fixed (bounded,): bounded states that
+    the goal gives there.
     """
 
     node: OcpNode
@@ -142,6 +146,7 @@ class OptimalProblem:
     start_limits: np.ndarray = field(default_factory=_nothing)
     at_end: OcpNode | None = None
     end_values: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    end_room: np.ndarray = field(default_factory=lambda: np.zeros(0))
     fixed: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
 
     @cached_property
@@ -198,6 +203,7 @@ class OcpInC:
             "fixed": problem.fixed.astype(np.intc),
             "start_values": problem.start_values,
             "end_values": problem.end_values,
+            "end_room": problem.end_room,
         }
         for name in ("control", "state", "row", "constant", "start"):
             least, most = getattr(problem, f"{name}_limits")

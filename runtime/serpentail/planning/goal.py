@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 HALF_TURN = "half turn"  # of each segment, a bound of its angles
 
 
@@ -16,7 +18,8 @@ class Goal:
         Attitude of the torso: upright at any yaw, or a quaternion (w, x, y, z) from torso to
         world.
     torso_rate : array_like, shape (3,), default zeros
-        Angular velocity of the torso (rad/s, body).
+        Angular velocity of the torso (rad/s, body): each component a number, or a range
+        (least, most). ``Mpc`` aims at the middle of a range.
     tail : array_like, shape (2m,), optional
         Tail coordinates (rad); single numbers may be None. Default: free.
     tail_rate : array_like, shape (2m,), optional
@@ -36,6 +39,16 @@ class Goal:
 
 
 GOALS = {"upright": Goal()}  # by name
+
+
+def middle(part: np.ndarray) -> np.ndarray:
+    """Return the numbers (n,) of a part of a checked goal; of ranges (2, n) their middles."""
+    return part if part.ndim == 1 else part.mean(axis=0)
+
+
+def room(part: np.ndarray) -> np.ndarray:
+    """Return how far (n,) a part of a checked goal may be from its middle."""
+    return np.zeros(len(part)) if part.ndim == 1 else (part[1] - part[0]) / 2
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from serpentail_scene.layout import OMEGA, VELOCITY
 from ..basics.attitude import rotation_matrix
 from ..basics.errors import PlanningError
 from ..model.model import Model
+from .goal import middle, room
 from .problem import PlanningProblem
 from .program.coordinates import IDENTITY_POSE
 
@@ -22,13 +23,14 @@ YAWS = np.linspace(0.0, 2 * np.pi, 73)
 def refuse_impossible(model: Model, problem: PlanningProblem) -> None:
     """PlanningError if no end of a flight can have the rates that the goal asks for.
 
-    Nothing is refused if parts of the start are free, because they change the momentum.
+    Nothing is refused if parts of the start are free, because they change the momentum, or if the
+    torso's rate has a range.
     """
     if problem.free_start:
         return
     goal, h = problem.goal, model.momentum(problem.q0, problem.v0)[1]
     size = float(np.linalg.norm(h))
-    if goal.torso_rate is None or size == 0:
+    if goal.torso_rate is None or room(goal.torso_rate).any() or size == 0:
         return
     told = f"flight conserves the angular momentum {np.array2string(h, precision=3)} kg m^2/s"
     tail_rests = goal.tail_rate is not None and not np.any(goal.tail_rate)
@@ -63,7 +65,7 @@ def _least_left(model: Model, problem: PlanningProblem, h: np.ndarray) -> float:
     own, tail = S[:3, :3], S[:3, 3:]
     wanted = np.full(len(goal.tail), np.nan) if goal.tail_rate is None else goal.tail_rate
     free = np.isnan(wanted)
-    fixed = own @ goal.torso_rate + tail[:, ~free] @ wanted[~free]
+    fixed = own @ middle(goal.torso_rate) + tail[:, ~free] @ wanted[~free]
     size, scale = float(np.linalg.norm(h)), float(np.linalg.norm(tail))
     most = np.inf if bounds.rate is None else bounds.rate[free] * scale / size
 

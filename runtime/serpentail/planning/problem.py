@@ -143,13 +143,27 @@ def checked_goal(goal: Any, tail: int) -> Goal:
     if attitude is not None and not upright:
         quaternion = _vector("goal.attitude", attitude, 4)
         attitude = _unit_quaternion("goal.attitude", quaternion)
-    rate = None if goal.torso_rate is None else _vector("goal.torso_rate", goal.torso_rate, 3)
     return Goal(
         attitude,
-        rate,
+        None if goal.torso_rate is None else _rates("goal.torso_rate", goal.torso_rate),
         _partly_free("goal.tail", goal.tail, tail),
         _partly_free("goal.tail_rate", goal.tail_rate, tail),
     )
+
+
+def _rates(field: str, value: Any) -> np.ndarray:
+    """Return numbers (3,), or least and most (2, 3) if one of them is a range."""
+    entries = [*value] if isinstance(value, tuple | list | np.ndarray) else []
+    if not any(np.ndim(entry) for entry in entries):
+        return _vector(field, value, 3)
+    pairs = [numbers_in(entry if np.ndim(entry) else (entry, entry)) for entry in entries]
+    if len(pairs) != 3 or not all(pair is not None and pair.shape == (2,) for pair in pairs):
+        raise refusal(field, value, "3 numbers, each may be (least, most)", PlanningError)
+    limits = np.array(pairs).T
+    refuse_not_finite(field, limits, PlanningError)
+    if (limits[0] > limits[1]).any():
+        raise refusal(field, value, "least below most", PlanningError)
+    return limits
 
 
 def _partly_free(field: str, value: Any, size: int) -> np.ndarray | None:

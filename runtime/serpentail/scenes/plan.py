@@ -43,7 +43,7 @@ def _bound(unit: str) -> Key:
 
 GOAL = {
     "attitude": Key("1", depth=1, words=("upright", FREE)),
-    "torso_rate": _or_free("rad/s"),
+    "torso_rate": Key("rad/s", depth=2, words=(FREE,)),
     "tail": _or_free("rad"),
     "tail_rate": _or_free("rad/s"),
 }

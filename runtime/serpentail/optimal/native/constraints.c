@@ -200,7 +200,8 @@ void limits_of(const Program *program, int k, double *least, double *most)
     }
     if (k == N) {
         for (int c = 0; c < sizes_of(program, N).controls; c++) {
-            row = limit(least, most, row, -MOST_GIVEN, MOST_GIVEN);
+            const double room = ocp->end_room[c] > 0.0 ? ocp->end_room[c] : MOST_GIVEN;
+            row = limit(least, most, row, -room, room);
         }
         return;
     }
@@ -327,6 +328,12 @@ double stages_cost(const Program *program)
     return sum;
 }
 
+/* Twice what the square of a row of the goal costs. */
+static double give_of(const Ocp *ocp, int row)
+{
+    return ocp->end_room[row] > 0.0 ? 0.0 : ocp->give;
+}
+
 double cost_of(const Program *program, const double *w)
 {
     const Ocp *ocp = program->ocp;
@@ -334,7 +341,7 @@ double cost_of(const Program *program, const double *w)
     double sum = stages_cost(program);
     for (int c = 0; c < sizes_of(program, N).controls; c++) {
         const double give = controls_of(program, N, w)[c];
-        sum += ocp->give / 2 * give * give;
+        sum += give_of(ocp, c) / 2 * give * give;
     }
     return sum;
 }
@@ -353,7 +360,7 @@ void cost_slopes(Program *program, int k, const double *w, double *slopes)
     }
     memset(slopes, 0, (size_t)columns * sizeof *slopes);
     for (int c = 0; c < sizes_of(program, N).controls; c++) {
-        slopes[c] = ocp->give * controls_of(program, N, w)[c];
+        slopes[c] = give_of(ocp, c) * controls_of(program, N, w)[c];
     }
 }
 
@@ -397,7 +404,7 @@ int hessian_of(Program *program, int k, const double *w, double scale, const dou
     if (k == N) {
         memset(H, 0, (size_t)columns * columns * sizeof *H);
         for (int c = 0; c < sizes.controls; c++) {
-            H[(size_t)c * columns + c] = scale * ocp->give;
+            H[(size_t)c * columns + c] = scale * give_of(ocp, c);
         }
         if (ocp->at_end == NULL) {
             return 0;

@@ -252,7 +252,8 @@ static int eval_hessian(double scale, const double *w, const double *lambda, con
     }
     for (int r = 0; scale > 0.0 && r < dims->ng[N]; r++) {
         const double shift = -lambda[dims->g_offs[N] + r] / ocp->give;
-        run->program->shift[r] = fmax(-MOST_GIVEN, fmin(shift, MOST_GIVEN));
+        const int ranged = ocp->end_room[r] > 0.0;
+        run->program->shift[r] = ranged ? 0.0 : fmax(-MOST_GIVEN, fmin(shift, MOST_GIVEN));
     }
     if (run->stop != NULL && run->stop()) {
         end_soon(run, STOPPED);

@@ -32,6 +32,7 @@ typedef struct {
     int start_equalities;     /* the first rows at the start, which are these values */
     const double *start_values;
     const double *end_values; /* (rows at the end) */
+    const double *end_room;   /* (rows at the end) how far each may be off at no cost; 0: see give */
     const double *least_start, *most_start;       /* (the other rows) */
     const int *fixed;         /* (bounded) whether the goal gives a bounded state at the end */
     double give;              /* twice what squares of the goal's rows cost */

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from ...model.model import Model
+from ..goal import middle
 from ..program.end import goal_matrix
 from ..result.curve import fitted
 from ..result.plan import Plan
@@ -117,7 +118,7 @@ def _end_cost(model: Model, plan: Plan) -> np.ndarray:
     rows = [tilt]
     for wanted, begin, unit in parts:
         if wanted is not None:
-            rows.append(end.E[0][begin + np.flatnonzero(np.isfinite(wanted))] / unit)
+            rows.append(end.E[0][begin + np.flatnonzero(np.isfinite(middle(wanted)))] / unit)
     weighed = np.concatenate(rows)
     return weighed.T @ weighed
 

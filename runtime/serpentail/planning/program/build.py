@@ -124,7 +124,9 @@ def plan_program(
             start_limits=_with_room(at_start.limits),
         )
     if at_end is not None:
-        optimal = replace(optimal, at_end=at_end.node, end_values=at_end.values)
+        optimal = replace(
+            optimal, at_end=at_end.node, end_values=at_end.values, end_room=at_end.room
+        )
     return PlanProgram(model, problem, variables, optimal, terms, compiled)
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...optimal.problem import OcpNode
-from ..goal import Goal
+from ..goal import Goal, middle, room
 from .cache import memoised
 from .nodes import FlightDynamics, NodeTerms, no_rates, terms_with
 
@@ -14,15 +14,17 @@ if TYPE_CHECKING:
     pass
 
 NUMBERS = (("numbers", 12),)  # of the matrix of ``goal_matrix``, row by row
+LEAST_ROOM = 1e-6  # an interior point needs some; a narrower range is its middle
 GOALS = ("tail", "tail_rate", "torso_rate")
 
 
 @dataclass(frozen=True, eq=False)
 class EndRows:
-    """A node at the end, and the values of its rows."""
+    """A node at the end, the values of its rows, and how far each may be off."""
 
     node: OcpNode
     values: np.ndarray
+    room: np.ndarray
 
 
 def goal_matrix(goal: Any) -> np.ndarray:
@@ -38,7 +40,7 @@ def goal_matrix(goal: Any) -> np.ndarray:
 def given_entries(goal: Goal, name: str) -> np.ndarray:
     """Return the entries of a part of the state that the goal gives."""
     value = getattr(goal, name)
-    return np.zeros(0, int) if value is None else np.flatnonzero(np.isfinite(value))
+    return np.zeros(0, int) if value is None else np.flatnonzero(np.isfinite(middle(value)))
 
 
 def end_rows(flight: FlightDynamics) -> EndRows | None:
@@ -54,10 +56,13 @@ def end_rows(flight: FlightDynamics) -> EndRows | None:
     numbers = np.zeros(12)
     numbers[: matrix.size] = matrix.ravel()
     units = [np.ones(len(matrix)), *(variables.units[k][entries[k]] for k in GOALS)]
-    values = [np.zeros(len(matrix))]
-    values += [getattr(goal, k)[entries[k]] if entries[k].size else np.zeros(0) for k in GOALS]
+    asked = {k: getattr(goal, k) for k in GOALS if entries[k].size}
+    values = [np.zeros(len(matrix)), *(middle(part)[entries[k]] for k, part in asked.items())]
+    rooms = [np.zeros(len(matrix)), *(room(part)[entries[k]] for k, part in asked.items())]
     row_units = np.concatenate(units)
-    return EndRows(flight.node(made, row_units, numbers), np.concatenate(values) / row_units)
+    off = np.concatenate(rooms) / row_units
+    node = flight.node(made, row_units, numbers)
+    return EndRows(node, np.concatenate(values) / row_units, np.where(off > LEAST_ROOM, off, 0.0))
 
 
 def _terms(flight: FlightDynamics, rows: int, entries: dict[str, np.ndarray]) -> NodeTerms:
