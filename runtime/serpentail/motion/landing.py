@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from serpentail_scene.layout import QUATERNION, VELOCITY
+from serpentail_scene.layout import OMEGA, QUATERNION, VELOCITY
 
 from ..basics.attitude import Array, rotation_matrix
 from ..model.model import Model
 from .body import weight
 from .ground import feet
+from .resample import smooth
 from .trajectory import Trajectory
 
 # standing is: upright, at rest, its weight on the feet
@@ -121,6 +122,32 @@ class Landing:
             name: np.asarray((forces[..., 2] > 0).any(axis=1))
             for name, forces in feet(self.motion).items()
         }
+
+    # The flight about the apex, by its samples alone: at its ends a blow may change what follows.
+
+    @cached_property
+    def _flying(self) -> NDArray[np.bool_] | None:
+        """The samples (K,) in the flight about the apex; None without an end of it, or a torso."""
+        if self.flight == (None, None) or self.model.fixed:
+            return None
+        begin, end = self.flight
+        t, slack = self.motion.t, ROUNDING * abs(float(self.motion.t[-1]))
+        after = t >= (-np.inf if begin is None else begin - slack)
+        flying: NDArray[np.bool_] = after & (t <= (np.inf if end is None else end + slack))
+        return flying if flying.any() else None
+
+    def torso_rate(self, which: int) -> Array | None:
+        """Angular velocity (3,) of the torso (rad/s, body) at the take-off (0) or landing (1)."""
+        time, flying = self.flight[which], self._flying
+        if time is None or flying is None:
+            return None
+        return smooth(self.motion.t[flying], self.motion.v[flying, OMEGA], np.array([time]))[0]
+
+    def angular_momentum(self, which: int) -> Array | None:
+        """Angular momentum (3,) about the centre of mass (kg m^2/s, world) there."""
+        if self.flight[which] is None or self._flying is None:
+            return None
+        return np.asarray(self.motion.angular_momentum[self._flying][-which])
 
     # What the landing was.
 

@@ -149,13 +149,18 @@ def _nearest(points: Array) -> Array:
     return np.asarray(np.linalg.norm(starts + parts[..., None] * ways, axis=2))
 
 
+def borne(model: Model) -> float:
+    """Return the largest force of the ground (body weights) that legs of the body's size bear."""
+    return float(BORNE * (BEARER / total_mass(model.parameters)) ** (1 / 3))
+
+
 def _blows(model: Model, motion: "Trajectory") -> list[str]:
     """A force of the ground that no legs of the animal's size bear."""
     largest, whole = peaks(motion), weight(model)
     if not largest or not whole:
         return []
     force, time = largest["all"]
-    most = BORNE * (BEARER / float(total_mass(model.parameters))) ** (1 / 3)
+    most = borne(model)
     if not force > most * whole:
         return []
     return [

@@ -4,14 +4,22 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from ..basics.near_names import NearNames
 from ..basics.short_repr import brief
+from ..motion.body import weight
 from ..motion.derived import AGAIN
+from ..motion.ground import peaks
 from ..motion.joined import JoinedAgain, joined
 from ..motion.landing import Landing
+from ..motion.plausibility import borne
 from ..motion.trajectory import Trajectory
 from ..planning.result.plan import Plan
 from .phase import LANDING, Phase
+
+MOST_SPIN = 10.0  # rad/s, of the torso at a touch-down: 11 degrees in 20 ms of landing
+MOST_PUSH = 25.0  # body weights: a jump by 0.35 m from a crouch needs some 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +87,7 @@ def whole(parts: list[Trajectory], runs: list[PhaseRun], phases: Sequence[Phase]
     for flight, phase in zip(runs[:-1], phases, strict=False):
         if planned and phase.until == LANDING and flight.ended_by != "duration":
             warnings += _fall(motion, flight, runs[-1])
+    warnings += _spin(motion) + _push(motion, parts)
     outcomes = {"phases": [run.info() for run in runs], "warnings": warnings}
     motion = replace(motion, info=motion.info | outcomes)
     repeats = [vars(part).get(AGAIN) for part in parts]
@@ -98,6 +107,38 @@ def _fall(motion: Trajectory, flight: PhaseRun, last: PhaseRun) -> list[str]:
     return [
         f"phase {last.name!r}, at t = {last.end:.4g} s: after the {flight.ended_by} it does not "
         f"stand, or was on its back: let phase {flight.name!r} end otherwise, or turn less"
+    ]
+
+
+def _spin(motion: Trajectory) -> list[str]:
+    """Return the warning of a landing whose torso turns fast."""
+    assert motion.model is not None
+    landing = Landing(motion.model, motion)
+    rate, momentum = landing.torso_rate(1), landing.angular_momentum(1)
+    if rate is None or momentum is None or not np.linalg.norm(rate) > MOST_SPIN:
+        return []
+    return [
+        f"touch-down at t = {landing.flight[1]:.4g} s: the torso turns at "
+        f"{np.linalg.norm(rate):.3g} rad/s, more than {MOST_SPIN:g}, because the jump has an "
+        f"angular momentum of {np.linalg.norm(momentum):.3g} kg m^2/s: push with less spin, or "
+        "give goal.torso_rate a range"
+    ]
+
+
+def _push(motion: Trajectory, parts: list[Trajectory]) -> list[str]:
+    """Return the warning of a hard push, unless ``Trajectory.warnings`` has one of the legs."""
+    model = motion.model
+    assert model is not None
+    take_off = Landing(model, motion).flight[0]
+    found = [peaks(part)["all"] for part in parts if part.contact is not None]
+    pushes = [peak for peak in found if take_off is not None and peak.time <= take_off]
+    whole = weight(model)
+    if not pushes or not whole or not MOST_PUSH * whole < max(pushes).force <= borne(model) * whole:
+        return []
+    force, time = max(pushes)
+    return [
+        f"push: the ground's force is {force / whole:.3g} body weights at t = {time:.4g} s, more "
+        f'than {MOST_PUSH:g}: let the legs take longer, with shape = "accelerate"'
     ]
 
 

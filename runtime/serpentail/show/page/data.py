@@ -25,6 +25,8 @@ LABELS = {  # of the numbers that the page shows
     "landed": "landed, and stands at the end",
     "least_upright_landing": "least upright from the landing on",
     "turned_landing_rad": "turned from the landing on",
+    "torso_rate_at_touch_down": "angular velocity at the landing",
+    "angular_momentum_at_take_off": "angular momentum at the take-off",
     "apex_m": "highest torso",
     "com_rise_m": "rise of the centre of mass",
     "tilt_max_deg": "largest tilt of the back",
