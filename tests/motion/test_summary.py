@@ -10,6 +10,7 @@ import pytest
 import serpentail as st
 from serpentail.motion import numbers
 from serpentail.motion.text import as_text, as_word
+from tests.references.body_set import Animal, Link
 from tests.support import zoo
 
 from .conftest import at_height, made, scene_of, told
@@ -19,13 +20,28 @@ MASS, GRAVITY = 0.10572 + 0.00351, 9.8  # kg of torso and tail, m/s^2: the rat's
 LEGS = st.Legs.fixed(np.radians(210), np.radians(-15))
 OF_EVENTS = {
     *("take_off_s", "recontact_s", "landing_group", "least_upright_landing", "landed"),
-    *("turned_landing_rad", "touching_s", "first_touch_down_s", "last_take_off_s"),
+    *("torso_rate_at_take_off", "torso_rate_at_touch_down", "angular_momentum_at_take_off"),
+    *(
+        "angular_momentum_at_touch_down",
+        "turned_landing_rad",
+        "touching_s",
+        "first_touch_down_s",
+        "last_take_off_s",
+    ),
 }
 OF_THE_GROUND = OF_EVENTS | {
     *("standing_end", "peak_ground_force_N", "peak_ground_force_weights", "peak_group_force_N"),
     *("peak_group_force_weights", "peak_ground_force_s"),
     *("ground_impulse_N_s", "impulse_N_s", "slip_m"),
 }
+
+
+def animal_of(model):
+    """The jump's rat as a set of bodies."""
+    p = model.parameters
+    length, names = p["tail_length"] / (3 * 4), ("torso_mass", "torso_inertia", "tail_mount")
+    link = Link(p["tail_mass"] / (3 * 4), length, length / 2, p["link_inertia"])
+    return Animal(segments=([link] * 4,) * 3, gravity=GRAVITY, **{name: p[name] for name in names})
 
 
 def strict(numbers):
@@ -174,6 +190,48 @@ def test_peaks_do_not_depend_on_the_samples(kick):
         assert many[1].info["peaks"] == motion.info["peaks"]
         part = motion.resample(motion.t[:2])  # ends before the blow
         assert told(part)["peak_ground_force_N"] < 2
+
+
+def test_peaks_are_those_between_samples_too(rat):
+    """Of a drop and of a kick that begins at once, against samples each 20 us; the trial of the
+    first step, which looks ahead into the kick, is no part of the motion.
+    """
+    kick, drop = scene_of("kick"), at_height(rat, 0.1, 1)[0]
+    push = st.Legs.moves(3.67, -0.26, [{"at": 0, "delta": -1.3, "rate": 90, "shape": "accelerate"}])
+    crouched = {"bristles0": kick.settings["bristles0"], "legs": push, "t_span": (-0.01, 0.04)}
+    for start, how in ((kick.q0, crouched), (drop, {"legs": LEGS, "t_span": 0.2})):
+        peaks = []
+        for step in (2e-3, 1e-4, 2e-5):
+            given = {"controller": st.Damping(1e-3), "output_step": step} | how
+            peaks.append(told(st.simulate(rat, start, np.zeros(8), **given)))
+        for of in peaks[:2]:
+            force, wanted = (x["peak_ground_force_N"] for x in (of, peaks[2]))
+            assert 0.99 * wanted < force <= wanted * (1 + 1e-9)
+            parts, wanted = (x["peak_group_force_N"] for x in (of, peaks[2]))
+            assert parts == pytest.approx(wanted, rel=0.01)
+    sampled = st.simulate(rat, start, np.zeros(8), **given).contact.total.max()
+    assert sampled == pytest.approx(force, rel=0.01)
+
+
+def test_the_flight_s_rate_and_angular_momentum(leap):
+    """Momentum by the set of bodies, which a flight conserves; the rate at its end is that of a run
+    that ends there. A drop has no take-off.
+    """
+    of, model = told(leap), leap.model
+    inside = int(np.searchsorted(leap.t, (of["take_off_s"] + of["recontact_s"]) / 2))
+    wanted = animal_of(model).momentum(leap.q[inside], leap.v[inside])[1]
+    for when in ("take_off", "touch_down"):
+        found = of[f"angular_momentum_at_{when}"]
+        np.testing.assert_allclose(found, wanted, atol=2e-4 * np.abs(wanted).max())
+    for when, time in (("take_off", of["take_off_s"]), ("touch_down", of["recontact_s"])):
+        found = of[f"torso_rate_at_{when}"]
+        np.testing.assert_allclose(found, leap.at(time).v[3:6], atol=0.02)
+    drop = st.simulate(
+        model, at_height(model, 0.2, 1)[0], np.zeros(model.nv), legs=LEGS, t_span=0.25
+    )
+    of = told(drop)
+    assert of["torso_rate_at_take_off"] is of["angular_momentum_at_take_off"] is None
+    np.testing.assert_allclose(of["torso_rate_at_touch_down"], 0, atol=1e-6)
 
 
 def test_the_path_of_sliding_feet_tail_and_torso():

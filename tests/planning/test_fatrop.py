@@ -36,6 +36,7 @@ SLOW = pytest.mark.slow
 STEEP = st.Bounds(angle=np.pi / 3, torque_rate=0.1)
 WITHIN = ((lambda point: point.tail_rate[0], -4.0, 9.0), (lambda point: point.tip, -2.0, 2.0))
 RICHER = {
+    "range of rates": {"goal": st.Goal(torso_rate=((-3, 3), (-0.5, 0.5), (1, 4)))},
     "path": {"path": WITHIN, "duration": (0.3, 0.5)},
     "torque rates": {"bounds": STEEP},
     "own objective": {
@@ -74,6 +75,24 @@ def check_optimum(plan: st.Plan) -> None:
     assert plan.report["objective"] == pytest.approx(wanted.objective, rel=1e-6)
     assert plan.duration == pytest.approx(wanted.duration, rel=1e-6)
     np.testing.assert_allclose(plan.curve.nodes["torque"], wanted.torques, atol=5e-8)
+
+
+def test_a_range_of_rates_holds_and_costs_no_more_than_its_middle():
+    """Where free rates end outside, the optimum is at an end of the range; a number is a range."""
+    free = planned({"goal": st.Goal(torso_rate=None)})
+    own = free.trajectory.v[-1, 3:6]
+    k = int(np.abs(own).argmax())
+    limits = np.array([own - 50, own + 50]).T
+    limits[k] = np.sort([0.3 * own[k], 0.6 * own[k]])
+    plan = planned({"goal": st.Goal(torso_rate=limits)})
+    found = plan.trajectory.v[-1, 3:6]
+    assert plan.success and found[k] == pytest.approx(0.6 * own[k], rel=1e-3)
+    limits[k] = limits[k].mean()
+    asked = [tuple(each) if i != k else each[0] for i, each in enumerate(limits)]
+    middle = planned({"goal": st.Goal(torso_rate=asked)})
+    assert middle.trajectory.v[-1, 3 + k] == pytest.approx(limits[k, 0], abs=1e-4)
+    effort = [each.report["objective"] for each in (free, plan, middle)]
+    assert effort[0] < effort[1] < effort[2]
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=SLOW) for k in (1, 2))])
