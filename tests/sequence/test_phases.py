@@ -233,9 +233,8 @@ def test_legs_yield_at_a_touch_down_also_of_the_phase_before():
         end = min(motion.t[-1], 0.2)
         legs, wanted = (each.resample([end]).contact.legs for each in (motion, one))
         with row(phases[0].name):
-            assert next(e["time"] for e in motion.events if e["group"] == "feet") == pytest.approx(
-                one.info["landed_at"]
-            )
+            touch = next(e["time"] for e in motion.events if e["group"] == "feet")
+            assert touch == pytest.approx(one.info["landed_at"])
             assert motion.t[-1] > one.info["landed_at"] + 0.02
             np.testing.assert_allclose(
                 legs[0], wanted[0] if lands else [GAMMA, DELTA] * 2, atol=1e-9
