@@ -215,34 +215,6 @@ def test_a_plan_that_fails_is_not_tracked_and_a_torque_that_suffices_is_told():
     assert sequence(kick(), right).simulate(*settled()).phases[1].plan.success
 
 
-def test_legs_yield_at_a_touch_down_also_of_the_phase_before():
-    """In two phases the first of which ends there, in one with a rest, and in a single run."""
-    move = {"at": "touch_down", "gamma": 3.6, "delta": -0.5, "duration": 0.02, "shape": "quintic"}
-    q = np.eye(1, 9, 3)[0]
-    q[2] = 0.1
-    legs, feet = st.Legs.moves(GAMMA, DELTA, [move]), ("touch_down", "feet")
-    one = st.simulate(rat(), q, np.zeros(8), legs=legs, t_span=0.2, **SETTINGS)
-    rows = [
-        [st.Phase("onto", 0.2, until=[feet]), st.Phase("land", 0.075, moves=[move])],
-        [st.Phase("tail", 0.2, until="landing"), st.Phase("land", 0.08, moves=[move])],
-        [st.Phase("both", 0.17, moves=[move]), st.Phase("rest", 0.03)],
-        [st.Phase("fall", 0.1, moves=[move]), st.Phase("later", 0.1)],
-    ]
-    for phases, lands in zip(rows, (True, True, True, False), strict=True):
-        motion = sequence(*phases).simulate(q, np.zeros(8)).trajectory
-        end = min(motion.t[-1], 0.2)
-        legs, wanted = (each.resample([end]).contact.legs for each in (motion, one))
-        with row(phases[0].name):
-            touch = next(e["time"] for e in motion.events if e["group"] == "feet")
-            assert touch == pytest.approx(one.info["landed_at"])
-            assert motion.t[-1] > one.info["landed_at"] + 0.02
-            np.testing.assert_allclose(
-                legs[0], wanted[0] if lands else [GAMMA, DELTA] * 2, atol=1e-9
-            )
-            off = np.abs(motion.resample([end]).q - one.resample([end]).q).max()
-            assert (off < 1e-3) == lands
-
-
 def test_a_fast_landing_and_a_hard_push_warn_once():
     """Each with its number; the shipped kick has a warning of the legs instead."""
     fly = st.Phase("fly", 1.0, until="landing")

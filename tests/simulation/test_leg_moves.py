@@ -2,6 +2,8 @@
 a reference that is told when the touch-down is, and what cannot be.
 """
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -113,6 +115,30 @@ def test_only_a_touch_down_after_the_moves_before_counts():
         for each in (st.Legs.fixed(GAMMA, DELTA), legs())
     )
     np.testing.assert_array_equal(still, yielding)
+
+
+def test_phases_yield_at_a_touch_down_also_of_the_phase_before():
+    """In two phases the first of which ends there, or earlier, and in one with a rest: as in a
+    single run. A move whose touch-down does not come in its phase is dropped.
+    """
+    how, feet = {"rtol": 1e-6, "output_step": 1e-3}, ("touch_down", "feet")
+    one = dropped(legs=legs(), **how)
+    touch = one.info["landed_at"]
+    rows = [
+        [st.Phase("onto", 0.06, until=[feet]), st.Phase("land", 0.06 - touch, moves=[YIELD])],
+        [st.Phase("earlier", 0.9 * touch), st.Phase("land", 0.06 - 0.9 * touch, moves=[YIELD])],
+        [st.Phase("both", 0.05, moves=[YIELD]), st.Phase("rest", 0.01)],
+        [st.Phase("fall", 0.9 * touch, moves=[YIELD]), st.Phase("later", 0.06 - 0.9 * touch)],
+    ]
+    for phases, lands in zip(rows, (True, True, True, False), strict=True):
+        parts = [dataclasses.replace(phase, controller=PASSIVE) for phase in phases]
+        sequence = st.Sequence(zoo.model("ground"), parts, GAMMA, DELTA, how)
+        motion = sequence.simulate(one.q[0], one.v[0]).trajectory
+        held = one.contact.legs[-1] if lands else [GAMMA, DELTA] * 2
+        with row(phases[0].name):
+            assert motion.t[-1] == pytest.approx(0.06)
+            np.testing.assert_allclose(motion.contact.legs[-1], held, atol=1e-6)
+            assert (np.abs(motion.q[-1] - one.q[-1]).max() < 1e-4) == lands
 
 
 def test_moves_that_cannot_be_are_named():
