@@ -153,12 +153,12 @@ def shaped(times: np.ndarray, values: np.ndarray, *shapes: str) -> Piecewise:
     """
     if len(times) == 1:
         return constant(times[0], values[0])
-    rise, width = np.diff(values, axis=0), np.diff(times)[:, None]
-    shares = np.zeros((len(rise), 1, max(len(SHAPES[shape]) for shape in shapes)))
-    for piece, shape in zip(shares, np.broadcast_to(shapes, len(rise)), strict=True):
+    width = np.diff(times)[:, None]
+    shares = np.zeros((len(width), 1, max(len(SHAPES[shape]) for shape in shapes)))
+    for piece, shape in zip(shares, np.broadcast_to(shapes, len(width)), strict=True):
         piece[0, : len(SHAPES[shape])] = SHAPES[shape]
     with np.errstate(all="ignore"):
-        rows = [values[:-1]]
+        rise, rows = np.diff(values, axis=0), [values[:-1]]
         rows += [shares[..., k] * rise / width**k for k in range(1, shares.shape[-1])]
     if not np.isfinite(rows).all():
         raise SimulationError(f"times {times.tolist()!s:.60}: too close to each other for values")
