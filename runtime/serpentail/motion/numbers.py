@@ -83,25 +83,6 @@ def _parts_in_weights(run: Facts) -> dict[str, float | None] | None:
     return {name: run.in_weights(f) for name, f in (run.peaks_of_parts() or {}).items()} or None
 
 
-def _of_flight(end: int, when: str) -> tuple[Number, Number]:
-    """Rate and angular momentum at the begin (0) or end (1) of the flight about the apex."""
-    at = "_at_" + when.replace("-", "_")
-    return (
-        Number(
-            "torso_rate" + at,
-            "rad/s",
-            f"angular velocity of the torso (x, y, z of its own axes) at this {when}",
-            lambda run: run.landing.torso_rate(end),
-        ),
-        Number(
-            "angular_momentum" + at,
-            "kg m^2/s",
-            f"angular momentum about the centre of mass (x, y, z) at this {when}",
-            lambda run: run.landing.angular_momentum(end),
-        ),
-    )
-
-
 def _duration(run: Facts) -> float:
     return float(run.motion.t[-1] - run.motion.t[0])
 
@@ -125,8 +106,16 @@ NUMBERS = (
         lambda run: com_rise(run.model, run.motion)),
     Number("recontact_s", "s", "landing: end of the flight about the apex",
         lambda run: run.landing.flight[1]),
-    *_of_flight(0, "take-off"),
-    *_of_flight(1, "touch-down"),
+    Number("torso_rate_at_take_off", "rad/s",
+        "angular velocity of the torso (x, y, z of its own axes) at this take-off",
+        lambda run: run.landing.torso_rate(0)),
+    Number("torso_rate_at_touch_down", "rad/s", "the same at this landing",
+        lambda run: run.landing.torso_rate(1)),
+    Number("angular_momentum_at_take_off", "kg m^2/s",
+        "angular momentum about the centre of mass (x, y, z) at this take-off",
+        lambda run: run.landing.angular_momentum(0)),
+    Number("angular_momentum_at_touch_down", "kg m^2/s", "the same at this landing",
+        lambda run: run.landing.angular_momentum(1)),
     Number("landing_group", "", "group of points that lands first",
         lambda run: run.landing.group()),
     # the attitude, and whether it was a landing or a tumble

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..basics.near_names import NearNames
 from ..basics.short_repr import brief
+from ..model.model import Model
 from ..motion.body import weight
 from ..motion.derived import AGAIN
 from ..motion.ground import peaks
@@ -19,7 +20,7 @@ from ..planning.result.plan import Plan
 from .phase import LANDING, Phase
 
 MOST_SPIN = 10.0  # rad/s, of the torso at a touch-down: 11 degrees in 20 ms of landing
-MOST_PUSH = 25.0  # body weights: a jump by 0.35 m from a crouch needs some 20
+MOST_PUSH = 25.0  # body weights: a jump by 0.6 m from a crouch needs some 19
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +88,8 @@ def whole(parts: list[Trajectory], runs: list[PhaseRun], phases: Sequence[Phase]
     for flight, phase in zip(runs[:-1], phases, strict=False):
         if planned and phase.until == LANDING and flight.ended_by != "duration":
             warnings += _fall(motion, flight, runs[-1])
-    warnings += _spin(motion) + _push(motion, parts)
+    if motion.contact is not None and motion.model is not None:
+        warnings += _rough(motion.model, motion, parts)
     outcomes = {"phases": [run.info() for run in runs], "warnings": warnings}
     motion = replace(motion, info=motion.info | outcomes)
     repeats = [vars(part).get(AGAIN) for part in parts]
@@ -110,36 +112,29 @@ def _fall(motion: Trajectory, flight: PhaseRun, last: PhaseRun) -> list[str]:
     ]
 
 
-def _spin(motion: Trajectory) -> list[str]:
-    """Return the warning of a landing whose torso turns fast."""
-    assert motion.model is not None
-    landing = Landing(motion.model, motion)
+def _rough(model: Model, motion: Trajectory, parts: list[Trajectory]) -> list[str]:
+    """Return warnings of a landing whose torso turns fast, and of a push that no blow explains:
+    of blows ``Trajectory.warnings`` tells.
+    """
+    landing, whole = Landing(model, motion), weight(model)
     rate, momentum = landing.torso_rate(1), landing.angular_momentum(1)
-    if rate is None or momentum is None or not np.linalg.norm(rate) > MOST_SPIN:
-        return []
-    return [
-        f"touch-down at t = {landing.flight[1]:.4g} s: the torso turns at "
-        f"{np.linalg.norm(rate):.3g} rad/s, more than {MOST_SPIN:g}, because the jump has an "
-        f"angular momentum of {np.linalg.norm(momentum):.3g} kg m^2/s: push with less spin, or "
-        "give goal.torso_rate a range"
-    ]
-
-
-def _push(motion: Trajectory, parts: list[Trajectory]) -> list[str]:
-    """Return the warning of a hard push, unless ``Trajectory.warnings`` has one of the legs."""
-    model = motion.model
-    assert model is not None
-    take_off = Landing(model, motion).flight[0]
-    found = [peaks(part)["all"] for part in parts if part.contact is not None]
+    take_off, warnings = landing.flight[0], []
+    if rate is not None and momentum is not None and np.linalg.norm(rate) > MOST_SPIN:
+        warnings.append(
+            f"touch-down at t = {landing.flight[1]:.4g} s: the torso turns at "
+            f"{np.linalg.norm(rate):.3g} rad/s, more than {MOST_SPIN:g}, because the jump has an "
+            f"angular momentum of {np.linalg.norm(momentum):.3g} kg m^2/s: push with less spin, or "
+            "give goal.torso_rate a range"
+        )
+    found = [peaks(part)["all"] for part in parts]
     pushes = [peak for peak in found if take_off is not None and peak.time <= take_off]
-    whole = weight(model)
-    if not pushes or not whole or not MOST_PUSH * whole < max(pushes).force <= borne(model) * whole:
-        return []
-    force, time = max(pushes)
-    return [
-        f"push: the ground's force is {force / whole:.3g} body weights at t = {time:.4g} s, more "
-        f'than {MOST_PUSH:g}: let the legs take longer, with shape = "accelerate"'
-    ]
+    if pushes and MOST_PUSH * whole < max(pushes).force <= borne(model) * whole:
+        force, time = max(pushes)
+        warnings.append(
+            f"push: the ground's force is {force / whole:.3g} body weights at t = {time:.4g} s, "
+            f'more than {MOST_PUSH:g}: let the legs take longer, with shape = "accelerate"'
+        )
+    return warnings
 
 
 def _without_plan(run: PhaseRun, phase: Phase, told: dict[str, Any]) -> str:
