@@ -13,7 +13,7 @@ from .function import Function, assemble
 from .layout import block
 from .scope import Instead, Scope, Vectors
 from .sweeps.columns import factored_dynamics_by_columns
-from .sweeps.inertia import animal_inertia, column_of
+from .sweeps.inertia import Block, animal_inertia, column_of
 from .sweeps.pieces import IDENTITY
 from .sweeps.wrenches import core_bias
 
@@ -50,20 +50,28 @@ def assemble_factored_dynamics(draft: Draft, arrays: dict[str, Array]) -> None:
     draft.copy(arrays["first_moment"].part(0, 3), composite["h"])
     core_bias(draft, segments, bias)
 
-    # eliminate translation: from the torso's rows, then from those of the tail
     names = ("inverse_mass", "com")
     center = Vectors({name: arrays[name].part(0, arrays[name].length) for name in names})
+    eliminate_translation(draft, composite, center, columns, entry)
+    draft.factor(A, size)
+
+
+def eliminate_translation(
+    draft: Draft, composite: Vectors, center: Vectors, columns: Array, entry: Block
+) -> None:
+    """Complete H without translation, whose block of the tail is stored: from the torso's rows,
+    then from those of the tail; store ``inverse_mass, com``, too.
+    """
     rows = {f"A_{r}": entry(r, 0, r + 1) for r in range(3)}
     draft.step(translation.without_translation, composite, **center, **rows)
-    with draft.loop("k", tail.nt) as k:
+    with draft.loop("k", draft.tail.nt) as k:
         column = {"column": column_of(columns, k)}
-        coupling = entry(before + k, 0, 3)
+        coupling = entry(k + 3, 0, 3)
         draft.step(translation.column_without_translation, center, column, A_row=coupling)
         with draft.loop("l", k + 1) as other:
             pair = column | {"other": column_of(columns, other)}
             step = translation.pair_without_translation
-            draft.step(step, center, pair, A_entry_=A_tail(k, other))
-    draft.factor(A, size)
+            draft.step(step, center, pair, A_entry_=entry(k + 3, other + 3))
 
 
 FACTORED_DYNAMICS = Function(

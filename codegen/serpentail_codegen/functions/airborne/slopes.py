@@ -1,178 +1,106 @@
-"""First derivatives of the rates of an airborne state.
-
-Lanes are directions: the angular momentum in torso axes, then coordinates and rates of segment
-after segment. The quaternion acts only through that momentum.
-"""
+"""First derivatives of the rates of an airborne state, a lane for each number of the state."""
 
 from dataclasses import dataclass
 
-from serpentail_scene.layout import OMEGA, PER_SEGMENT, TORSO_NV, VELOCITY
+from serpentail_scene.layout import OMEGA, TORSO_NV, VELOCITY
 
 from ...autodiff.forward import tangent_program
-from ...ir.program import Array, Index, Ref
-from ...mechanics import airborne, rotations
+from ...ir.program import Array
+from ...mechanics import rotations
 from ..derivatives.differentiated import CORE
-from ..derivatives.directions import Directions
+from ..derivatives.jacobians import minus, weightless
 from ..draft import Draft
-from ..function import assemble
-from ..layout import block, coordinate
-from ..sweeps.inertia import column_of
+from ..function import Function, assemble
+from ..layout import block
 from .balance import (
+    QUATERNION,
     TURN,
-    Accelerations,
     Balance,
     assemble_rates,
     at_coordinates,
     at_rates,
+    turn_and_drift,
 )
+from .equations import AT_BASE, CONSERVED
 
 
 @dataclass(frozen=True)
 class AirborneSlopes:
-    """Derivatives of an airborne state's unknowns, row by row, along all directions.
-
-    ``omega`` (3 rows); ``tail``: q_t_ddot (nt rows); ``loads``: net and turn_load (3 rows each).
-    ``by_omega`` (nv x 3): C along omega alone.
-    ``by_torque``: q_t_ddot along torques (nt rows).
-    ``turns`` (4 x 3): the momentum along the numbers of the quaternion.
-    ``a``: acceleration of B.
+    """Derivatives of an airborne motion, a lane for each number of x; ``by_torque``: of v_dot, a
+    lane for each torque.  ``a``: acceleration of B.
     """
 
-    directions: Directions
-    omega: Array
-    tail: Array
-    loads: Array
-    by_omega: Array
+    d_quaternion: Array
+    d_q: Array
+    d_v: Array
+    d_v_dot: Array
     by_torque: Array
-    turns: Array
     a: Array
 
-    def turn(self) -> dict[str, Ref]:
-        """Return how the momentum in torso axes changes with the numbers of the quaternion."""
-        return {f"turn_{k}": self.turns[k] for k in range(4)}
 
-
-def assemble_derivatives(
-    draft: Draft, arrays: dict[str, Array]
-) -> tuple[Balance, Accelerations, AirborneSlopes]:
+def assemble_derivatives(draft: Draft, arrays: dict[str, Array]) -> tuple[Balance, AirborneSlopes]:
     """Rates of an airborne state with their Jacobian."""
-    b, motion = assemble_rates(draft, arrays)
-    slopes = store_slopes(b, motion)
-    store_jacobian(b, slopes, arrays["J"])
-    return b, motion, slopes
+    b = assemble_rates(draft, arrays)
+    slopes = store_slopes(draft, b, arrays["angular"])
+    store_jacobian(draft, b, slopes, arrays["J"])
+    return b, slopes
 
 
-def store_slopes(b: Balance, motion: Accelerations) -> AirborneSlopes:
-    """Differentiate the inertial forces at fixed accelerations, then solve."""
-    draft, tail, directions = b.draft, b.draft.tail, Directions(b.draft.tail, ("omega",))
-    lanes = directions.count
+def store_slopes(draft: Draft, b: Balance, conserved: Array) -> AirborneSlopes:
+    """Differentiate the equations of momenta, then those of forces at fixed accelerations."""
+    tail, lanes = draft.tail, draft.tail.airborne_state
 
-    # accelerations of the torso, which the rows of the tail do not need
-    a = draft.array("a", 3)
-    draft.solve(b.inertia, block(motion.v_dot, OMEGA))
-    b.follow(motion.v_dot, block(motion.v_dot, OMEGA), a[0], motion.net)
+    def wide(name: str, size: int) -> Array:
+        return draft.wide(name, size, lanes)
 
-    # tangents of H v_dot + C in torso axes
-    inner = tangent_program(assemble(CORE, tail), ("q", "v"), lanes, directions.outward)
-    rows, arguments = (
-        draft.wide("rows", tail.nv, lanes),
-        {"q": b.q, "v": b.v, "v_dot": motion.v_dot, "a": a},
-    )
-    draft.call(inner, d_force=rows, **arguments, **directions.tangents(draft))
+    def tangents(function: Function, *active: str, **arguments: Array) -> None:
+        draft.call(tangent_program(assemble(function, tail), active, lanes), **arguments)
 
-    omega = draft.wide("omega_slopes", TURN, lanes)
-    store_omega(b, directions, rows, omega)
-    by_omega = chain(draft, rows, omega)
+    # what each lane moves
+    d_quaternion, d_q, d_v = wide("d_quaternion", 4), wide("d_q", tail.nq), wide("d_v", tail.nv)
+    draft.unit(d_quaternion[0], QUATERNION.start)
+    draft.unit(tail.all_q(d_q), at_coordinates(tail))
+    draft.fill(d_v.whole(), 0)
+    draft.unit(tail.all_v(d_v), at_rates(tail))
 
-    # loads of these changes, and accelerations that balance them
-    loads, tail_slopes = draft.wide("loads", 6, lanes), draft.wide("tail_slopes", tail.nt, lanes)
-    net, turn_load = loads.part(0, 3), loads.part(3, 3)
-    reads = {"force": block(rows, VELOCITY), "moment": block(rows, OMEGA)}
-    draft.step(airborne.torso_load, b.center.only("com"), reads, net=net, turn_load=turn_load)
-    with draft.loop("k", tail.nt) as k:
-        reads = b.of_tail(k) | {
-            "inertial": tail.coordinate_v(rows, k),
-            "net": net,
-            "turn_load": turn_load,
-        }
-        target = tail_slopes.part(k, 1)
-        step = airborne.torque_without_torso
-        draft.step(step, b.center.only("inverse_mass"), reads, load=target)
-    draft.solve(b.M, tail_slopes.part(0, tail.nt))
-    by_torque = draft.wide("torque_slopes", tail.nt, tail.nt)
-    draft.unit(by_torque.part(0, tail.nt), 0)
-    draft.solve(b.M, by_torque.part(0, tail.nt))
+    # omega, and the velocity of B
+    given, linear, angular = (wide(name, 3) for name in ("d_momentum", "d_linear", "d_angular"))
+    turned = {"quaternion": b.quaternion, "angular": conserved, "d_quaternion": d_quaternion}
+    tangents(CONSERVED, "quaternion", d_momentum=given, **turned)
+    moved = {"q": b.q, "v": b.v, "d_q": d_q, "d_v": d_v}
+    tangents(AT_BASE, "q", "v", d_linear=linear, d_angular=angular, **moved)
+    body = b.factored.body
+    turn_and_drift(draft, b.inertia, body, given[0], linear[0], angular[0], d_v)
 
-    turns = draft.array("turns", 3, 4)
-    columns = {f"column_{k}": turns[k] for k in range(4)}
-    reads = {"quaternion": b.quaternion, "momentum": b.momentum}
-    draft.step(airborne.turn_of_quaternion, reads, **columns)
-    return AirborneSlopes(directions, omega, tail_slopes, loads, by_omega, by_torque, turns, a)
+    # accelerations
+    a, rows, d_v_dot = draft.array("a", 3), wide("rows", tail.nv), wide("d_v_dot", tail.nv)
+    draft.copy(a[0], block(b.v_dot, VELOCITY))
+    tangents(CORE, "q", "v", v_dot=b.v_dot, a=a, d_force=rows, **moved)
+    b.factored.solve(minus(draft, rows), d_v_dot)
+    unit = draft.wide("unit_torque", tail.nt, tail.nt)
+    by_torque = draft.wide("by_torque", tail.nv, tail.nt)
+    draft.unit(unit.whole(), 0)
+    b.factored.solve(weightless(draft, lambda k: unit.part(k, 1)), by_torque)
+    return AirborneSlopes(d_quaternion, d_q, d_v, d_v_dot, by_torque, a)
 
 
-def store_omega(b: Balance, directions: Directions, rows: Array, omega: Array) -> None:
-    """Store the derivatives of omega: by the momentum, and by the momentum that the tail takes from
-    the torso.
-    """
-    draft, tail = b.draft, b.draft.tail
-    draft.unit(omega.part(0, TURN), 0)
-    forces = {f"row_{axis}": rows.lane(k, 0, TURN) for k, axis in enumerate("xyz")}
-    with draft.loop("i", tail.segments) as i, draft.loop("k", PER_SEGMENT) as k:
-        number, rate = coordinate(i) + k, directions.of_v(i) + k
-        reads = {"column": column_of(b.columns, number), "coupling": b.coupling[number]}
-        reads |= {
-            "w": b.omega,
-            "force": rows.down(VELOCITY.start, rate, 3),
-            "moment": rows.down(OMEGA.start, rate, 3),
-            "row": rows.lane(number + TORSO_NV, 0, TURN),
-        }
-        target = omega.down(0, directions.of_q(i) + k, TURN)
-        draft.step(airborne.momentum_slope, b.center, reads, forces, momentum=target)
-        one = {"gain": b.coupling[number], "rate": draft.fixed("one", [1])}
-        draft.step(airborne.taken_back, one, part=omega.down(0, rate, TURN))
-    draft.solve(b.inertia, omega.part(0, TURN))
-
-
-def chain(draft: Draft, rows: Array, omega: Array) -> Array:
-    """Turn slopes at fixed omega into slopes at fixed momentum; return the slopes along omega."""
-    by_omega = draft.array("by_omega", TURN, draft.tail.nv)
-    turning = {f"omega_{k}": omega.part(k, 1) for k in range(TURN)}
-    with draft.loop("row", draft.tail.nv) as r:
-        draft.copy(by_omega[r], rows.lane(r, 0, TURN))
-        draft.fill(rows.lane(r, 0, TURN), 0)
-        draft.step(airborne.chained_row, turning, {"by_omega": by_omega[r]}, row_=rows.part(r, 1))
-    return by_omega
-
-
-def store_jacobian(b: Balance, slopes: AirborneSlopes, J: Array) -> None:
+def store_jacobian(draft: Draft, b: Balance, slopes: AirborneSlopes, J: Array) -> None:
     """Store d(y)/d(x, tau), row by row."""
-    draft, tail, directions = b.draft, b.draft.tail, slopes.directions
-    size, nt = tail.airborne_arguments, tail.nt
-    q, v, tau = at_coordinates(tail), at_rates(tail), tail.airborne_state
+    tail, size = draft.tail, draft.tail.airborne_arguments
+    nt, count, second = tail.nt, tail.airborne_state, at_rates(tail)
+    omega, turn = block(b.v, OMEGA), block(slopes.d_v, OMEGA)
+    rate = draft.wide("d_rate", 4, count)
+    reads = {"quaternion": slopes.d_quaternion[0], "turn": omega}
+    draft.step(rotations.turned_quaternion, reads, rate=rate[0])
+    reads = {"quaternion": b.quaternion[0], "turn": turn}
+    draft.step(rotations.turned_quaternion, reads, rate_=rate[0])
 
-    def spread(row: Index, source: Array, number: Index) -> None:
-        reads = {"row": source.lane(number, 0, TURN)}
-        first = row * size
-        draft.step(airborne.by_quaternion, slopes.turn(), reads, row=J.part(first, 4))
-        with draft.loop("i", tail.segments) as i:
-            for start, lane in ((q, directions.of_q(i)), (v, directions.of_v(i))):
-                to = J.part(first + coordinate(i) + start, PER_SEGMENT)
-                draft.copy(to, source.lane(number, lane, PER_SEGMENT))
-
-    # of the rates of coordinates, of q_t_ddot, of omega
     draft.fill(J.whole(), 0)
+    sources = (rate, 0, 0, 4), (slopes.d_v_dot, TORSO_NV, second, nt), (slopes.d_v, OMEGA.start, count, TURN)
+    for source, first, row, rows in sources:
+        with draft.loop("row", rows) as r:
+            draft.copy(J.part((r + row) * size, count), source.lane(r + first, 0, count))
     with draft.loop("k", nt) as k:
-        draft.fill(J.part(size * q + v + (size + 1) * k, 1), 1)
-        spread(k + v, slopes.tail, k)
-        to = J.part(size * k + (size * v + tau), nt)
-        draft.copy(to, slopes.by_torque.lane(k, 0, nt))
-    with draft.loop("k", TURN) as k:
-        spread(k + tau, slopes.omega, k)
-
-    # of the quaternion's rate
-    turning = {"quaternion": b.quaternion}
-    with draft.loop("k", tau) as k:
-        reads = turning | {"turn": J.part(k + size * tau, TURN, size)}
-        draft.step(rotations.turned_quaternion, reads, rate=J.part(k, 4, size))
-    rows = {f"row_{k}_": J.part(k * size, 4) for k in range(4)}
-    draft.step(airborne.turning_by_quaternion, {"omega": b.omega}, **rows)
+        draft.fill(J.part((k + at_coordinates(tail)) * size + k + second, 1), 1)
+        to = J.part((k + second) * size + count, nt)
+        draft.copy(to, slopes.by_torque.lane(k + TORSO_NV, 0, nt))
