@@ -17,7 +17,7 @@ from ..function import Assembly, Function, assemble
 from ..layout import block
 from .balance import QUATERNION, TURN, Balance, assemble_rates, at_coordinates, at_rates
 from .equations import AT_BASE, CONSERVED
-from .slopes import AirborneSlopes, assemble_derivatives
+from .slopes import assemble_derivatives, placed
 
 
 def assemble_hessian(draft: Draft, arrays: dict[str, Array]) -> None:
@@ -99,12 +99,17 @@ def assemble_hessian(draft: Draft, arrays: dict[str, Array]) -> None:
     add_products(slopes.by_torque, by_q["v_dot"], 0, torques)
     add_products(slopes.d_v, turn, OMEGA.start, across)
     add_products(slopes.d_v, by_v, 0, both)
-    with draft.loop("k", count) as k:
-        draft.copy(H.part(k * size, count), both.lane(k, 0, count))
-    with draft.loop("k", count) as k:
-        for source, at, lanes in ((along, first, nt), (across, 0, 4)):
-            draft.copy(H.part(k * size + at, lanes), source.lane(k, 0, lanes), adds=True)
-            draft.copy(H.part(k + at * size, lanes, size), source.lane(k, 0, lanes), adds=True)
+    for lane, at, some in placed(tail):
+        with draft.loop("k", some) as k:
+            for other, beside, more_ in placed(tail):
+                to = H.part((k + at) * size + beside, more_)
+                draft.copy(to, both.lane(k + lane, other, more_))
+    for lane, at, some in placed(tail):
+        with draft.loop("k", some) as k:
+            for source, begin, lanes in ((along, first, nt), (across, 0, 4)):
+                row = source.lane(k + lane, 0, lanes)
+                draft.copy(H.part((k + at) * size + begin, lanes), row, adds=True)
+                draft.copy(H.part(k + at + begin * size, lanes, size), row, adds=True)
     with draft.loop("k", 4) as k:
         draft.copy(H.part(k * size, 4), twice.lane(k, 0, 4), adds=True)
     with draft.loop("k", nt) as k:

@@ -5,13 +5,15 @@ from dataclasses import dataclass
 from serpentail_scene.layout import OMEGA, TORSO_NV, VELOCITY
 
 from ...autodiff.forward import tangent_program
-from ...ir.program import Array
-from ...mechanics import rotations
+from ...ir.program import Array, as_index
+from ...mechanics import airborne, rotations
 from ..derivatives.differentiated import CORE
 from ..derivatives.jacobians import minus, weightless
 from ..draft import Draft
-from ..function import Function, assemble
+from ..function import assemble
 from ..layout import block
+from ..sweeps.inertia import column_of
+from ..tail import Tail
 from .balance import (
     QUATERNION,
     TURN,
@@ -46,6 +48,15 @@ def assemble_derivatives(draft: Draft, arrays: dict[str, Array]) -> tuple[Balanc
     return b, slopes
 
 
+def placed(tail: Tail) -> tuple[tuple[int, int, int], ...]:
+    """Return runs of lanes: their first lane, its position in x, and how many they are.
+
+    Coordinates come first, because only they move momenta at fixed velocities.
+    """
+    moved = 2 * tail.nt
+    return (0, at_coordinates(tail), moved), (moved, QUATERNION.start, QUATERNION.stop)
+
+
 def store_slopes(draft: Draft, b: Balance, conserved: Array) -> AirborneSlopes:
     """Differentiate the equations of momenta, then those of forces at fixed accelerations."""
     tail, lanes = draft.tail, draft.tail.airborne_state
@@ -53,29 +64,33 @@ def store_slopes(draft: Draft, b: Balance, conserved: Array) -> AirborneSlopes:
     def wide(name: str, size: int) -> Array:
         return draft.wide(name, size, lanes)
 
-    def tangents(function: Function, *active: str, **arguments: Array) -> None:
-        draft.call(tangent_program(assemble(function, tail), active, lanes), **arguments)
-
     # what each lane moves
     d_quaternion, d_q, d_v = wide("d_quaternion", 4), wide("d_q", tail.nq), wide("d_v", tail.nv)
-    draft.unit(d_quaternion[0], QUATERNION.start)
-    draft.unit(tail.all_q(d_q), at_coordinates(tail))
+    draft.unit(tail.all_q(d_q), 0)
     draft.fill(d_v.whole(), 0)
-    draft.unit(tail.all_v(d_v), at_rates(tail))
+    draft.unit(tail.all_v(d_v), tail.nt)
+    draft.unit(d_quaternion[0], 2 * tail.nt)
 
     # omega, and the velocity of B
     given, linear, angular = (wide(name, 3) for name in ("d_momentum", "d_linear", "d_angular"))
+    inner = tangent_program(assemble(CONSERVED, tail), ("quaternion",), lanes)
     turned = {"quaternion": b.quaternion, "angular": conserved, "d_quaternion": d_quaternion}
-    tangents(CONSERVED, "quaternion", d_momentum=given, **turned)
-    moved = {"q": b.q, "v": b.v, "d_q": d_q, "d_v": d_v}
-    tangents(AT_BASE, "q", "v", d_linear=linear, d_angular=angular, **moved)
+    draft.call(inner, d_momentum=given, **turned)
+    few = as_index(tail.nt)
+    inner = tangent_program(assemble(AT_BASE, tail), ("q",), lanes, lambda loops: few)
+    draft.call(inner, q=b.q, v=b.v, d_q=d_q, d_linear=linear, d_angular=angular)
+    columns = b.factored.columns
+    with draft.loop("k", tail.nt) as k:
+        reads = {"column": column_of(columns, k), "rate": tail.coordinate_v(d_v, k)}
+        draft.step(airborne.tail_momentum, reads, linear_=linear[0], angular_=angular[0])
     body = b.factored.body
     turn_and_drift(draft, b.inertia, body, given[0], linear[0], angular[0], d_v)
 
     # accelerations
     a, rows, d_v_dot = draft.array("a", 3), wide("rows", tail.nv), wide("d_v_dot", tail.nv)
     draft.copy(a[0], block(b.v_dot, VELOCITY))
-    tangents(CORE, "q", "v", v_dot=b.v_dot, a=a, d_force=rows, **moved)
+    inner = tangent_program(assemble(CORE, tail), ("q", "v"), lanes)
+    draft.call(inner, q=b.q, v=b.v, v_dot=b.v_dot, a=a, d_q=d_q, d_v=d_v, d_force=rows)
     b.factored.solve(minus(draft, rows), d_v_dot)
     unit = draft.wide("unit_torque", tail.nt, tail.nt)
     by_torque = draft.wide("by_torque", tail.nv, tail.nt)
@@ -99,7 +114,8 @@ def store_jacobian(draft: Draft, b: Balance, slopes: AirborneSlopes, J: Array) -
     sources = (rate, 0, 0, 4), (slopes.d_v_dot, TORSO_NV, second, nt), (slopes.d_v, OMEGA.start, count, TURN)
     for source, first, row, rows in sources:
         with draft.loop("row", rows) as r:
-            draft.copy(J.part((r + row) * size, count), source.lane(r + first, 0, count))
+            for lane, at, some in placed(tail):
+                draft.copy(J.part((r + row) * size + at, some), source.lane(r + first, lane, some))
     with draft.loop("k", nt) as k:
         draft.fill(J.part((k + at_coordinates(tail)) * size + k + second, 1), 1)
         to = J.part((k + second) * size + count, nt)
