@@ -100,12 +100,15 @@ def without_writes(body: ir.Body, arrays: Collection[str]) -> ir.Body:
 
 
 def _partly_written(body: ir.Body) -> list[ir.Ref]:
-    """Return the wide arrays of which some statement writes only a part of the lanes."""
+    """Return the wide arrays of which some statement writes only a part of the lanes, and that are
+    read beyond: outputs, and where the part grows from iteration to iteration.
+    """
     arrays: dict[str, ir.Array] = {}
     for statement, _ in ir.statements(body):
         if isinstance(statement, ir.Apply) and statement.columns:
             for ref in writes(statement):
-                if ref.array.lanes:
+                grows = bool(statement.columns.terms)
+                if ref.array.lanes and (grows or ref.array.role == "output"):
                     arrays[ref.array.name] = ref.array
     return [a.whole() for a in arrays.values()]
 

@@ -70,7 +70,11 @@ def turn_and_drift(
 def assemble_rates(draft: Draft, arrays: dict[str, Array]) -> Balance:
     """Rates of an airborne state, and omega."""
     tail, x, nt = draft.tail, arrays["x"], draft.tail.nt
-    q, v, v_dot = draft.array("q", tail.nq), draft.array("v", tail.nv), draft.array("v_dot", tail.nv)
+    q, v, v_dot = (
+        draft.array("q", tail.nq),
+        draft.array("v", tail.nv),
+        draft.array("v_dot", tail.nv),
+    )
     draft.copy(tail.all_q(q), x.part(at_coordinates(tail), nt))
     draft.copy(tail.all_v(v), x.part(at_rates(tail), nt))
     quaternion = draft.array("quaternion", 4)

@@ -1,4 +1,4 @@
-"""The equations that give omega from an angular momentum, as programs to be differentiated."""
+"""The equations beside H v_dot + C that hold in flight: they give omega from an angular momentum, as programs to be differentiated."""
 
 from serpentail_scene.signatures.arguments import ANGULAR, Argument, Q, V
 

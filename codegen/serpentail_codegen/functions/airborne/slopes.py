@@ -28,12 +28,11 @@ from .equations import AT_BASE, CONSERVED
 
 @dataclass(frozen=True)
 class AirborneSlopes:
-    """Derivatives of an airborne motion, a lane for each number of x; ``by_torque``: of v_dot, a
-    lane for each torque.  ``a``: acceleration of B.
+    """Derivatives of an airborne motion, a lane for each number of x as ``placed`` tells;
+    ``by_torque``: of v_dot, a lane for each torque.  ``a``: acceleration of B.
     """
 
     d_quaternion: Array
-    d_q: Array
     d_v: Array
     d_v_dot: Array
     by_torque: Array
@@ -76,8 +75,8 @@ def store_slopes(draft: Draft, b: Balance, conserved: Array) -> AirborneSlopes:
     inner = tangent_program(assemble(CONSERVED, tail), ("quaternion",), lanes)
     turned = {"quaternion": b.quaternion, "angular": conserved, "d_quaternion": d_quaternion}
     draft.call(inner, d_momentum=given, **turned)
-    few = as_index(tail.nt)
-    inner = tangent_program(assemble(AT_BASE, tail), ("q",), lanes, lambda loops: few)
+    moved = as_index(tail.nt)  # lanes
+    inner = tangent_program(assemble(AT_BASE, tail), ("q",), lanes, lambda loops: moved)
     draft.call(inner, q=b.q, v=b.v, d_q=d_q, d_linear=linear, d_angular=angular)
     columns = b.factored.columns
     with draft.loop("k", tail.nt) as k:
@@ -96,7 +95,7 @@ def store_slopes(draft: Draft, b: Balance, conserved: Array) -> AirborneSlopes:
     by_torque = draft.wide("by_torque", tail.nv, tail.nt)
     draft.unit(unit.whole(), 0)
     b.factored.solve(weightless(draft, lambda k: unit.part(k, 1)), by_torque)
-    return AirborneSlopes(d_quaternion, d_q, d_v, d_v_dot, by_torque, a)
+    return AirborneSlopes(d_quaternion, d_v, d_v_dot, by_torque, a)
 
 
 def store_jacobian(draft: Draft, b: Balance, slopes: AirborneSlopes, J: Array) -> None:
@@ -111,7 +110,11 @@ def store_jacobian(draft: Draft, b: Balance, slopes: AirborneSlopes, J: Array) -
     draft.step(rotations.turned_quaternion, reads, rate_=rate[0])
 
     draft.fill(J.whole(), 0)
-    sources = (rate, 0, 0, 4), (slopes.d_v_dot, TORSO_NV, second, nt), (slopes.d_v, OMEGA.start, count, TURN)
+    sources = (
+        (rate, 0, 0, 4),
+        (slopes.d_v_dot, TORSO_NV, second, nt),
+        (slopes.d_v, OMEGA.start, count, TURN),
+    )
     for source, first, row, rows in sources:
         with draft.loop("row", rows) as r:
             for lane, at, some in placed(tail):

@@ -20,10 +20,6 @@ from ..sweeps.wrenches import inertial_forces, virtual_power
 POWER = Argument("power", (1,), "lambda^T (H v_dot + C)")
 A = Argument("a", (3,), "R^T (p_b_ddot + g z), which stands for v_dot[0:3]")
 U_VIRTUAL = Argument("u", (3,), "R^T multiplier[0:3], the virtual velocity of B")
-DRIFT = Argument("drift", (3,), "velocity of B relative to the COM, torso axes")
-RIGID = Argument("rigid", (3,), "turn of a virtual motion as one rigid body")
-SLIDE = Argument("slide", (3,), "its velocity at B")
-RIGID_MOTION = {"w_rigid": "rigid", "u_rigid": "slide", "drift": "drift"}
 FIRST_MOMENT = Argument("moment", (3,), "first moment about B, torso axes (kg m)")
 
 
@@ -54,9 +50,7 @@ def assemble_first_moment(draft: Draft, arrays: dict[str, Array]) -> None:
 
 
 def assemble_virtual_power(draft: Draft, arrays: dict[str, Array]) -> None:
-    """lambda^T (H v_dot + C) in torso axes, as one sum over the links, from the torso to the tip;
-    with a rigid motion among the arguments, also the power of the momentum under it.
-    """
+    """lambda^T (H v_dot + C) in torso axes, as one sum over the links, from the torso to the tip."""
     v_dot, multiplier = arrays["v_dot"], arrays["multiplier"]
     state = draft.state(arrays["q"], arrays["v"])
     segments = prepared(draft, state)
@@ -64,9 +58,7 @@ def assemble_virtual_power(draft: Draft, arrays: dict[str, Array]) -> None:
     # the torso moves by v and v_dot, and virtually by the multiplier
     motion = {"w": state.omega, "w_dot": block(v_dot, OMEGA), "a": arrays["a"][0]}
     virtual = {"w_virtual": block(multiplier, OMEGA), "u_virtual": arrays["u"][0]}
-    rigid = {name: arrays[a][0] for name, a in RIGID_MOTION.items() if a in arrays}
-    start = Vectors(motion | virtual | rigid)
-    virtual_power(draft, segments, start, multiplier, v_dot, arrays["power"][0])
+    virtual_power(draft, segments, Vectors(motion | virtual), multiplier, v_dot, arrays["power"][0])
     add_passive_power(draft, state, multiplier, arrays["power"][0])
 
 
@@ -82,15 +74,5 @@ VIRTUAL_POWER = Function(
     (POWER,),
     assemble_virtual_power,
 )
-# for second derivatives of airborne motion: its weights are Lagrange's multipliers of the equations
-# of accelerations, and of A_r v = R^T h, which determines omega
-POWER_AND_MOMENTUM = Function(
-    "power_and_momentum",
-    "lambda^T (H v_dot + C), and the momentum's power under a rigid motion",
-    (Q, V, V_DOT, A, MULTIPLIER, U_VIRTUAL, DRIFT, RIGID, SLIDE),
-    (POWER,),
-    assemble_virtual_power,
-)
-
 # functions of one state without contact, of which derivatives are taken
 FUNCTIONS = signed(dynamics.ASSEMBLIES | kinematics.ASSEMBLIES)

@@ -6,7 +6,7 @@ from dataclasses import replace
 from serpentail_scene.layout import OMEGA, VELOCITY
 
 from ...ir.program import Array, Index, Ref
-from ...mechanics import airborne_power, branch, mount, torso
+from ...mechanics import branch, mount, torso
 from ..draft import Draft
 from ..layout import block
 from ..scope import Motion, State, Vectors
@@ -108,15 +108,11 @@ def virtual_power(
     ``multiplier``; ``segments`` are those of each chain.
 
     ``start``: ``w``, ``w_dot``, ``a`` of the torso and ``w_virtual``, ``u_virtual``, its virtual
-    velocities. With ``w_rigid``, ``u_rigid`` and ``drift``, the power of the momentum of omega,
-    drift and rates under a motion as one rigid body is added, of a tail alone.
+    velocities.
     """
-    rigid = "w_rigid" in start.named
     draft.step(torso.torso_power, start, power=power)
-    if rigid:
-        draft.step(airborne_power.torso_momentum_power, start, power_=power)
     for own in on_each(draft, segments):
-        carried = _virtual_at_root(draft, seen_virtually(draft, start), rigid)
+        carried = _virtual_at_root(draft, seen_virtually(draft, start))
 
         # from the mount to the tip
         for i, g in each_piece(draft):
@@ -124,29 +120,20 @@ def virtual_power(
                 own.motion(i, v_dot),
                 {"virtual_rates": draft.tail.segment_v(multiplier, i)},
             )
-            tail = mechanism(draft)
-            step = tail.power_and_momentum if rigid else tail.power
+            step = mechanism(draft).power
             draft.step(step, own.at(i, g), *rates, carried, power_=power, **carried)
 
 
-def _virtual_at_root(draft: Draft, start: Vectors, rigid: bool) -> Vectors:
+def _virtual_at_root(draft: Draft, start: Vectors) -> Vectors:
     """Carry the torso's motion and its virtual velocities to a mount, into the axes at the root."""
-    turning = ("w", "w_dot", "w_virtual", "w_rigid") if rigid else ("w", "w_dot", "w_virtual")
-    virtual = [("w_virtual", "u_virtual")] + [("w_rigid", "u_rigid")] * rigid
-    names = ("w", "w_dot", "a", "w_virtual", "u_virtual", *("u", "w_rigid", "u_rigid") * rigid)
+    names = ("w", "w_dot", "a", "w_virtual", "u_virtual")
     carried = Vectors({name: draft.vector(f"{name}_here", 3) for name in names})
     draft.step(torso.mount_acceleration, start, a_mount=carried["a"])
-    for w, u in virtual:
-        draft.step(torso.mount_velocity, {"w": start[w], "u": start[u]}, u=carried[u])
-    if rigid:
-        reads = {"w": start["w"], "u": start["drift"]}
-        draft.step(torso.mount_velocity, reads, u=carried["u"])
-    for name in turning:
+    reads = {"w": start["w_virtual"], "u": start["u_virtual"]}
+    draft.step(torso.mount_velocity, reads, u=carried["u_virtual"])
+    for name in ("w", "w_dot", "w_virtual"):
         draft.copy(carried[name], start[name])
     across(draft, mount.motion_at_root, carried.only("w", "w_dot", "a").named)
-    if rigid:
-        across(draft, mount.velocity_at_root, carried.only("u").named)
-    for w, u in virtual:
-        turned = {"w_virtual": carried[w], "u_virtual": carried[u]}
-        across(draft, mount.virtual_velocity_at_root, turned)
+    virtual = carried.only("w_virtual", "u_virtual").named
+    across(draft, mount.virtual_velocity_at_root, virtual)
     return carried

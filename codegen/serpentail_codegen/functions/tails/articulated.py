@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from fractions import Fraction
 
 from ...ir.program import Array, Ref
-from ...mechanics import airborne_power, link
+from ...mechanics import link
 from ...scene.variant import SegmentRun
 from ..draft import Draft
 from ..scope import Instead, Motion, State, Vectors
@@ -115,5 +115,4 @@ ARTICULATED = Mechanism(
     gather_wrench=link.gather_wrench,
     gather_moment=link.gather_moment,
     power=link.link_power,
-    power_and_momentum=airborne_power.link_power_and_momentum,
 )

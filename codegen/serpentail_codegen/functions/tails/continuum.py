@@ -6,7 +6,7 @@ from math import ceil, log2
 
 from ...ir.program import Array, Index, Ref
 from ...ir.step import Step
-from ...mechanics import airborne_power, arc, arc_inertia, arc_shape, arc_wrench
+from ...mechanics import arc, arc_inertia, arc_shape, arc_wrench
 from ...mechanics.lower import derive
 from ..draft import Draft
 from ..scope import Instead, Motion, State, Vectors
@@ -157,5 +157,4 @@ CONTINUUM = Mechanism(
     gather_wrench=arc_wrench.gather_segment_wrench,
     gather_moment=arc_inertia.gather_segment_moment,
     power=arc_wrench.segment_power,
-    power_and_momentum=airborne_power.segment_power_and_momentum,
 )

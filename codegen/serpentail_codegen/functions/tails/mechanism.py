@@ -106,7 +106,6 @@ class Mechanism:
     gather_wrench: StepFunction
     gather_moment: StepFunction
     power: StepFunction
-    power_and_momentum: StepFunction
 
 
 def simplified(function: StepFunction, state: State, forced: bool = True) -> Step:
