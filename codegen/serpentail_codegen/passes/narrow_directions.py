@@ -42,9 +42,15 @@ def has_directions(program: ir.Program) -> bool:
 
 
 def places_lanes(program: ir.Program) -> bool:
-    """Tell if a program writes single lanes, which no line of wide operations can express."""
-    body = inlined(program).body
-    return any(ref.lane and ref.array.lanes for s, _ in ir.statements(body) for ref in writes(s))
+    """Tell if a program writes single lanes, or reads them for what is wide: no line of wide
+    operations can express that.
+    """
+
+    def places(statement: ir.Statement) -> bool:
+        wide = [ref for ref in writes(statement) if ref.array.lanes]
+        return any(ref.lane for ref in wide) or bool(wide and any(r.lane for r in reads(statement)))
+
+    return any(places(s) for s, _ in ir.statements(inlined(program).body))
 
 
 class _Turns:

@@ -1,4 +1,7 @@
-"""The equations beside H v_dot + C that hold in flight: they give omega from an angular momentum, as programs to be differentiated."""
+"""What holds in flight beside H v_dot + C = loads: the equations that give omega from a momentum.
+
+They are programs, to be differentiated.
+"""
 
 from serpentail_scene.signatures.arguments import ANGULAR, Argument, Q, V
 

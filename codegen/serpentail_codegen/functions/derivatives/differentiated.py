@@ -50,7 +50,7 @@ def assemble_first_moment(draft: Draft, arrays: dict[str, Array]) -> None:
 
 
 def assemble_virtual_power(draft: Draft, arrays: dict[str, Array]) -> None:
-    """lambda^T (H v_dot + C) in torso axes, as one sum over the links, from the torso to the tip."""
+    """lambda^T (H v_dot + C) in torso axes, as one sum over the links from the torso to the tip."""
     v_dot, multiplier = arrays["v_dot"], arrays["multiplier"]
     state = draft.state(arrays["q"], arrays["v"])
     segments = prepared(draft, state)
