@@ -11,6 +11,9 @@ if TYPE_CHECKING:
 # tail coordinates (rad) that no motion reaches: stops there have no effect
 OUT_OF_REACH = 1e6
 ENDS = (("tail_stop_lower", -1), ("tail_stop_upper", 1))
+BEHIND = (
+    "{name} is {angle:.6g} rad, behind {stop} {at:.6g} by more than tail_stop_width {width:.6g}"
+)
 
 
 def passive_force(values: Mapping[str, Any], angles: Any, rates: Any) -> Any:
@@ -50,12 +53,12 @@ def behind_stops(model: "Model", angles: Any) -> str:
     for (name, _), (way, _) in zip(ENDS, _ways(values, angles), strict=False):
         run, coordinate = np.unravel_index(way.argmax(), way.shape)
         if way[run, coordinate] > 1:
-            stop = np.broadcast_to(_of(values, name), np.shape(angles))[run, coordinate]
-            width = np.broadcast_to(_of(values, "tail_stop_width"), np.shape(angles))
-            return (
-                f"{model.names.tail[coordinate]} is {angles[run, coordinate]:.6g} rad, behind "
-                f"{name} {stop:.6g} by more than tail_stop_width {width[run, coordinate]:.6g}"
+            at, width = (
+                np.broadcast_to(_of(values, each), np.shape(angles))[run, coordinate]
+                for each in (name, "tail_stop_width")
             )
+            numbers = {"angle": angles[run, coordinate], "at": at, "width": width}
+            return BEHIND.format(name=model.names.tail[coordinate], stop=name, **numbers)
     return ""
 
 

@@ -31,6 +31,22 @@ DEGREES = 4 * np.pi  # rad, of a segment: two whole turns; degrees are the likel
 KNEES = 3  # hip, D and knee come first in a leg, and are no contacts
 AT_ONCE = 4096  # samples
 
+WORDS = {  # of doubts; a page that computes tells them, too
+    "buried": "{part}: {depth:.3g} mm below the ground at t = {time:.4g} s, more than "
+    "{allowed:.3g} mm, and no contact there: {remedy}",
+    "add": 'add "{part}" to `contacts` of the scene',
+    "knees": "above the ankle they touch nothing: start higher, or bend the legs less",
+    "sunk": "tail: goes through the torso at t = {time:.4g} s, {depth:.2g} of the way from its "
+    "surface to its centre too deep, more than {allowed:.3g}: bend the tail less, or damp it more",
+    "pushed": "ground: pushes with {force:.4g} N at t = {time:.4g} s, {weights:.3g} body weights, "
+    "more than {most:.3g}, which legs of this size bear: let the legs move, or the animal land, "
+    "more slowly, or make the ground softer by K_n and D_n",
+    "bent": "tail: segment {segment} is bent by {bend:.3g} rad at t = {time:.4g} s, more than "
+    "{most:.3g}: {remedy}",
+    "damp": "damp it more, or give its reference smaller bends",
+    "degrees": "are degrees given in place of radians (np.radians)? If not, damp it more",
+}
+
 Moment = tuple[float, float]  # value, time (s)
 Measure = Callable[[slice], Array]  # samples -> (K,)
 
@@ -63,13 +79,9 @@ def _in_the_ground(model: Model, motion: "Trajectory") -> list[str]:
     allowed, warnings = DEEP * 2 * float(semi_axes(model).max()), []
     for part, (depth, time) in _depths(model, motion).items():
         if depth > allowed:
-            remedy = f'add "{part}" to `contacts` of the scene'
-            if part == "legs":
-                remedy = "above the ankle they touch nothing: start higher, or bend the legs less"
-            warnings.append(
-                f"{part}: {1e3 * depth:.3g} mm below the ground at t = {time:.4g} s, more than "
-                f"{1e3 * allowed:.3g} mm, and no contact there: {remedy}"
-            )
+            remedy = WORDS["knees" if part == "legs" else "add"].format(part=part)
+            lengths = {"depth": 1e3 * depth, "allowed": 1e3 * allowed}
+            warnings.append(WORDS["buried"].format(part=part, time=time, remedy=remedy, **lengths))
     return warnings
 
 
@@ -110,10 +122,7 @@ def _through_the_torso(model: Model, motion: "Trajectory") -> list[str]:
     deepest, time = _largest(motion, depth)
     if not deepest > SUNK:
         return []
-    return [
-        f"tail: goes through the torso at t = {time:.4g} s, {deepest:.2g} of the way from its "
-        f"surface to its centre too deep, more than {SUNK}: bend the tail less, or damp it more"
-    ]
+    return [WORDS["sunk"].format(time=time, depth=deepest, allowed=SUNK)]
 
 
 def torso_is_known(model: Model) -> bool:
@@ -163,11 +172,7 @@ def _blows(model: Model, motion: "Trajectory") -> list[str]:
     most = borne(model)
     if not force > most * whole:
         return []
-    return [
-        f"ground: pushes with {force:.4g} N at t = {time:.4g} s, {force / whole:.3g} body weights, "
-        f"more than {most:.3g}, which legs of this size bear: let the legs move, or the animal "
-        "land, more slowly, or make the ground softer by K_n and D_n"
-    ]
+    return [WORDS["pushed"].format(force=force, time=time, weights=force / whole, most=most)]
 
 
 def _bends(model: Model, motion: "Trajectory") -> list[str]:
@@ -176,13 +181,9 @@ def _bends(model: Model, motion: "Trajectory") -> list[str]:
     warnings = []
     for segment, k in enumerate(bends.argmax(axis=0)):
         if bends[k, segment] > MOST_BEND:
-            remedy = "damp it more, or give its reference smaller bends"
-            if bends[k, segment] > DEGREES:
-                remedy = "are degrees given in place of radians (np.radians)? If not, damp it more"
-            warnings.append(
-                f"tail: segment {segment + 1} is bent by {bends[k, segment]:.3g} rad at t = "
-                f"{motion.t[k]:.4g} s, more than {MOST_BEND:.3g}: {remedy}"
-            )
+            numbers = {"bend": bends[k, segment], "time": motion.t[k], "most": MOST_BEND}
+            remedy = WORDS["degrees" if bends[k, segment] > DEGREES else "damp"]
+            warnings.append(WORDS["bent"].format(segment=segment + 1, remedy=remedy, **numbers))
     return warnings
 
 

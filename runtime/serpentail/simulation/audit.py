@@ -22,6 +22,14 @@ ROUNDINGS = 1e5  # rounding errors
 DIFFERENCE = 100.0  # rounding errors of kinetic energies that their difference may contain
 TINY = np.finfo(float).tiny  # for bodies that neither move nor weigh anything
 BALANCED = ("kinetic", "potential", "linear_momentum")  # values at both ends that an audit needs
+WORDS = {  # of warnings; a page that computes tells them, too
+    "unbalanced": "{share:.2g} % of what was moved is not accounted for (energy {energy:.2g} J, "
+    "momentum {momentum:.2g} N s; expected below {allowed:.2g} %): take a {remedy}",
+    "unfelt": "{count} touches were shorter than a step and may have been missed: take a shorter "
+    "step, or an adaptive method",
+    "near": "{group}: point {point} passed {height:.2g} mm above the ground at t = {time:.4g} s "
+    "with an error of {error:.2g} mm: a smaller rtol decides whether it touches",
+}
 Arrays = dict[str, np.ndarray]
 
 
@@ -171,22 +179,23 @@ def warnings_of(audit: Audit, info: Mapping[str, Any], eps: float) -> list[str]:
     """Return warnings about imbalance and missed touches, from the audit and info of one run."""
     found = []
     allowed = allowance(info, eps)
-    remedy = "take a smaller rtol" if "rtol" in info else "take a shorter step"
     if not audit.relative <= allowed:
-        found.append(
-            f"{100 * audit.relative:.2g} % of what was moved is not accounted for (energy "
-            f"{audit.energy:.2g} J, momentum {np.linalg.norm(audit.momentum):.2g} N s; expected "
-            f"below {100 * allowed:.2g} %): {remedy}"
-        )
+        words = {
+            "share": 100 * audit.relative,
+            "energy": audit.energy,
+            "momentum": np.linalg.norm(audit.momentum),
+            "allowed": 100 * allowed,
+            "remedy": remedy(info),
+        }
+        found.append(WORDS["unbalanced"].format(**words))
     if info.get("unfelt"):
-        found.append(
-            f"{info['unfelt']} touches were shorter than a step and may have been missed: take a "
-            "shorter step, or an adaptive method"
-        )
+        found.append(WORDS["unfelt"].format(count=info["unfelt"]))
     if near := info.get("near"):
-        found.append(
-            f"{near['group']}: point {near['point']} passed {1e3 * near['height']:.2g} mm above "
-            f"the ground at t = {near['time']:.4g} s with an error of {1e3 * near['error']:.2g} "
-            "mm: a smaller rtol decides whether it touches"
-        )
+        lengths = {name: 1e3 * near[name] for name in ("height", "error")}
+        found.append(WORDS["near"].format(**near | lengths))
     return found
+
+
+def remedy(info: Mapping[str, Any]) -> str:
+    """Return what makes a method more exact."""
+    return "smaller rtol" if "rtol" in info else "shorter step"

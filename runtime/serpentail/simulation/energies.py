@@ -23,6 +23,7 @@ from .runs.outcomes import Samples
 
 # numbers whose eighth power a real can hold
 MODEST = {np.dtype(real): float(np.finfo(real).max) ** 0.125 for real in (np.float32, np.float64)}
+EASE_STOPS = "{behind}: make the stop stiffer, or its width larger"
 INTERRUPTED = "interrupted"  # the failure of a run that Ctrl-C ended, whose error has no words
 MEASURES = {"energy": ("kinetic", "potential"), "momentum": ("linear_momentum", "angular_momentum")}
 
@@ -128,7 +129,7 @@ class Energies:
         warnings = warnings_of(books, info, eps)
         behind = behind_stops(self.model, samples.q[:, self.model.layout.tail_q])
         if behind:
-            warnings.append(f"{behind}: make the stop stiffer, or its width larger")
+            warnings.append(EASE_STOPS.format(behind=behind))
         return info | books.info() | {"warnings": warnings}
 
     def _ends(self) -> dict[str, np.ndarray]:

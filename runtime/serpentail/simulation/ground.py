@@ -23,6 +23,10 @@ MAX_STATIC_LOAD = (
 LANDED_AT = "landed_at"  # in a run's info: the time (s) at which the legs' landing began
 LEG_ANGLES = 4  # of both legs, which their rates follow
 MOST_EVENTS = 10_000  # that are kept
+DEEP = (
+    "q0{whose}: point {point} ({group}) is {depth:.3g} mm deep at the start, more than "
+    "{limit:.3g} mm: raise q0[2] by {height:.4g} m"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,11 +93,9 @@ class GroundSettings:
         if len(wrong):
             heights, limit, k = heights[wrong[0]], limits[wrong[0]], int(heights[wrong[0]].argmin())
             deepest, whose = -float(heights[k]), f" of run {wrong[0]}" if start.many else ""
-            where = f"point {k} ({self._group_of(k)}) is {1e3 * deepest:.3g} mm deep at the start"
-            raise SimulationError(
-                f"q0{whose}: {where}, more than {1e3 * limit:.3g} mm: raise q0[2] by {deepest:.4g} "
-                "m"
-            )
+            lengths = {"depth": 1e3 * deepest, "limit": 1e3 * limit, "height": deepest}
+            point = {"point": k, "group": self._group_of(k)}
+            raise SimulationError(DEEP.format(whose=whose, **point, **lengths))
 
     def _heights(self, model: Model, start: Start, parameters: RunParameters) -> np.ndarray:
         """Heights (k, points) in m of the points at the starts."""

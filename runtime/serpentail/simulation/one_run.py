@@ -66,7 +66,7 @@ class RunAgain:
             if start.start >= start.end:
                 raise SimulationError(f"at t = {start.start:.6g} s a phase ends after the next one")
         method = self.method.coarser(coarse, start.interval)
-        samples = self._made(start, ground, method)
+        samples = integrate(self.runs(start, ground, method))
         info = samples.info | method.info
         return trajectory_or_error(start.model, replace(samples, info=info), ground)
 
@@ -79,15 +79,15 @@ class RunAgain:
         real = self.start.model.parameter_vector.dtype
         wanted = times.astype(real).astype(float)
         sampled = np.concatenate([self.start.times.astype(real), wanted])
-        samples = self._made(self.start.sampled_at(np.unique(sampled)), self.ground, self.method)
+        start = self.start.sampled_at(np.unique(sampled))
+        samples = integrate(self.runs(start, self.ground, self.method))
         if samples.failure is not None:
             raise samples.failure
         rows = np.minimum(np.searchsorted(samples.t, wanted), len(samples.t) - 1)
         return samples.q[rows], samples.v[rows]
 
-    def _made(self, start: Start, ground: GroundSettings, method: IntegrationMethod) -> Samples:
-        """Return the samples of a run."""
+    def runs(self, start: Start, ground: GroundSettings, method: IntegrationMethod) -> RunSet:
+        """Return a run to make, with the same controller."""
         model = start.model
         actuations = RunActuations(Records(model), self.controller, start, ground.legs)
-        parameters = model.parameters_of_runs(None, 1)
-        return integrate(RunSet(actuations, start, ground, parameters, method))
+        return RunSet(actuations, start, ground, model.parameters_of_runs(None, 1), method)

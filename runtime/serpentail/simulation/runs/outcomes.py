@@ -13,6 +13,10 @@ if TYPE_CHECKING:
     from .single import RunSet
 
 SHORT_STEPS = (STEP_TOO_SMALL, TOO_MANY_STEPS)  # statuses: the steps became too short
+FAILED = "at t = {t:.6g} s {why}"
+TOO_STRONG = (
+    " Torques reach {torque:.3g} N m, and a joint {rate:.3g} rad/s: is a torque far too large?"
+)
 COUNTS = ("steps", "rejected", "evaluations", "factorisations")
 
 
@@ -61,10 +65,9 @@ def failed(status: int, t: float, extremes: tuple[float, float] = (0, 0)) -> Sim
     extremes: largest torque (N m) and rate of a tail coordinate (rad/s) so far.
     """
     torque, rate = extremes
-    words = f"at t = {t:.6g} s {WHY[status]}"
+    words = FAILED.format(t=t, why=WHY[status])
     if status in SHORT_STEPS and torque and rate > LARGEST["rad/s"][0]:
-        words += f" Torques reach {torque:.3g} N m, and a joint {rate:.3g} rad/s: is a torque far"
-        words += " too large?"
+        words += TOO_STRONG.format(torque=torque, rate=rate)
     return SimulationError(words)
 
 

@@ -1,0 +1,1 @@
+"""What a page needs to compute a run again: the model's C as WebAssembly, its memory, its knobs."""
