@@ -67,13 +67,19 @@ export class Animal {
     this.centre = new Mesh(BALL, new MeshBasicMaterial({ depthTest: false, transparent: true }));
     this.centre.scale.setScalar(0.065 * Math.max(...this.run.body.semi_axes));
     this.centre.renderOrder = 2;
+    this.path = new Line(new BufferGeometry(), new LineBasicMaterial());
+    this.path.frustumCulled = false;
+    this.group.add(this.centre, this.path);
+    this.trace();
+  }
+
+  // Draws the path of the centre of mass.
+  trace() {
     const places = new Float32Array(3 * this.run.rows);
     for (let row = 0; row < this.run.rows; row++)
       this.run.point("com", row, 0, to).toArray(places, 3 * row);
-    const line = new BufferGeometry().setAttribute("position", new BufferAttribute(places, 3));
-    this.path = new Line(line, new LineBasicMaterial());
-    this.path.frustumCulled = false;
-    this.group.add(this.centre, this.path);
+    this.path.geometry.dispose();
+    this.path.geometry.setAttribute("position", new BufferAttribute(places, 3));
   }
 
   // The shadow lies on the ground straight below the torso and shows how high the torso is.

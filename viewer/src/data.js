@@ -1,11 +1,16 @@
 // Unpacks the motions of a page, which serpentail packed as columns of floats with names.
 
-// A column is stored as four planes of bytes. They hold the differences between the bits of
-// successive rows.
-export async function decoded(text, rows) {
+// The bytes of a text: base64 of gzip.
+export async function unzipped(text) {
   const packed = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
-  const planes = new Uint8Array(await new Response(stream).arrayBuffer());
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+// A column is stored as four planes of bytes. They hold the differences between the bits of
+// successive rows. Returns numbers row by row, and how many a row has.
+export async function decoded(text, rows) {
+  const planes = await unzipped(text);
   const count = planes.length / 4;
   if (count % rows) throw new Error("its data is damaged");
   const bits = new Uint32Array(count);
@@ -14,18 +19,25 @@ export async function decoded(text, rows) {
     for (let plane = 3; plane >= 0; plane--) step = step * 256 + planes[plane * count + i];
     bits[i] = (i % rows ? bits[i - 1] : 0) + step;
   }
-  return new Float32Array(bits.buffer);
+  const columns = new Float32Array(bits.buffer);
+  const width = count / rows;
+  return { data: columns.map((_, i) => columns[(i % width) * rows + Math.floor(i / width)]), width };
 }
 
 // One motion: its description (meta) and its samples.
 export class Run {
   constructor(meta, columns) {
     Object.assign(this, meta);
-    this.columns = columns;
-    this.times = Float64Array.from(
-      { length: meta.rows },
-      (_, k) => this.value("t", k, 0) + this.value("t", k, 1),
+    const { data } = columns.t;
+    this.fill(
+      Float64Array.from({ length: meta.rows }, (_, k) => data[2 * k] + data[2 * k + 1]),
+      columns,
     );
+  }
+
+  // Takes other samples: times, and by name their numbers row by row (data) and how many each has.
+  fill(times, columns) {
+    Object.assign(this, { times, columns, rows: times.length });
   }
 
   static async of(meta) {
@@ -35,7 +47,8 @@ export class Run {
   }
 
   value(name, row, column) {
-    return this.columns[name][column * this.rows + row];
+    const { data, width } = this.columns[name];
+    return data[row * width + column];
   }
 
   // Copy point i of a row into a vector.

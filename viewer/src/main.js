@@ -1,21 +1,27 @@
 // The page of runs: reads its data, assembles stage, plots and numbers, and handles the keyboard.
 import { Run } from "./data.js";
-import { addNotes, addNumbers, addSwitches, addWarnings } from "./panel.js";
+import { Knobs } from "./live/knobs.js";
+import { LiveRun } from "./live/run.js";
+import { addSwitches, tellNotes, tellNumbers, tellWarnings } from "./panel.js";
 import { Player } from "./player.js";
 import { Plots } from "./plots.js";
 import { Stage } from "./stage.js";
 
 const find = (id) => document.getElementById(id);
 const page = (window.serpentail = { ready: false, seek: null, error: null });
+const notes = []; // that stay, whatever is computed
+
+function addNote(note) {
+  notes.push(note);
+  tellNotes(find("notes"), notes);
+}
 
 // Without WebGL the page shows everything except the animal.
 function stageOf(canvas, runs, meta) {
   try {
     return new Stage(canvas, runs, meta);
   } catch (error) {
-    addNotes(find("notes"), [
-      `The animal cannot be drawn: this browser has no WebGL (${error.message}).`,
-    ]);
+    addNote(`The animal cannot be drawn: this browser has no WebGL (${error.message}).`);
     canvas.style.visibility = "hidden";
     return undefined;
   }
@@ -24,9 +30,9 @@ function stageOf(canvas, runs, meta) {
 async function open() {
   const meta = JSON.parse(find("data").textContent);
   const runs = await Promise.all(meta.runs.map((run) => Run.of(run)));
-  addNotes(find("notes"), meta.notes);
-  addWarnings(find("warnings"), meta.warnings);
-  addNumbers(find("numbers"), runs);
+  meta.notes.forEach(addNote);
+  tellWarnings(find("warnings"), meta.warnings);
+  tellNumbers(find("numbers"), runs);
 
   const stage = stageOf(find("view"), runs, meta);
   const player = new Player(find, runs, (t) => parts.forEach((part) => part.show(t)));
@@ -53,11 +59,43 @@ async function open() {
   find("follow").addEventListener("change", () => stage?.follow(find("follow").checked));
   look();
   document.addEventListener("keydown", (event) => obey(event, player, switches, look));
+  if (meta.live) await enliven(meta, runs, player, parts);
   return player;
 }
 
+// The first run is computed again when one of its knobs is turned.
+async function enliven(meta, runs, player, parts) {
+  let live;
+  try {
+    const prefix = runs.length > 1 ? `${runs[0].name}: ` : "";
+    live = await LiveRun.of(meta.live, runs[0], prefix);
+  } catch (error) {
+    addNote(`This browser cannot compute the run again, and replays it: ${error.message}`);
+    return;
+  }
+  const others = meta.warnings.slice(meta.live.told);
+  const compute = (values) => {
+    try {
+      const told = live.compute(values);
+      tellNotes(find("notes"), [...notes, ...told.notes]);
+      tellWarnings(find("warnings"), [...told.warnings, ...others]);
+    } catch (error) {
+      return error.message;
+    }
+    tellNumbers(find("numbers"), runs);
+    player.renew();
+    for (const part of parts) part.renew(0);
+    player.seek(player.time);
+    return "";
+  };
+  const knobs = new Knobs(find("knobs"), meta.live.knobs, compute);
+  page.change = (values) => knobs.set(values);
+  page.samples = () => ({ t: runs[0].times, q: live.engine.array("q", runs[0].rows).data });
+}
+
 function obey(event, player, switches, look) {
-  if (event.ctrlKey || event.altKey || event.metaKey || event.target.matches("select")) return;
+  if (event.ctrlKey || event.altKey || event.metaKey) return;
+  if (event.target.matches("select, #knobs input")) return;
   const own = { f: () => find("follow").click(), s: () => find("apart").click(), r: look };
   const action = player.action(event) ?? own[event.key] ?? switched(switches, event.key);
   if (!action) return;
@@ -75,6 +113,6 @@ open().then(
   (player) => Object.assign(page, { ready: true, seek: (t) => player.seek(t) }),
   (error) => {
     page.error = String(error.stack ?? error);
-    addNotes(find("notes"), [`This page could not be opened: ${error.message ?? error}`]);
+    addNote(`This page could not be opened: ${error.message ?? error}`);
   },
 );

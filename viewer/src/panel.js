@@ -4,16 +4,20 @@ import { onChange, series } from "./theme.js";
 const made = (name, text = "", more = {}) =>
   Object.assign(document.createElement(name), { textContent: text }, more);
 
-export function addNotes(holder, notes) {
+// Tells notes in place of earlier ones.
+export function tellNotes(holder, notes) {
+  const before = [...holder.querySelectorAll("p")];
+  if (before.length === notes.length && before.every((p, i) => p.textContent === notes[i])) return;
+  before.forEach((note) => note.remove());
   holder.append(...notes.map((note) => made("p", note)));
   holder.hidden = !notes.length;
 }
 
 // Warnings are folded, so that plots and numbers below them stay in view.
-export function addWarnings(holder, warnings) {
+export function tellWarnings(holder, warnings) {
   const count = `${warnings.length} warning${warnings.length === 1 ? "" : "s"}`;
   holder.querySelector("summary").textContent = count;
-  addNotes(holder, warnings);
+  tellNotes(holder, warnings);
 }
 
 // Adds a switch for each run; returns the switches.
@@ -38,7 +42,8 @@ export function addSwitches(holder, runs, change) {
 }
 
 // Fills a table: one row for each number, one column for each run.
-export function addNumbers(table, runs) {
+export function tellNumbers(table, runs) {
+  table.replaceChildren();
   const labels = [...new Set(runs.flatMap((run) => run.numbers.map(([label]) => label)))];
   if (runs.length > 1) {
     const head = table.createTHead().insertRow();

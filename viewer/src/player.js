@@ -7,24 +7,31 @@ const MOST_MARKS = 200;
 
 export class Player {
   constructor(find, runs, show) {
-    Object.assign(this, { runs, show });
-    this.begin = Math.min(...runs.map((run) => run.times[0]));
-    this.end = Math.max(...runs.map((run) => run.times.at(-1)));
-    this.events = runs.flatMap((run) => run.events).sort((a, b) => a.time - b.time);
+    Object.assign(this, { runs, show, marks: find("marks") });
+    this.jumps = [find("before"), find("after")];
     this.slider = find("time");
     this.clock = find("clock");
     this.button = find("play");
     this.speed = find("speed");
-    Object.assign(this.slider, { min: this.begin, max: this.end, step: "any" });
+    this.renew();
     this.slider.addEventListener("input", () => this.seek(Number(this.slider.value)));
     this.button.addEventListener("click", () => this.toggle());
-    find("before").addEventListener("click", () => this.jump(-1));
-    find("after").addEventListener("click", () => this.jump(1));
-    for (const id of ["before", "after"]) find(id).hidden = !this.events.length;
+    this.jumps.forEach((button, i) => button.addEventListener("click", () => this.jump(2 * i - 1)));
     this.addSpeeds();
-    this.addMarks(find("marks"));
     this.time = this.begin;
     this.playing = false;
+  }
+
+  // Takes the times and events of the runs as they are now.
+  renew() {
+    const { runs } = this;
+    this.begin = Math.min(...runs.map((run) => run.times[0]));
+    this.end = Math.max(...runs.map((run) => run.times.at(-1)));
+    this.events = runs.flatMap((run) => run.events).sort((a, b) => a.time - b.time);
+    Object.assign(this.slider, { min: this.begin, max: this.end, step: "any" });
+    for (const button of this.jumps) button.hidden = !this.events.length;
+    this.marks.replaceChildren();
+    this.addMarks(this.marks);
   }
 
   addSpeeds() {

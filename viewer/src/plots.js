@@ -102,10 +102,20 @@ class Plot {
         Array.from({ length: rows }, (_, k) => this.runs[run].value(array, k, column)),
       ];
     });
-    this.largest = tables
-      .flatMap(([, values]) => values)
-      .reduce((most, value) => Math.max(most, Math.abs(value)), 0);
-    return uPlot.join(tables);
+    this.largest = 0;
+    for (const [, values] of tables)
+      for (const value of values) this.largest = Math.max(this.largest, Math.abs(value));
+    return this.alone ? [tables[0][0], ...tables.map(([, values]) => values)] : uPlot.join(tables);
+  }
+
+  renew() {
+    this.stale = !this.seen;
+    if (this.seen) this.plot.setData(this.data());
+  }
+
+  see(seen) {
+    this.seen = seen;
+    if (seen && this.stale) this.renew();
   }
 
   addKey() {
@@ -161,10 +171,20 @@ export class Plots {
   constructor(holder, metas, runs, seek) {
     this.plots = metas.map((meta) => new Plot(holder, meta, runs, seek));
     onChange(() => this.plots.forEach((plot) => plot.paint()));
+    const sight = new IntersectionObserver((entries) => {
+      for (const { target, isIntersecting } of entries)
+        this.plots.find((plot) => plot.box === target).see(isIntersecting);
+    });
+    for (const plot of this.plots) sight.observe(plot.box);
   }
 
   show(t) {
     for (const plot of this.plots) plot.show(t);
+  }
+
+  // Takes other samples of runs; plots out of sight do so when they are seen.
+  renew() {
+    for (const plot of this.plots) plot.renew();
   }
 
   switchRun(run, on) {

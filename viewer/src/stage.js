@@ -149,6 +149,11 @@ export class Stage {
     this.at.copy(this.followed());
   }
 
+  // Takes other samples of a run.
+  renew(k) {
+    this.animals[k].trace();
+  }
+
   switchRun(k, on) {
     this.animals[k].group.visible = on;
     this.at.copy(this.followed());

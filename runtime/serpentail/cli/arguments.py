@@ -55,6 +55,8 @@ def _of_motions(verbs: argparse._SubParsersAction) -> None:
     simulate.add_argument("--film", help=film)
     text = "estimate the error of each number: the motion is made again, less exactly"
     simulate.add_argument("--errors", action="store_true", help=text)
+    text = "let the page of --view compute the motion again, with sliders"
+    simulate.add_argument("--live", action="store_true", help=text)
     text = "plan the motion of a scene's table [plan]"
     plan = _scene_verb(verbs, "plan", "scenes/righting_m1_n3.toml", text)
     text = "estimate parameters and torques from marker tracks, as the table [identify] says"

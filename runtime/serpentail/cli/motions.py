@@ -41,7 +41,11 @@ def simulate(arguments: argparse.Namespace) -> VerbOutcome:
     text = as_text(report, UNITS, found.errors)
     if arguments.errors:
         report["errors"] = found.errors
-    files: Files = {"save": partial(save, motion), "film": motion.film, "view": motion.view}
+    files: Files = {
+        "save": partial(save, motion),
+        "film": motion.film,
+        "view": partial(motion.view, live=arguments.live),
+    }
     return VerbOutcome(report, text, True, files)
 
 

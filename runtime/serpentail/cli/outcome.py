@@ -42,6 +42,12 @@ def refuse_targets(arguments: argparse.Namespace) -> None:
         from ..show.page.view import template
 
         template()
+    if getattr(arguments, "live", False):
+        from ..basics.extras import needed
+
+        if arguments.view is None:
+            raise SerpentailError("--live: without --view there is no page: add --view run.html")
+        needed("ziglang", "live")
     for option in OPTIONS:
         path = getattr(arguments, option, None)
         try:

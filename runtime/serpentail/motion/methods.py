@@ -113,14 +113,19 @@ class Exports(NearNames):
 class Showable:
     """Ways to see one motion; ``model`` is that of a motion which was read from a file."""
 
-    def view(self, path: str | os.PathLike[str] = "run.html", model: Model | None = None) -> Path:
+    def view(
+        self,
+        path: str | os.PathLike[str] = "run.html",
+        model: Model | None = None,
+        live: bool = False,
+    ) -> Path:
         """Write an .html page that shows this motion in a browser, and return its path.
 
         Arguments and errors are those of ``serpentail.view``.
         """
         from ..show.page.view import view
 
-        return view(self, path, model=model)  # type: ignore[call-overload]
+        return view(self, path, model=model, live=live)  # type: ignore[call-overload]
 
     def _repr_html_(self) -> str:
         """Text and page, for notebooks."""

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ...basics.plausible_values import LARGEST
 from ...model.library import WHY
 from ...model.model import Model
 from ...model.passive import BEHIND
@@ -42,6 +43,7 @@ LIMITS = {  # of warnings and numbers
     "speed": landing.MAX_SPEED,
     "share": landing.MIN_SHARE,
     "difference": audit.DIFFERENCE,
+    "fastest": LARGEST["rad/s"][0],  # rad/s
 }
 
 

@@ -108,11 +108,15 @@ def _notes(motion: Trajectory, step: int) -> list[str]:
     return notes
 
 
+def labels() -> dict[str, tuple[str, str]]:
+    """Return the label and the unit, in brackets, of each number that the page shows."""
+    return {name: (label, f" ({UNITS[name]})" * bool(UNITS[name])) for name, label in LABELS.items()}
+
+
 def _numbers(model: Model, motion: Trajectory) -> list[tuple[str, str]]:
     """Labels with units, and values, of the numbers that the motion has."""
     numbers, rows = summary(model, motion), []
-    for name, label in LABELS.items():
-        unit = f" ({UNITS[name]})" if UNITS[name] else ""
+    for name, (label, unit) in labels().items():
         value = numbers[name]
         for part, number in (value if isinstance(value, dict) else {"": value}).items():
             whose = f": {part.replace('_', ' ')}" if part else ""

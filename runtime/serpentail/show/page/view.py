@@ -13,9 +13,10 @@ from ...basics.checks import real_array
 from ...basics.errors import ViewError
 from ...basics.files import replacing
 from ...model.model import Model
+from ...motion.plausibility import warnings_of
 from ...motion.trajectory import Trajectory
 from ..motions import Motions, checked_models, checked_motions, checked_names
-from .data import page_data
+from .data import labels, page_data
 from .samples import packed, thinned_rows
 
 MOST = 2400  # samples of a run in a page
@@ -47,6 +48,7 @@ def view(
     names: Sequence[str] | None = None,
     model: Model | None = None,
     markers: Sequence[Any] | None = None,
+    live: bool = False,
 ) -> Path:
     """Write a page that shows motions over each other; return its path."""
 
@@ -59,6 +61,7 @@ def view(
     names: Sequence[str] | None = None,
     model: Model | None = None,
     markers: Sequence[Any] | None = None,
+    live: bool = False,
 ) -> Page:
     """Return a page that shows motions over each other, for a notebook."""
 
@@ -70,6 +73,7 @@ def view(
     names: Sequence[str] | None = None,
     model: Model | None = None,
     markers: Sequence[Any] | None = None,
+    live: bool = False,
 ) -> Path | Page:
     """Write a page that shows motions over each other in a browser.
 
@@ -88,6 +92,11 @@ def view(
         The model of motions that were read from files.
     markers : sequence of array_like, shape (K, M, 3), optional
         For each motion, positions of seen markers at its samples (m, world), nan in gaps.
+    live : bool, default False
+        Whether the page computes: with sliders of the start, parameters and gains it makes the
+        first motion again, by the model's C compiled to WebAssembly. It must be a run of
+        ``simulate`` in C, of a model whose real is double and whose parameters are not baked; of
+        others the page says why it only replays them.
 
     Returns
     -------
@@ -100,15 +109,17 @@ def view(
         An argument is wrong, or the file cannot be written.
     ModelError
         The model lacks "tail_points".
+    ExtraMissing
+        ``live`` without ziglang: ``pip install "serpentail[live]"``.
 
     Examples
     --------
     >>> st.view([planned, true], "compare.html", names=["planned", "true"])  # doctest: +SKIP
     """
     if path is None:
-        return Page(page_text(motions, names, model, MOST_NOTEBOOK, markers))
+        return Page(page_text(motions, names, model, MOST_NOTEBOOK, markers, live))
     target = checked_path(path)
-    text = page_text(motions, names, model, markers=markers)
+    text = page_text(motions, names, model, markers=markers, live=live)
     try:
         with replacing(target) as part:
             part.write_text(text, encoding="utf-8")
@@ -123,12 +134,15 @@ def page_text(
     model: Model | None = None,
     most: int = MOST,
     markers: Sequence[Any] | None = None,
+    live: bool = False,
 ) -> str:
     """Return the page of motions as text, with at most ``most`` samples of each; see ``view``."""
     motions, names = checked_motions(motions, names, model)
     names = checked_names(names, motions)
     models = checked_models(motions, model)
     page, data = template(), page_data(motions, names, models, most)
+    if live:
+        data |= _live(motions[0], models[0], data, most)
     if markers is not None and len(markers) != len(motions):
         needs = f"needs one of each of {len(motions)} motions"
         raise ViewError(f"markers: {len(markers)} entries: {needs}")
@@ -141,6 +155,16 @@ def page_text(
     }
     marks = re.compile("|".join(map(re.escape, parts)))
     return marks.sub(lambda mark: parts[mark[0]], page)
+
+
+def _live(motion: Trajectory, model: Model, data: dict[str, Any], most: int) -> dict[str, Any]:
+    """Return what a page needs to compute a motion again, or a note that says why it cannot."""
+    from ..computing.again import computed_again
+
+    found = computed_again(model, motion, most)
+    if isinstance(found, str):
+        return {"notes": [*data["notes"], f"this page only replays the run: {found}"]}
+    return {"live": found | {"labels": labels(), "told": len(warnings_of(model, motion))}}
 
 
 def packed_markers(motion: Trajectory, seen: Any, most: int) -> tuple[str, int]:
