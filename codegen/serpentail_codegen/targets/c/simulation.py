@@ -73,6 +73,7 @@ def simulation_context(
     resolution, level, felt = RESOLUTION[scene.real]
     return {
         **{name: name + ("f" if single else "") for name in ("pow", "fabs", "ceil")},
+        **({"pow": f"{scene.name}_power"} if scene.profile == "reproducible" else {}),
         "eps": "FLT_EPSILON" if single else "DBL_EPSILON",
         "has": has,
         "values": scene.parameters,  # where they are folded in

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from serpentail_scene.layout import OMEGA
 from serpentail_scene.rules import FINITE, NOT_NEGATIVE, NUMBER_RULES, NumberRule
 
 from ...basics.attitude import pitch_roll_yaw
@@ -24,7 +25,8 @@ DEG = math.pi / 180
 TURN = (-180.0, 180.0)  # degrees
 # sliders go from one of these parts of the value to the other; of zero to 1
 PARTS = (0.1, 3.0)
-MOST_SPIN, MOST_SPEED = 30.0, 2.0  # rad/s, m/s: the least range of a slider
+MOST_SPIN = 30.0  # rad/s: the least range of a slider
+TIDY = 9  # decimals of degrees: what follows them is rounding
 ORDERED = ("tail_stop_lower", "tail_stop_upper")  # which exclude each other
 
 
@@ -90,7 +92,7 @@ def _range(value: float, rule: NumberRule) -> tuple[float, float]:
 
 
 def _start(run: CompiledRun, image: Image) -> Iterator[Knob]:
-    """The words of ``Model.state``: height, attitude, velocity, spin and bends."""
+    """The words of ``Model.state``: height, attitude, spin and bends."""
     model, start = run.model, run.runs.start
     q0, v0 = start.q0[0], start.v0[0]
     q, v = (image.array(run.runs.state[name]) for name in ("q", "v"))
@@ -98,22 +100,21 @@ def _start(run: CompiledRun, image: Image) -> Iterator[Knob]:
         words = _refusal(lambda x: model.state(height=x))
         height, most = float(q0[2]), float(q0[2]) + 2 * animal_of(model).length
         yield Knob("start", "height", "m", height, 0.0, most, words, (q + 2 * REAL,))
-        for k, angle in enumerate(np.degrees(pitch_roll_yaw(q0)).tolist()):
+        angles = np.degrees(pitch_roll_yaw(q0[None], unwrap=True)[0]).round(TIDY)
+        for k, angle in enumerate(angles.tolist()):
             words = _refusal(lambda x, k=k: model.state(**{ANGLES[k]: x}))
             yield Knob("start", ANGLES[k], "deg", angle, *TURN, words, angle=k)
-        rows = (("velocity", 0, "m/s", MOST_SPEED), ("spin", 3, "rad/s", MOST_SPIN))
-        for word, first, unit, least in rows:
-            for k, axis in enumerate("xyz"):
-                value, place = float(v0[first + k]), (v + REAL * (first + k),)
-                most = max(least, 2 * abs(value))
-                words = _refusal(lambda x, w=word, k=k: model.state(**{w: _row(3, k, x)}))
-                yield Knob("start", f"{word} {axis}", unit, value, -most, most, words, place)
+        for k, spin in enumerate(v0[OMEGA].tolist()):
+            most = max(MOST_SPIN, 2 * abs(spin))
+            words = _refusal(lambda x, k=k: model.state(spin=_row(3, k, x)))
+            places = (v + REAL * (OMEGA.start + k),)
+            yield Knob("start", f"spin {'xyz'[k]}", "rad/s", spin, -most, most, words, places)
     if model.manifest["scene"]["coordinates"] == "polar":
         return
     for k, joints in enumerate(np.repeat(model.joints_each, 2).tolist()):
         at = model.layout.tail_q.start + k
         name = f"bend {k // 2 + 1} {('pitch', 'yaw')[k % 2]}"
-        value, scale = float(joints * q0[at] / DEG), DEG / joints
+        value, scale = round(float(joints * q0[at] / DEG), TIDY), DEG / joints
         words = _refusal(lambda x, k=k: model.state(bend=_row(model.layout.nt, k, x)))
         yield Knob("start", name, "deg", value, *TURN, words, (q + REAL * at,), scale)
 
