@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from ..basics.errors import SerpentailError
+from ..basics.extras import needed
 from ..basics.files import refuse_unwritable
 
 OPTIONS = ("save", "film", "view", "plot")
@@ -43,8 +44,6 @@ def refuse_targets(arguments: argparse.Namespace) -> None:
 
         template()
     if getattr(arguments, "live", False):
-        from ..basics.extras import needed
-
         if arguments.view is None:
             raise SerpentailError("--live: without --view there is no page: add --view run.html")
         needed("ziglang", "live")
@@ -70,7 +69,6 @@ def target(option: str, path: str) -> Path:
 
         return checked_path(path)
     if option == "plot":
-        from ..basics.extras import needed
         from ..show.pictures.style import figure_path
 
         needed("matplotlib", "plot")

@@ -4,75 +4,73 @@ const GROUPS = { start: "Start", body: "Body and ground", controller: "Controlle
 const made = (name, more = {}) => Object.assign(document.createElement(name), more);
 const short = (x) => String(Number(x.toPrecision(6)));
 
+// The limits of a slider: a part of the value, and some times it.
+function limits({ rule, value, slider }) {
+  if (slider) return [Math.min(slider[0], value), Math.max(slider[1], value)];
+  const most = Math.max(Math.abs(value), 1);
+  if (rule === "finite") return [value - most, value + most];
+  return [rule === "positive" ? value / 10 : 0, 3 * value || 1];
+}
+
 export class Knobs {
-  // change: called with the values of the changed knobs, a map, before the next frame
+  // change: takes the values of the changed knobs, a map; returns why it refuses them
   constructor(holder, knobs, change) {
-    Object.assign(this, { knobs, change, values: new Map(), parts: new Map() });
+    Object.assign(this, { knobs, change, values: new Map(), rows: new Map() });
     for (const [group, title] of Object.entries(GROUPS)) {
-      const of = knobs.filter((knob) => knob.group === group);
-      if (!of.length) continue;
-      const box = made("details", { open: group === "start" });
-      box.append(made("summary", { textContent: title }), ...of.map((knob) => this.row(knob)));
+      const rows = knobs.filter((knob) => knob.group === group).map((knob) => this.row(knob));
+      const box = made("details", { open: group === "start", hidden: !rows.length });
+      box.append(made("summary", { textContent: title }), ...rows);
       holder.append(box);
     }
-    this.refused = made("p", { className: "refused", hidden: true });
-    this.refused.setAttribute("role", "alert");
-    const reset = made("button", { textContent: "As it was", id: "reset" });
+    this.refused = made("p", { role: "alert", hidden: true });
+    const reset = made("button", { textContent: "As it was" });
     reset.addEventListener("click", () => this.set({}));
     holder.append(this.refused, reset);
     holder.hidden = false;
   }
 
   row(knob) {
-    const words = `${knob.name} (${knob.unit})`.replace(" (1)", "");
-    const row = made("div", { className: "knob", title: knob.meaning });
-    const [least, most] = [Math.min(knob.least, knob.value), Math.max(knob.most, knob.value)];
-    const slider = made("input", { type: "range", min: least, max: most, step: "any" });
-    const field = made("input", { type: "number", step: "any" });
-    for (const part of [slider, field]) part.setAttribute("aria-label", words);
-    slider.addEventListener("input", () => {
-      field.value = short(slider.valueAsNumber);
-      this.turn(knob, Number(field.value));
+    const name = `${knob.name} (${knob.unit})`.replace(" (1)", "");
+    const row = made("div", { className: "knob", title: knob.meaning ?? "" });
+    const [min, max] = limits(knob);
+    row.append(
+      made("span", { textContent: name }),
+      made("input", { type: "range", min, max, step: "any", ariaLabel: name }),
+      made("input", { type: "number", step: "any", ariaLabel: name }),
+    );
+    this.rows.set(knob, row);
+    this.show(knob);
+    row.addEventListener("input", ({ target }) => {
+      this.values.set(knob, target.valueAsNumber);
+      this.show(knob, target);
+      this.due ??= requestAnimationFrame(() => this.tell());
     });
-    field.addEventListener("input", () => {
-      slider.value = field.value;
-      this.turn(knob, field.valueAsNumber);
-    });
-    row.append(made("span", { textContent: words }), slider, field);
-    this.parts.set(knob, [slider, field]);
-    this.show(knob, knob.value);
     return row;
   }
 
-  show(knob, value) {
-    const [slider, field] = this.parts.get(knob);
-    slider.value = value;
-    field.value = short(value);
+  // Shows the value of a knob, but not in the input where it is being typed.
+  show(knob, typed) {
+    const row = this.rows.get(knob);
+    const value = this.values.get(knob) ?? knob.value;
+    row.classList.toggle("turned", this.values.has(knob));
+    for (const input of row.querySelectorAll("input"))
+      if (input !== typed && Number.isFinite(value)) input.value = short(value);
   }
 
-  turn(knob, value) {
-    this.values.set(knob, value);
-    this.parts.get(knob)[1].parentElement.classList.add("turned");
-    this.due ??= requestAnimationFrame(() => this.tell());
-  }
-
-  // Sets knobs by their names, all others as the run had them; returns why that was refused.
+  // Sets knobs by their names, all others as the run had them; returns why that is refused.
   set(values) {
-    this.values.clear();
+    this.values = new Map();
     for (const knob of this.knobs) {
-      const own = Object.hasOwn(values, knob.name);
-      if (own) this.values.set(knob, values[knob.name]);
-      this.parts.get(knob)[1].parentElement.classList.toggle("turned", own);
-      this.show(knob, own ? values[knob.name] : knob.value);
+      if (Object.hasOwn(values, knob.name)) this.values.set(knob, values[knob.name]);
+      this.show(knob);
     }
     return this.tell();
   }
 
   tell() {
     this.due = undefined;
-    const refused = this.change(this.values);
-    this.refused.textContent = refused;
-    this.refused.hidden = !refused;
-    return refused;
+    this.refused.textContent = this.change(this.values);
+    this.refused.hidden = !this.refused.textContent;
+    return this.refused.textContent;
   }
 }

@@ -1,193 +1,153 @@
 // Doubts about a computed run, in the words of Python: its books, touches, stops, and what no
 // animal can do.
-import { largest, norm, sum } from "./facts.js";
+import { largest, norm, of, range, sum, three } from "./facts.js";
 import { filled } from "./words.js";
 
 const TINY = 2.2250738585072014e-308;
-const KNEES = 3; // hip, D and knee come first in a leg, and are no contacts
+const [LEG, KNEES] = [6, 3]; // joints; hip, D and knee come first, and are no contacts
 
 export function warningsOf(facts) {
   const books = facts.status ? [] : [...booked(facts), ...touched(facts), ...stopped(facts)];
   return [...books, ...buried(facts), ...sunk(facts), ...pushed(facts), ...bent(facts)];
 }
 
-// What of energy and momentum the works and impulses do not explain, relative to what was moved.
+// What of energy and momentum works and impulses do not explain, relative to what was moved.
 function booked(facts) {
-  const { live, rows, kinetic, potential, linear, t } = facts;
-  const { words, allowed, remedy } = live;
-  const { works, impulses } = facts.books();
+  const { live, rows, kinetic, potential, linear, t, works, mass, weight } = facts;
+  const { allowed, remedy } = live;
   const last = rows - 1;
   const worked = sum(Object.values(works));
-  const energy = kinetic[last] + potential[last] - kinetic[0] - potential[0] - worked;
-  const at = (k) => [...linear.data.subarray(3 * k, 3 * k + 3)];
-  const span = t[last] - t[0];
-  const moved = [0, 1, 2].map((i) => {
-    const pull = i === 2 ? -facts.weight * span : 0;
-    const pushed = sum(Object.values(impulses).map((each) => each[i]));
-    return live.fixed ? 0 : at(last)[i] - at(0)[i] - pull - pushed;
-  });
   const effort = sum(Object.values(works).map(Math.abs));
-  const flies = Object.values(impulses).every((each) => each.every((x) => x === 0));
-  const inner = (k) => Math.max(kinetic[k] - norm(...at(k)) ** 2 / (2 * facts.mass), 0);
+  const impulses = Object.values(facts.impulses);
+  const energy = kinetic[last] + potential[last] - kinetic[0] - potential[0] - worked;
+  const [before, after] = [three(linear, 0), three(linear, last)];
+  const pull = [0, 0, weight * (t[last] - t[0])];
+  const moved = pull.map(
+    (fallen, i) => !live.fixed && after[i] - before[i] + fallen - sum(impulses.map((x) => x[i])),
+  );
+  const flies = !live.fixed && impulses.every((each) => each.every((x) => x === 0));
+  const inner = (k) => Math.max(kinetic[k] - norm(...three(linear, k)) ** 2 / (2 * mass), 0);
   const share = (samples) => {
-    const most = (f) => Math.max(...samples.map(f));
-    const stored = most((k) => facts.stored(k));
-    if (live.fixed || !flies) {
-      const lifted = facts.weight * facts.number("tail_length");
-      return Math.abs(energy) / Math.max(most((k) => kinetic[k]) + lifted + stored + effort, TINY);
-    }
+    const top = (f) => largest(samples.length, (i) => f(samples[i]))[0];
+    const most = (f) => top(f) + top((k) => facts.stored(k));
+    const lifted = weight * facts.number("tail_length");
+    if (!flies) return Math.abs(energy) / Math.max(most((k) => kinetic[k]) + lifted + effort, TINY);
     const change = inner(last) - inner(0) + facts.stored(last) - facts.stored(0) - worked;
-    const rounding = live.limits.difference * live.eps * Math.max(kinetic[0], kinetic[last]);
-    const least = 0.5 * Math.min(...[...facts.parameter("torso_inertia")].slice(0, 3));
-    const within = Math.max(most(inner) + stored + least + effort, TINY);
-    return Math.max(Math.abs(change) - rounding, 0) / within;
+    const rounding = live.limits.DIFFERENCE * live.eps * Math.max(kinetic[0], kinetic[last]);
+    const least = 0.5 * Math.min(...facts.engine.parameter("torso_inertia"));
+    return Math.max(Math.abs(change) - rounding, 0) / Math.max(most(inner) + least + effort, TINY);
   };
   let found = share([0, last]);
-  if (found > allowed) found = share(facts.t.map((_, k) => k));
-  const size = (each) => norm(...each);
-  const momenta = Math.max(size(at(0)), size(at(last))) + facts.weight * span;
-  const all = momenta + sum(Object.values(impulses).map(size));
-  const relative = Math.max(found, size(moved) / Math.max(all, TINY));
+  if (found > allowed) found = share(range(rows));
+  const momenta = Math.max(norm(...before), norm(...after)) + pull[2];
+  const all = momenta + sum(impulses.map((each) => norm(...each)));
+  const momentum = norm(...moved);
+  const relative = Math.max(found, momentum / Math.max(all, TINY));
   if (relative <= allowed) return [];
-  const numbers = { share: 100 * relative, allowed: 100 * allowed, momentum: size(moved) };
-  return [filled(words.unbalanced, { ...numbers, energy, remedy })];
+  const numbers = { share: 100 * relative, energy, momentum, allowed: 100 * allowed, remedy };
+  return [filled(live.words.unbalanced, numbers)];
 }
 
 // Touches that may have been missed.
-function touched({ engine, live, groups }) {
-  if (!groups.length) return [];
-  const { words } = live;
-  const found = [];
-  const count = engine.member("unfelt");
-  if (count) found.push(filled(words.unfelt, { count }));
-  const error = 1e3 * engine.member("near_error");
-  if (!(error > 0)) return found;
-  const point = engine.member("near_point");
-  let ends = 0;
-  const group = groups.find((name) => point < (ends += live.groups[name]));
-  const height = 1e3 * engine.member("near_height");
-  const near = { group, point, error, height, time: engine.member("near_time") };
-  return [...found, filled(words.near, near)];
+function touched(facts) {
+  const { engine, live } = facts;
+  if (!facts.points) return [];
+  const [count, point] = [engine.member("unfelt"), engine.member("near_point")];
+  const [time, height, error] = ["time", "height", "error"].map((x) => engine.member(`near_${x}`));
+  const near = { group: facts.groupOf(point), point, time, height: 1e3 * height };
+  return [
+    ...(count ? [filled(live.words.unfelt, { count })] : []),
+    ...(error > 0 ? [filled(live.words.near, { ...near, error: 1e3 * error })] : []),
+  ];
 }
 
 // The first stop that a coordinate of the tail is behind by more than its width.
 function stopped(facts) {
-  const { live, rows } = facts;
-  const { words } = live;
+  const { live, rows, engine } = facts;
   for (const [end, stop] of ["tail_stop_lower", "tail_stop_upper"].entries()) {
-    if (!facts.parameter(stop)) return [];
-    const each = Array.from({ length: live.nt }, (_, i) => i);
-    const way = (k, i) => facts.ways(k, i)[end][1];
-    const [most, k] = largest(rows, (row) => Math.max(...each.map((i) => way(row, i))));
-    if (!(most > 1)) continue;
-    const i = each.find((index) => way(k, index) === most);
-    const place = { name: live.names[i], angle: facts.angle(k, i), stop };
-    const at = facts.parameter(stop)[i];
-    const behind = filled(words.behind, {
-      ...place,
-      at,
-      width: facts.parameter("tail_stop_width")[i],
+    const [most, j] = largest(rows * live.nt, (each) => {
+      return facts.ways(Math.floor(each / live.nt), each % live.nt)[end];
     });
-    return [filled(words.ease_stops, { behind })];
+    if (!(most > 1)) continue;
+    const [k, i] = [Math.floor(j / live.nt), j % live.nt];
+    const numbers = { at: engine.parameter(stop)[i], width: engine.parameter("tail_stop_width")[i] };
+    const words = { name: live.names[i], angle: facts.angle(k, i), stop, ...numbers };
+    return [filled(live.words.ease_stops, { behind: filled(live.words.behind, words) })];
   }
   return [];
 }
 
 // Parts that are deep in the ground, because the scene gives them no contact.
 function buried(facts) {
-  const { live, rows, tail, legs } = facts;
+  const { live, axes, tail, legs } = facts;
   if (!facts.points) return [];
-  const { words, limits } = live;
-  const axes = facts.axes;
-  const lowest = ({ data, width }, k, points) =>
-    Math.max(...points.map((i) => -data[k * width + 3 * i + 2]));
-  const count = (width) => Array.from({ length: width / 3 }, (_, i) => i);
-  const parts = {};
-  if (!live.groups.torso)
-    parts.torso = (k) => norm(...facts.up(k).map((x, i) => axes[i] * x)) - facts.height(k);
-  if (!live.groups.tail) parts.tail = (k) => lowest(tail, k, count(tail.width));
-  if (legs) {
-    const above = count(legs.width).filter((i) => i % 6 < KNEES);
-    parts.legs = (k) => lowest(legs, k, above);
-  }
-  const allowed = limits.deep * 2 * Math.max(...axes);
-  const found = [];
-  for (const [part, depthAt] of Object.entries(parts)) {
-    const [depth, k] = largest(rows, depthAt);
-    if (!(depth > allowed)) continue;
-    const remedy = filled(words[part === "legs" ? "knees" : "add"], { part });
+  const lowest = (array, k, points) => Math.max(...points.map((i) => -of(array, k, 3 * i + 2)));
+  const depths = {
+    torso: (k) => norm(...facts.up(k).map((x, i) => axes[i] * x)) - facts.place(k)[2],
+    tail: (k) => lowest(tail, k, range(tail.width / 3)),
+    legs: legs && ((k) => lowest(legs, k, range(legs.width / 3).filter((i) => i % LEG < KNEES))),
+  };
+  const allowed = live.limits.DEEP * 2 * Math.max(...axes);
+  return Object.entries(depths).flatMap(([part, f]) => {
+    const [depth, k] = f && !live.groups[part] ? largest(facts.rows, f) : [0];
+    if (!(depth > allowed)) return [];
+    const remedy = filled(live.words[part === "legs" ? "knees" : "add"], { part });
     const lengths = { depth: 1e3 * depth, allowed: 1e3 * allowed, time: facts.t[k] };
-    found.push(filled(words.buried, { part, remedy, ...lengths }));
-  }
-  return found;
+    return [filled(live.words.buried, { part, remedy, ...lengths })];
+  });
 }
 
 // A tail that bends into the torso, or comes back into it.
 function sunk(facts) {
-  const axes = facts.axes;
-  const { words, limits } = facts.live;
+  const { axes, live, rows, t } = facts;
   if (!axes.every((axis) => axis > 0)) return [];
-  const [depth, k] = largest(facts.rows, (row) => depthInTorso(facts, row, axes));
-  if (!(depth > limits.sunk)) return [];
-  return [filled(words.sunk, { time: facts.t[k], depth, allowed: limits.sunk })];
+  const allowed = live.limits.SUNK;
+  const [depth, k] = largest(rows, (row) => depthInTorso(facts, row));
+  return depth > allowed ? [filled(live.words.sunk, { time: t[k], depth, allowed })] : [];
 }
 
-// How far the tail goes into the torso, as the unit ball: 0 not at all, 1 to its centre.
-function depthInTorso(facts, k, axes) {
-  const { data, width } = facts.tail;
-  const [w, x, y, z] = facts.quaternion(k);
-  const columns = [
-    [1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)],
-    [2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)],
-    [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)],
-  ];
-  const base = k * facts.q.width;
-  const own = (i) => {
-    const from = [0, 1, 2].map((j) => data[k * width + 3 * i + j] - facts.q.data[base + j]);
-    return columns.map((c, j) => (c[0] * from[0] + c[1] * from[1] + c[2] * from[2]) / axes[j]);
-  };
-  let deepest = 0;
-  let outside = false;
-  let a = own(0);
-  const mount = norm(...a);
-  for (let i = 1; i < width / 3; i++) {
-    outside ||= norm(...a) > 1;
-    const b = own(i);
-    const way = b.map((to, j) => to - a[j]);
-    const length = Math.max(sum(way.map((d) => d * d)), TINY);
-    const part = Math.min(Math.max(-sum(a.map((from, j) => from * way[j])) / length, 0), 1);
-    const nearest = norm(...a.map((from, j) => from + part * way[j]));
-    deepest = Math.max(deepest, (outside ? 1 : mount) - nearest);
-    a = b;
+// How far the tail goes into the torso, as the unit ball: 0 not at all, 1 to its centre. Until it
+// has left the ball once, it may be as near to the centre as its mount.
+function depthInTorso(facts, k) {
+  const { axes, tail } = facts;
+  const [columns, base] = [facts.columns(k), facts.place(k)];
+  const own = range(tail.width / 3).map((i) => {
+    const from = three(tail, k, 3 * i).map((x, axis) => x - base[axis]);
+    return columns.map((column, j) => sum(column.map((x, axis) => x * from[axis])) / axes[j]);
+  });
+  let [deepest, allowed] = [0, norm(...own[0])];
+  for (let i = 0; i + 1 < own.length; i++) {
+    const a = own[i];
+    if (norm(...a) > 1) allowed = 1;
+    const way = own[i + 1].map((x, j) => x - a[j]);
+    const part = -sum(way.map((x, j) => x * a[j])) / Math.max(sum(way.map((x) => x * x)), TINY);
+    const inside = Math.min(Math.max(part, 0), 1);
+    deepest = Math.max(deepest, allowed - norm(...a.map((x, j) => x + inside * way[j])));
   }
   return deepest;
 }
 
 // A force of the ground that no legs of the animal's size bear.
-function pushed(facts) {
-  const { words, limits } = facts.live;
-  const whole = facts.weight;
-  if (!facts.forces || !whole) return [];
-  const [force, time] = facts.peaks.all;
-  const most = limits.borne * (limits.bearer / facts.mass) ** (1 / 3);
-  if (!(force > most * whole)) return [];
-  return [filled(words.pushed, { force, time, weights: force / whole, most })];
+function pushed({ live, peaks, mass, weight }) {
+  if (!peaks || !weight) return [];
+  const [force, time] = peaks.all;
+  const most = live.limits.BORNE * (live.limits.BEARER / mass) ** (1 / 3);
+  if (!(force > most * weight)) return [];
+  return [filled(live.words.pushed, { force, time, weights: force / weight, most })];
 }
 
 // Segments that are bent by clearly more than half a turn.
 function bent(facts) {
-  const { live, rows } = facts;
-  const { words, limits } = live;
-  const bend = (k, m) => {
-    const [first, second] = [facts.angle(k, 2 * m), facts.angle(k, 2 * m + 1)].map(Math.abs);
-    if (live.kinds[m] === "articulated") return live.joints[m] * Math.max(first, second);
-    return live.polar ? second : norm(first, second);
-  };
-  return live.kinds.flatMap((_, m) => {
-    const [most, k] = largest(rows, (row) => bend(row, m));
-    if (!(most > limits.bend)) return [];
-    const remedy = words[most > limits.degrees ? "degrees" : "damp"];
-    const numbers = { bend: most, time: facts.t[k], most: limits.bend };
-    return [filled(words.bent, { segment: m + 1, remedy, ...numbers })];
+  const { live, rows, t } = facts;
+  const { MOST_BEND: most, DEGREES } = live.limits;
+  return live.kinds.flatMap((kind, m) => {
+    const [bend, k] = largest(rows, (row) => {
+      const [first, second] = [2 * m, 2 * m + 1].map((i) => Math.abs(facts.angle(row, i)));
+      if (kind === "articulated") return live.joints[m] * Math.max(first, second);
+      return live.polar ? second : norm(first, second);
+    });
+    const remedy = live.words[bend > DEGREES ? "degrees" : "damp"];
+    const numbers = { segment: m + 1, bend, time: t[k], most, remedy };
+    return bend > most ? [filled(live.words.bent, numbers)] : [];
   });
 }

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...basics.plausible_values import LARGEST
+from ...basics.extras import needed
 from ...model.library import WHY
 from ...model.model import Model
 from ...model.passive import BEHIND
@@ -16,106 +16,100 @@ from ...motion.trajectory import Trajectory
 from ...simulation import audit, ground
 from ...simulation.energies import EASE_STOPS
 from ...simulation.methods import SCIPY
-from ...simulation.runs.outcomes import FAILED, SHORT_STEPS, TOO_STRONG
+from ...simulation.runs.outcomes import FAILED
 from ...simulation.runs.single import CompiledRun
 from ...simulation.simulate import RunAgain
 from .image import BASE, Image
-from .knobs import knobs, parameter_places
+from .knobs import REAL, knobs
 from .webassembly import webassembly
 
 # functions that a page calls on all samples, if the model has them
-CALLED = ("energy", "momentum", "tail_points", "leg_points", "center_of_mass")
-CALLED += ("contact_points", "contact_rates")
+CALLED = (
+    *("energy", "momentum", "tail_points", "leg_points", "center_of_mass"),
+    *("contact_points", "contact_rates"),
+)
 ARRAYS = 10  # of the argument record of a function
 ENDLESS = 2**31 - 1  # steps of one call
-WORDS = audit.WORDS | plausibility.WORDS
-WORDS |= {"deep": ground.DEEP, "failed": FAILED, "too_strong": TOO_STRONG, "behind": BEHIND}
-WORDS |= {"ease_stops": EASE_STOPS}
+WORDS = audit.WORDS | plausibility.WORDS | {"deep": ground.DEEP, "failed": FAILED}
+WORDS |= {"behind": BEHIND, "ease_stops": EASE_STOPS}
 LIMITS = {  # of warnings and numbers
-    "deep": plausibility.DEEP,
-    "sunk": plausibility.SUNK,
-    "borne": plausibility.BORNE,
-    "bearer": plausibility.BEARER,
-    "bend": plausibility.MOST_BEND,
-    "degrees": plausibility.DEGREES,
-    "static": ground.MAX_STATIC_LOAD,
-    "upright": landing.MIN_UPRIGHT,
-    "speed": landing.MAX_SPEED,
-    "share": landing.MIN_SHARE,
-    "difference": audit.DIFFERENCE,
-    "fastest": LARGEST["rad/s"][0],  # rad/s
+    name: getattr(module, name)
+    for module, names in (
+        (plausibility, ("DEEP", "SUNK", "BORNE", "BEARER", "MOST_BEND", "DEGREES")),
+        (landing, ("MIN_UPRIGHT", "MAX_SPEED", "MIN_SHARE")),
+        (audit, ("DIFFERENCE",)),
+        (ground, ("MAX_STATIC_LOAD",)),
+    )
+    for name in names
 }
 
 
 def computed_again(model: Model, motion: Trajectory, most: int) -> dict[str, Any] | str:
     """Return the data for a page that computes a motion of at most so many samples, for JSON.
 
-    Where that cannot be, return the reason. ExtraMissing, CompileFailed and SerpentailError as of
-    ``webassembly``.
+    Where that cannot be, return the reason. Errors as of ``webassembly``.
     """
+    needed("ziglang", "live")
     again = vars(motion).get(AGAIN)
-    reason = _why_not(model, motion, again, most)
-    return reason if reason or again is None else _data(model, again)
-
-
-def _why_not(model: Model, motion: Trajectory, again: RunAgain | None, most: int) -> str:
-    """Return why a page cannot compute a motion; "" if it can."""
     if again is None:
         return "only what simulate has just made can be computed again, not a file, a plan, a part"
-    if model.manifest["real"] != "double" or model.manifest["scene"]["baked"]:
-        return 'the model needs real = "double" and baked = false'
-    if again.method.name in SCIPY:
-        return f"{again.method.name} is a method of Python: take one in C, such as tsit5"
-    if again.ground.stop_at:
-        return "it ends at an event: leave out stop_at"
-    if len(motion.t) > most:
-        return f"it has {len(motion.t)} samples: a longer output_step gives {most} or fewer"
-    return ""
-
-
-def _data(model: Model, again: RunAgain) -> dict[str, Any] | str:
-    """Return the data of a run that is made of C, else the reason."""
     run = CompiledRun(again.runs(again.start, again.ground, again.method))
-    parts = run.actuation.parts
-    if any(each.user or each.native or each.state for each in parts):
-        return "its controller is a function: only Damping, torques over time and Pfl are C"
-    arrays = [run.runs.parameters.vectors, run.runs.peaks]
-    image = Image(run.runs.records, [*arrays, *run.runs.state.values(), *run.runs.out.values()])
+    parts, method, rows = run.actuation.parts, again.method.name, len(motion.t)
+    unfit = model.manifest["real"] != "double" or model.manifest["scene"]["baked"]
+    reasons = {
+        'the model needs real = "double" and baked = false': unfit,
+        f"{method} is a method of Python: take one in C, such as tsit5": method in SCIPY,
+        "it ends at an event: leave out stop_at": again.ground.stop_at,
+        f"it has {rows} samples: a longer output_step gives {most} or fewer": rows > most,
+        "its controller is a function: only Damping, torques over time and Pfl are C": any(
+            each.user or each.native for each in parts
+        ),
+    }
+    return next((each for each, true in reasons.items() if true), None) or _data(model, again, run)
+
+
+def _data(model: Model, again: RunAgain, run: CompiledRun) -> dict[str, Any]:
+    """Return the data of a run."""
+    runs, code = run.runs, run.runs.records.code
+    arrays = [runs.parameters.vectors, runs.peaks, *runs.state.values(), *runs.out.values()]
+    image = Image(runs.records, arrays)
     run.record.pause = ENDLESS
-    record = image.record(run.record)
-    manifest, info = run.runs.records.code.manifest, again.method.info
+    record = image.put(image.translated(run.record))
+    parameters, place = {}, image.at(run.record.parameters)
+    for p in (p for p in model.manifest["parameters"] if p["in_struct"]):
+        parameters[p["name"]] = place, p["size"]
+        place += REAL * p["size"]
     outputs, calls = _calls(run, image)
-    prefix = manifest["prefix"]
+    prefix, info = code.manifest["prefix"], again.method.info
     exports = [f"{prefix}_rollout", *(f"{prefix}_batch_{name}" for name in calls)]
-    eps = float(np.finfo(float).eps)
-    return {
-        "module": _text(webassembly(run.runs.records.code.checked, exports)),
+    eps, kind = float(np.finfo(float).eps), image.types["run"]
+    offsets = {name: (getattr(kind, name).offset, of) for name, of in image.members["run"]}
+    simulation = {name: code.manifest["simulation"].get(name, []) for name in ("ledger", "parts")}
+    return simulation | {
+        "module": _text(webassembly(code.checked, exports)),
         "image": _text(bytes(image.bytes)),
         "base": BASE,
         "prefix": prefix,
         "run": record,
-        "members": image.offsets("run"),
+        "members": offsets,
         "calls": calls,
         "arrays": outputs,
-        "parameters": parameter_places(run, image),
+        "parameters": parameters,
         "values": {name: np.atleast_1d(x).tolist() for name, x in model.parameters.items()},
-        "knobs": knobs(run, image),
-        "times": again.start.times.tolist(),
-        "nt": model.layout.nt,
+        "knobs": knobs(run, image, parameters),
+        "times": runs.start.times.tolist(),
+        "nt": model.nu,
         "fixed": model.fixed,
         "groups": model.contacts,
-        "ledger": manifest["simulation"]["ledger"],
-        "parts": manifest["simulation"].get("parts", []),
         "joints": model.joints_each.tolist(),
-        "kinds": list(model.kinds),
-        "pieces": manifest["dimensions"]["total"],
-        "polar": manifest["scene"]["coordinates"] == "polar",
-        "names": list(model.names.tail),
+        "kinds": model.kinds,
+        "pieces": model.manifest["dimensions"]["total"],
+        "polar": model.manifest["scene"]["coordinates"] == "polar",
+        "names": model.names.tail,
         "eps": eps,
         "allowed": audit.allowance(info, eps),
         "remedy": audit.remedy(info),
         "why": WHY,
-        "short": SHORT_STEPS,
         "words": WORDS,
         "limits": LIMITS,
     }
@@ -126,28 +120,30 @@ def _calls(run: CompiledRun, image: Image) -> tuple[dict[str, Any], dict[str, in
 
     Return addresses and widths of the arrays by name, and the addresses of the records.
     """
-    model, rows = run.model, len(run.runs.start.times)
-    known = {name: (image.array(array), array.shape[2]) for name, array in run.runs.out.items()}
-    legs = run.runs.ground.legs_at(run.runs.start.times)
-    if legs:
-        angles = np.ascontiguousarray(legs[0][:, : ground.LEG_ANGLES])
-        known["legs"] = image.put(legs[0].tobytes()), legs[0].shape[1]
-        known["angles"] = image.put(angles.tobytes()), angles.shape[1]
-    manifest, calls = run.runs.records.code.manifest, {}
+    times, functions = run.runs.start.times, run.runs.records.code.manifest["functions"]
+    known = {
+        name: (image.at(getattr(run.record, f"{name}_out")), array.shape[2])
+        for name, array in run.runs.out.items()
+        if hasattr(run.record, f"{name}_out")
+    }
+    for legs in run.runs.ground.legs_at(times):
+        for name, width in (("legs", legs.shape[1]), ("angles", ground.LEG_ANGLES)):
+            known[name] = image.put(legs[:, :width].tobytes()), width
+    calls = {}
     for name in CALLED:
-        entry = manifest["functions"].get(name)
-        if entry is None or (name == "leg_points" and not legs):
+        inputs = [
+            each["name"] for each in functions.get(name, {"inputs": [{"name": ""}]})["inputs"]
+        ]
+        if not known.keys() >= set(inputs):
             continue
-        work = image.put(bytes(8 * manifest["work"][name]))
-        addresses = [known[each["name"]][0] for each in entry["inputs"]]
-        for each in entry["outputs"]:
+        for each in functions[name]["outputs"]:
             width = int(np.prod(each["shape"]))
-            known[f"{name}.{each['name']}"] = image.put(bytes(8 * width * rows)), width
-            addresses.append(known[f"{name}.{each['name']}"][0])
-        vector = image.array(run.runs.parameters.vectors)
-        addresses += [0] * (ARRAYS - len(addresses))
-        call = np.array([vector, rows, 0, work, *addresses], "<u4")
-        calls[name] = image.put(call.tobytes())
+            place = image.put(bytes(REAL * width * len(times)))
+            known[f"{name}.{each['name']}"] = place, width
+            inputs.append(f"{name}.{each['name']}")
+        work = image.put(bytes(REAL * run.runs.records.code.manifest["work"][name]))
+        call = [image.at(run.record.parameters), 0, 0, work, *(known[each][0] for each in inputs)]
+        calls[name] = image.put(np.array(call + [0] * (4 + ARRAYS - len(call)), "<u4").tobytes())
     return known, calls
 
 

@@ -1,15 +1,14 @@
-"""What a reader may change on a page that computes: the start, parameters, gains, with limits."""
+"""What a reader may change on a page that computes: the start, parameters, gains."""
 
+import ctypes
 import math
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
 from serpentail_scene.layout import OMEGA
-from serpentail_scene.rules import FINITE, NOT_NEGATIVE, NUMBER_RULES, NumberRule
 
 from ...basics.attitude import pitch_roll_yaw
 from ...basics.errors import SerpentailError
@@ -21,155 +20,95 @@ from ..animal import animal_of
 from .image import Image
 
 REAL = 8  # bytes
-DEG = math.pi / 180
 TURN = (-180.0, 180.0)  # degrees
-# sliders go from one of these parts of the value to the other; of zero to 1
-PARTS = (0.1, 3.0)
-MOST_SPIN = 30.0  # rad/s: the least range of a slider
+SPIN = 30.0  # rad/s: the least range of a slider
 TIDY = 9  # decimals of degrees: what follows them is rounding
 ORDERED = ("tail_stop_lower", "tail_stop_upper")  # which exclude each other
+Knob = dict[str, Any]
 
 
-@dataclass(frozen=True)
-class Knob:
-    """A number that a reader may change: places (addresses of reals) get it times ``scale``.
+def knobs(run: CompiledRun, image: Image, parameters: dict[str, tuple[int, int]]) -> list[Knob]:
+    """Return the knobs of a run that lies in an image, ready for JSON.
 
-    least, most: limits of the slider; those of the number are ``above`` and ``low``. angle: number
-    of the angle of the attitude that it is. words: of the error about a wrong value, as Python's.
+    Places are addresses of reals, which get the number times ``scale``; ``angle``: number of the
+    angle of the attitude that it is; ``words``: Python's error about a wrong value; ``slider``: its
+    limits, which otherwise follow from value and rule. parameters: their addresses and sizes.
     """
-
-    group: str
-    name: str
-    unit: str
-    value: float
-    least: float
-    most: float
-    words: str
-    places: tuple[int, ...] = ()
-    scale: float = 1.0
-    angle: int | None = None
-    above: float | None = None
-    low: float | None = None
-    meaning: str = ""
+    return [*_start(run, image), *_parameters(run, parameters), *_gains(run, image)]
 
 
-def knobs(run: CompiledRun, image: Image) -> list[dict[str, Any]]:
-    """Return the knobs of a run that lies in an image, ready for JSON."""
-    return [asdict(knob) for of in (_start, _parameters, _gains) for knob in of(run, image)]
+def _knob(
+    name: tuple[str, str, str], value: float, places: list[int], wrong: Any, **more: Any
+) -> Knob:
+    """Return a knob: its group, name and unit; wrong: a function and arguments that it refuses."""
+    knob = dict(zip(("group", "name", "unit"), name, strict=True)) | {"rule": "finite", "scale": 1}
+    return knob | {"value": value, "places": places, "words": _refusal(*wrong)} | more
 
 
-def parameter_places(run: CompiledRun, image: Image) -> dict[str, tuple[int, int]]:
-    """Return the address and the size of each parameter of the C struct."""
-    place, found = image.array(run.runs.parameters.vectors), {}
-    for p in run.model.manifest["parameters"]:
-        if p["in_struct"]:
-            found[p["name"]] = place, p["size"]
-            place += REAL * p["size"]
-    return found
-
-
-def _refusal(make: Callable[[float], object]) -> str:
-    """Return the words of the error about a wrong value, which ``{value}`` stands for."""
+def _refusal(make: Callable[..., object], arguments: dict[str, Any]) -> str:
+    """Return the words of the error about nan among arguments, which ``{value}`` stands for."""
     try:
-        make(math.nan)
+        make(**arguments)
     except SerpentailError as error:
-        return re.sub(r"value \[?nan(, nan)*\]?", "value {value}", str(error))
-    raise AssertionError("nan was taken")
-
-
-def _limits(rule: NumberRule) -> dict[str, float | None]:
-    """Return the limits of numbers under a rule."""
-    limits = {"above": rule.above, "low": rule.least}
-    return {name: x if math.isfinite(x) else None for name, x in limits.items()}
-
-
-def _range(value: float, rule: NumberRule) -> tuple[float, float]:
-    """Return the limits of a slider about a value."""
-    if rule is FINITE:
-        return value - max(abs(value), 1.0), value + max(abs(value), 1.0)
-    least = 0.0 if rule.above < 0 else PARTS[0] * value
-    return least, PARTS[1] * value or 1.0
+        return re.sub(r"value nan", "value {value}", str(error))
+    raise AssertionError(f"{arguments} were taken")
 
 
 def _start(run: CompiledRun, image: Image) -> Iterator[Knob]:
     """The words of ``Model.state``: height, attitude, spin and bends."""
     model, start = run.model, run.runs.start
-    q0, v0 = start.q0[0], start.v0[0]
-    q, v = (image.array(run.runs.state[name]) for name in ("q", "v"))
+    q0, v0, wrong = start.q0[0], start.v0[0], np.diag(np.full(max(3, run.model.nu), math.nan))
+    q, v = image.at(run.record.q), image.at(run.record.v)
     if not model.fixed:
-        words = _refusal(lambda x: model.state(height=x))
-        height, most = float(q0[2]), float(q0[2]) + 2 * animal_of(model).length
-        yield Knob("start", "height", "m", height, 0.0, most, words, (q + 2 * REAL,))
+        slider = (0, float(q0[2]) + 2 * animal_of(model).length)
+        height = model.state, {"height": math.nan}
+        yield _knob(("start", "height", "m"), q0[2], [q + 2 * REAL], height, slider=slider)
         angles = np.degrees(pitch_roll_yaw(q0[None], unwrap=True)[0]).round(TIDY)
-        for k, angle in enumerate(angles.tolist()):
-            words = _refusal(lambda x, k=k: model.state(**{ANGLES[k]: x}))
-            yield Knob("start", ANGLES[k], "deg", angle, *TURN, words, angle=k)
-        for k, spin in enumerate(v0[OMEGA].tolist()):
-            most = max(MOST_SPIN, 2 * abs(spin))
-            words = _refusal(lambda x, k=k: model.state(spin=_row(3, k, x)))
-            places = (v + REAL * (OMEGA.start + k),)
-            yield Knob("start", f"spin {'xyz'[k]}", "rad/s", spin, -most, most, words, places)
-    if model.manifest["scene"]["coordinates"] == "polar":
-        return
-    for k, joints in enumerate(np.repeat(model.joints_each, 2).tolist()):
+        for k, name in enumerate(ANGLES):
+            angle = model.state, {name: math.nan}
+            yield _knob(("start", name, "deg"), angles[k], [], angle, angle=k, slider=TURN)
+        for k, spin in enumerate(v0[OMEGA]):
+            most, place = max(SPIN, 2 * abs(spin)), v + REAL * (OMEGA.start + k)
+            turns = model.state, {"spin": wrong[k, :3].tolist()}
+            words = ("start", f"spin {'xyz'[k]}", "rad/s")
+            yield _knob(words, spin, [place], turns, slider=(-most, most))
+    polar = model.manifest["scene"]["coordinates"] == "polar"
+    for k, joints in enumerate([] if polar else np.repeat(model.joints_each, 2)):
         at = model.layout.tail_q.start + k
-        name = f"bend {k // 2 + 1} {('pitch', 'yaw')[k % 2]}"
-        value, scale = round(float(joints * q0[at] / DEG), TIDY), DEG / joints
-        words = _refusal(lambda x, k=k: model.state(bend=_row(model.layout.nt, k, x)))
-        yield Knob("start", name, "deg", value, *TURN, words, (q + REAL * at,), scale)
+        bend = model.state, {"bend": wrong[k, : model.nu].tolist()}
+        words = ("start", f"bend {k // 2 + 1} {('pitch', 'yaw')[k % 2]}", "deg")
+        value, places = np.degrees(joints * q0[at]).round(TIDY), [q + REAL * at]
+        yield _knob(words, value, places, bend, scale=np.radians(1) / joints, slider=TURN)
 
 
-def _row(size: int, k: int, x: float) -> list[float]:
-    return [x if i == k else 0.0 for i in range(size)]
-
-
-def _parameters(run: CompiledRun, image: Image) -> Iterator[Knob]:
-    """Parameters of one number, and those of each tail coordinate."""
-    model, places = run.model, parameter_places(run, image)
-    for p in model.manifest["parameters"]:
-        name, rule = p["name"], NUMBER_RULES[p["check"]]
-        if (p["size"] > 1 and "per" not in p) or "pieces" in p or name in ORDERED:
+def _parameters(run: CompiledRun, parameters: dict[str, tuple[int, int]]) -> Iterator[Knob]:
+    """Parameters of one number, or of equal numbers for all tail coordinates."""
+    for p in run.model.manifest["parameters"]:
+        name = p["name"]
+        values = np.unique(run.model.parameters.get(name, [0, 0]))
+        mine = p["in_struct"] or name == "link_radius"
+        if not mine or len(values) > 1 or (p["size"] > 1 and "per" not in p) or name in ORDERED:
             continue
-        if name not in model.parameters or not (p["in_struct"] or name == "link_radius"):
-            continue
-        values = np.atleast_1d(model.parameters[name]).tolist()
-        first = places.get(name, (0, 0))[0]
-        each = tuple(first + REAL * k for k in range(len(values))) if first else ()
-        words = _refusal(lambda x, name=name: model.with_parameters(**{name: x}))
-        yield from _alike(
-            Knob("body", name, p["unit"], 0.0, 0.0, 0.0, words, meaning=p["meaning"]),
-            (values, each, model.names.tail),
-            rule,
-        )
+        first, size = parameters.get(name, (0, 0))
+        places = [first + REAL * k for k in range(size)]
+        refused = run.model.with_parameters, {name: math.nan}
+        more = {"rule": p["check"], "meaning": p["meaning"]}
+        yield _knob(("body", name, p["unit"]), values[0], places, refused, **more)
 
 
 def _gains(run: CompiledRun, image: Image) -> Iterator[Knob]:
     """Damping of the controllers, and gains of the laws that track a reference."""
-    model, parts = run.model, run.actuation.parts
-    nt = model.layout.nt
-    controllers = image.places[run.actuation.record.controllers]
-    size, offsets = image.size("controller"), image.offsets("controller")
+    model, parts, kind = run.model, run.actuation.parts, image.types["controller"]
+    records, rule = run.actuation.record.controllers, {"rule": "not_negative"}
     for k, each in enumerate(parts):
         phase = f" of phase {k + 1}" if len(parts) > 1 else ""
-        if each.damping is not None:
-            place, values = image.array(each.damping), each.damping.tolist()
-            places = tuple(place + REAL * i for i in range(nt))
-            words = _refusal(lambda x: Damping(x).parts(nt))
-            knob = Knob("controller", f"damping{phase}", "N m s", 0.0, 0.0, 0.0, words)
-            yield from _alike(knob, (values, places, model.names.tail), NOT_NEGATIVE)
+        if each.damping is not None and len(np.unique(each.damping)) == 1:
+            start = image.at(image.found[records][k].damping)
+            places = [start + REAL * i for i in range(model.nu)]
+            words, refused = ("controller", f"damping{phase}", "N m s"), Damping(math.nan).parts
+            yield _knob(words, each.damping[0], places, (refused, {"nt": model.nu}), **rule)
         for gain, unit in (("kp", "1/s^2"), ("kd", "1/s")) if each.pfl is not None else ():
-            place = controllers + k * size + offsets[gain][0]
-            words = _refusal(lambda x, gain=gain: Pfl(model, None, **{gain: x}))
-            knob = Knob("controller", f"{gain}{phase}", unit, 0.0, 0.0, 0.0, words)
-            yield from _alike(knob, ([getattr(each.pfl, gain)], (place,), [""]), NOT_NEGATIVE)
-
-
-def _alike(knob: Knob, numbers: tuple[Any, Any, Any], rule: NumberRule) -> Iterator[Knob]:
-    """One knob for numbers that are alike, else one for each: values, places, names."""
-    values, places, names = numbers
-    alike = len(set(values)) == 1
-    for k, value in enumerate(values[:1] if alike else values):
-        least, most = _range(value, rule)
-        own = {"value": value, "least": least, "most": most, **_limits(rule)}
-        own["name"] = knob.name if alike else f"{knob.name} of {names[k]}"
-        yield Knob(**vars(knob) | own | {"places": places if alike else places[k : k + 1]})
+            place = image.at(records) + k * ctypes.sizeof(kind) + getattr(kind, gain).offset
+            arguments = {"model": model, "reference": None, gain: math.nan}
+            words = ("controller", f"{gain}{phase}", unit)
+            yield _knob(words, getattr(each.pfl, gain), [place], (Pfl, arguments), **rule)

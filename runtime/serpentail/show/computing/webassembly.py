@@ -1,26 +1,22 @@
 """A model's C as WebAssembly, compiled by ziglang's clang; the cache keeps what was made."""
 
-import hashlib
 import sys
 from importlib.metadata import version
 from pathlib import Path
 
 from ...basics.errors import CompileFailed
 from ...basics.extras import needed
-from ...basics.progress import Stage
-from ...compiling.cache import LIBRARIES, alone, cache_folder, digest, find, store, workshop
+from ...compiling.cache import LIBRARIES, cache_folder, digest, find, store, workshop
 from ...compiling.toolchain import run_command
 from ...model.library import LAZY_SOURCES
 from ...model.manifest import CheckedFolder
 
 HEADERS = Path(__file__).with_name("native")  # in place of a C library
-# Without contraction and with all checks of numbers, as in the profile "reproducible"; only what
-# is exported stays.
+# no contraction, as in the profile "reproducible"; of the C only what is exported stays
 FLAGS = (
     *("-target", "wasm32-freestanding", "-std=c99", "-O2", "-msimd128", "-mbulk-memory"),
     *("-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-ffunction-sections"),
     *("-nostdlib", "-Wl,--no-entry", "-Wl,--gc-sections", "-Wl,--strip-all"),
-    "-Wl,--export=__heap_base",
 )
 
 
@@ -31,32 +27,23 @@ def webassembly(checked: CheckedFolder, exports: list[str]) -> bytes:
     cache.
     """
     needed("ziglang", "live")
-    prefix = checked.manifest["prefix"]
-    late = {f"src/{prefix}_{part}.c" for part in LAZY_SOURCES}
-    names = [name for name in checked.files if name.endswith((".c", ".h")) and name not in late]
-    texts = {name: checked.files[name] for name in names if not name.startswith("example/")}
+    late = {f"src/{checked.manifest['prefix']}_{part}.c" for part in LAZY_SOURCES}
+    texts = {name: text for name, text in checked.files.items() if name not in late}
+    texts = {name: text for name, text in texts.items() if name.startswith(("src/", "include/"))}
     texts |= {f"libc/{path.name}": path.read_bytes() for path in sorted(HEADERS.iterdir())}
-    flags = [*FLAGS, *(f"-Wl,--export={name}" for name in exports)]
-    digests = [(name, hashlib.sha256(text).hexdigest()) for name, text in sorted(texts.items())]
-    cache, key = cache_folder(), digest([digests, flags, version("ziglang")])
-    with alone(cache, key):
-        found = find(cache, LIBRARIES, key)
-        return found[1] if found else _compiled(texts, flags, cache, key)
-
-
-def _compiled(texts: dict[str, bytes], flags: list[str], cache: Path, key: str) -> bytes:
-    """Return the module of texts, which the cache then has."""
-    with workshop(cache) as part, Stage("compile", "WebAssembly"):
+    flags = [*FLAGS, *(f"-Wl,--export={name}" for name in ("__heap_base", *exports))]
+    told = [(name, text.decode()) for name, text in sorted(texts.items())]
+    cache, key = cache_folder(), digest([told, flags, version("ziglang")])
+    if found := find(cache, LIBRARIES, key):
+        return found[1]
+    with workshop(cache) as part:
         for name, text in texts.items():
-            path = part / name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(text)
-        sources = [str(part / name) for name in texts if name.endswith(".c")]
-        folders = ("-isystem", str(part / "libc"), "-I", str(part / "include"))
-        made = part / "module.wasm"
-        command = (sys.executable, "-m", "ziglang", "cc", *flags, *folders, *sources, "-o", made)
-        finished = run_command([str(word) for word in command])
+            (part / name).parent.mkdir(exist_ok=True)
+            (part / name).write_bytes(text)
+        command = [sys.executable, "-m", "ziglang", "cc", *flags, "-o", f"{part}/module.wasm"]
+        command += [f"-isystem{part}/libc", f"-I{part}/include"]
+        finished = run_command([*command, *(f"{part}/{name}" for name in texts if name[-1] == "c")])
         if finished.returncode:
-            words = finished.stderr.replace(str(part), "").strip()
+            words = finished.stderr.replace(f"{part}/", "")
             raise CompileFailed(f"ziglang could not make WebAssembly of the model: {words:.2000}")
-        return store(cache, LIBRARIES, key, made).read_bytes()
+        return store(cache, LIBRARIES, key, part / "module.wasm").read_bytes()

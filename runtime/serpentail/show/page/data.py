@@ -110,7 +110,8 @@ def _notes(motion: Trajectory, step: int) -> list[str]:
 
 def labels() -> dict[str, tuple[str, str]]:
     """Return the label and the unit, in brackets, of each number that the page shows."""
-    return {name: (label, f" ({UNITS[name]})" * bool(UNITS[name])) for name, label in LABELS.items()}
+    units = {name: f" ({UNITS[name]})" if UNITS[name] else "" for name in LABELS}
+    return {name: (label, units[name]) for name, label in LABELS.items()}
 
 
 def _numbers(model: Model, motion: Trajectory) -> list[tuple[str, str]]:

@@ -14,9 +14,6 @@ if TYPE_CHECKING:
 
 SHORT_STEPS = (STEP_TOO_SMALL, TOO_MANY_STEPS)  # statuses: the steps became too short
 FAILED = "at t = {t:.6g} s {why}"
-TOO_STRONG = (
-    " Torques reach {torque:.3g} N m, and a joint {rate:.3g} rad/s: is a torque far too large?"
-)
 COUNTS = ("steps", "rejected", "evaluations", "factorisations")
 
 
@@ -67,7 +64,8 @@ def failed(status: int, t: float, extremes: tuple[float, float] = (0, 0)) -> Sim
     torque, rate = extremes
     words = FAILED.format(t=t, why=WHY[status])
     if status in SHORT_STEPS and torque and rate > LARGEST["rad/s"][0]:
-        words += TOO_STRONG.format(torque=torque, rate=rate)
+        words += f" Torques reach {torque:.3g} N m, and a joint {rate:.3g} rad/s: is a torque far"
+        words += " too large?"
     return SimulationError(words)
 
 
