@@ -10,5 +10,6 @@ double pow(double x, double y) OF_JAVASCRIPT(pow);
 #define sqrt __builtin_sqrt
 #define fabs __builtin_fabs
 #define ceil __builtin_ceil
+#define NAN __builtin_nanf("")
 
 #endif
