@@ -30,7 +30,7 @@ ENVIRONMENT := $(if $(UV),$(UV) venv --quiet --seed --python $(PYTHON),$(PYTHON)
 INSTALL := $(if $(UV),$(UV) pip install --quiet --python $(PY) --reinstall-package serpentail,\
              $(PY) -m pip install --quiet --disable-pip-version-check) --editable
 # a page that could not be made is tried again by the next `make setup` or `make demo`
-PAGE := $(wildcard hatch_build.py viewer/*.* viewer/src/*)
+PAGE := $(wildcard hatch_build.py viewer/*.* viewer/src/* viewer/src/*/*)
 TELL_PAGE := if test -f runtime/serpentail/show/page/page.html; then touch $(PAGED); else \
              echo "no page of runs, which needs Node.js 18 and npm: $$(cat .build/page_missing 2>&1)"; fi
 setup: $(READY) $(if $(wildcard $(READY)),$(if $(wildcard $(PAGED)),,$(PAGED)))

@@ -23,6 +23,7 @@ const style = [
   read("node_modules/uplot/dist/uPlot.min.css"),
   read("src/colours.css"),
   read("src/style.css"),
+  read("src/live/knobs.css"),
 ].join("\n");
 const licences = ["three", "uplot"]
   .map((name) => `${name}\n\n${read(`node_modules/${name}/LICENSE`)}`)

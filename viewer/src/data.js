@@ -21,7 +21,8 @@ export async function decoded(text, rows) {
   }
   const columns = new Float32Array(bits.buffer);
   const width = count / rows;
-  return { data: columns.map((_, i) => columns[(i % width) * rows + Math.floor(i / width)]), width };
+  const data = columns.map((_, i) => columns[(i % width) * rows + Math.floor(i / width)]);
+  return { data, width };
 }
 
 // One motion: its description (meta) and its samples.

@@ -43,9 +43,9 @@ def flown(name, law=None, span=0.3, **words):
     return st.simulate(model, state, span, controller=law, **more)
 
 
-def tracking(model):
+def tracking(model, kp=900, kd=60):
     reference = st.Reference([0.0, 0.1], [[0.0] * model.nu, [0.3] * model.nu])
-    return st.Phases([(0.0, st.Pfl(model, reference, kp=900, kd=60)), (0.2, st.Damping(1e-4))])
+    return st.Pfl(model, reference, kp=kp, kd=kd)
 
 
 # a motion, and what is changed
@@ -61,7 +61,7 @@ CASES = {
     "polar": (lambda: flown("polar"), {"gravity": 1.0, "spin y": 4.0}),
     "fixed": (
         lambda: flown("fixed", tracking(zoo.model("fixed")), bend=0.2),
-        {"kp of phase 1": 400.0, "damping of phase 2": 3e-4, "tail_mass": 0.01},
+        {"kp": 400.0, "kd": 50.0, "tail_mass": 0.01},
     ),
     "fall": (lambda: flown("reproducible", st.Damping(1e-3), 0.6, **FALL), {}),
     "slip": (
@@ -89,19 +89,10 @@ def again(motion, values):
         place = len(q) - model.nu + k
         name = f"bend {k // 2 + 1} {('pitch', 'yaw')[k % 2]}"
         q[place] = np.radians(left.pop(name)) / joints if name in left else q[place]
-    law = made.controller
-    if "damping" in left:
-        law = st.Damping(left.pop("damping"))
-    if isinstance(law, st.Phases):
-        (_, first), (begin, _) = law.phases
-        gains = {"kp": left.pop("kp of phase 1"), "kd": first.kd}
-        later = st.Damping(left.pop("damping of phase 2"))
-        law = (first.curve, gains), (begin, later)
-    model = model.with_parameters(**left)
-    if isinstance(law, tuple):
-        (curve, gains), phase = law
-        pfl = st.Pfl(model, st.Reference([0.0, 0.1], curve.at([0.0, 0.1])[0]), **gains)
-        law = st.Phases([(0.0, pfl), phase])
+    gains = {name: left.pop(name) for name in ("damping", "kp", "kd") if name in left}
+    law, model = made.controller, model.with_parameters(**left)
+    if gains:
+        law = tracking(model, **gains) if "kp" in gains else st.Damping(**gains)
     if made.ground.legs is not None:
         start["legs"] = made.ground.legs
     settings = {name: made.method.settings[name] for name in ("rtol", "atol")}

@@ -13,7 +13,7 @@ export class Engine {
 
   constructor(live, exports, image) {
     Object.assign(this, { live, exports, image, memory: exports.memory });
-    if (exports.__heap_base.value > live.base) throw new Error("the model's constants are too large");
+    if (exports.__heap_base.value > live.base) throw new Error("the model is too large");
     const pages = (live.base + image.length - this.memory.buffer.byteLength) / PAGE;
     if (pages > 0) this.memory.grow(Math.ceil(pages));
     this.view = new DataView(this.memory.buffer);

@@ -70,8 +70,8 @@ function stopped(facts) {
     });
     if (!(most > 1)) continue;
     const [k, i] = [Math.floor(j / live.nt), j % live.nt];
-    const numbers = { at: engine.parameter(stop)[i], width: engine.parameter("tail_stop_width")[i] };
-    const words = { name: live.names[i], angle: facts.angle(k, i), stop, ...numbers };
+    const [at, width] = [stop, "tail_stop_width"].map((name) => engine.parameter(name)[i]);
+    const words = { name: live.names[i], angle: facts.angle(k, i), stop, at, width };
     return [filled(live.words.ease_stops, { behind: filled(live.words.behind, words) })];
   }
   return [];

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from ...basics.extras import needed
 from ...model.library import WHY
 from ...model.model import Model
 from ...model.passive import BEHIND
@@ -49,7 +48,6 @@ def computed_again(model: Model, motion: Trajectory, most: int) -> dict[str, Any
 
     Where that cannot be, return the reason. Errors as of ``webassembly``.
     """
-    needed("ziglang", "live")
     again = vars(motion).get(AGAIN)
     if again is None:
         return "only what simulate has just made can be computed again, not a file, a plan, a part"

@@ -1,7 +1,1 @@
-/* What the generated C needs of string.h: instructions of WebAssembly. */
-#ifndef SERPENTAIL_STRING_H
-#define SERPENTAIL_STRING_H
-
-#define memcpy __builtin_memcpy
-
-#endif
+#define memcpy __builtin_memcpy /* an instruction of WebAssembly */
