@@ -194,6 +194,27 @@ def test_reproducible_sine_and_cosine_reduce_any_angle(name):
     assert not {"sin", "cos", "sinf", "cosf"} & wanted
 
 
+def test_powers_of_step_lengths_are_exact_enough_without_libm(tmp_path):
+    for name, most in (("small", 1e-5), ("reproducible", 1e-13)):
+        model = model_of(name)
+        text = model.simulation.read_text()
+        assert not re.search(r"\bpowf?\(", text)
+        real, source = f"{model.name}_real", tmp_path / f"{name}.c"
+        own = f"{real} own_power({real} x, {real} a) {{ return {model.name}_power(x, a); }}"
+        source.write_text(f"{text}\n{own}\n")
+        power = ctypes.CDLL(str(compile_library([model.source, source], model.include))).own_power
+        kind = ctypes.c_float if name == "small" else ctypes.c_double
+        power.argtypes, power.restype = (kind, kind), kind
+        limits = np.finfo(np.dtype(kind))
+        sizes = [limits.tiny, 1e-30, 1e-6, 0.3, 0.999, 1.0, 7.5, 1e12, limits.max]
+        for x in (kind(size).value for size in sizes):
+            for a in (-0.85, -0.17, 0.04, 1 / 3):
+                assert power(x, a) == pytest.approx(x ** kind(a).value, rel=most), (name, x, a)
+        assert (
+            np.isnan(power(np.nan, 0.2)) and power(0.0, 0.2) < 1e-7 and power(np.inf, -0.2) < 1e-7
+        )
+
+
 @needs("objdump")
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="looks for x86's instructions")
 def test_reproducible_models_fuse_nothing_and_float_ones_have_no_double_arithmetic(tmp_path):
