@@ -3,6 +3,7 @@ import uPlot from "uplot";
 import { colour, onChange, series } from "./theme.js";
 
 const HEIGHT = 150;
+const REST = 60; // ms between curves that are drawn anew: the animal moves meanwhile
 const DASHES = [[], [6, 4], [2, 3], [9, 3, 2, 3]];
 
 // Four digits; a value below 1e-6 of the plot's largest one is shown as 0, since it is rounding.
@@ -182,9 +183,12 @@ export class Plots {
     for (const plot of this.plots) plot.show(t);
   }
 
-  // Takes other samples of runs; plots out of sight do so when they are seen.
+  // Takes other samples of runs, not with every frame; plots out of sight do so when they are seen.
   renew() {
-    for (const plot of this.plots) plot.renew();
+    this.due ??= setTimeout(() => {
+      this.due = undefined;
+      for (const plot of this.plots) plot.renew();
+    }, REST);
   }
 
   switchRun(run, on) {
