@@ -10,6 +10,7 @@ import numpy as np
 from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TORSO_NV, VELOCITY
 
 from ..basics.attitude import pose_of, product, rotation_matrix
+from ..model.chains import values_of
 from ..model.model import Model
 from ..model.parameters import total_mass
 from .errors import (
@@ -100,19 +101,22 @@ def quaternion_has_no_norm_and_no_sign(model: Model, s: Case) -> Errors:
 
 @law("tail_points", VALUE_LIMIT, only="articulated")
 def links_have_their_length(model: Model, s: Case) -> Errors:
-    """The first tail point is the mount, and each is a link from the next: L_t / N, or its own
-    length.
+    """The first point of a chain of links is its mount, and each is a link from the next: L / N, or
+    its own length.
     """
-    points = model.tail_points(s.q).astype(float)
-    pose = pose_of(s.q, model.layout)
-    mount = pose[POSITION] + rotation_matrix(pose[QUATERNION]) @ model.parameters["tail_mount"]
-    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    even = model.parameters["tail_length"] / len(lengths)
-    wanted = np.array(model.parameters.get("link_lengths", np.full(len(lengths), even)))
-    return {
-        "mount": relative(points[0], mount, points),
-        "lengths": relative(lengths, wanted, points),
-    }
+    every, pose = model.tail_points(s.q).astype(float), pose_of(s.q, model.layout)
+    mounts, lengths = [], []
+    for chain in model.layout.chains:
+        if {*model.kinds[chain.segments]} != {"articulated"}:
+            continue
+        p, points = values_of(chain, model.parameters), every[chain.points]
+        mount = np.array(p["tail_mount"]) * (1, -1 if chain.mirrored else 1, 1)
+        there = pose[POSITION] + rotation_matrix(pose[QUATERNION]) @ mount
+        found = np.linalg.norm(np.diff(points, axis=0), axis=1)
+        wanted = p.get("link_lengths", np.full(len(found), p["tail_length"] / len(found)))
+        mounts.append(relative(points[0], there, points))
+        lengths.append(relative(found, np.array(wanted), points))
+    return {"mount": worst(mounts), "lengths": worst(lengths)}
 
 
 @law("tail_points tail_point_jacobians", VALUE_LIMIT)

@@ -48,6 +48,7 @@ READERS = {"urdf": read_urdf, "mjcf": read_mjcf, "bundle": read_bundle, "fmu": r
 REMEDIES = {  # words of a refusal -> the model and the kind that they lead to
     'export an "fmu"': lambda model, _: (model, "fmu"),
     'export an "mjcf"': lambda model, _: (model, "mjcf"),
+    'export a "bundle"': lambda model, _: (model, "bundle"),
     "with tail_stiffness = 0": lambda model, kind: (model.with_parameters(tail_stiffness=0), kind),
     'kind = "articulated" and some links': lambda model, kind: (
         st.build(tail="articulated", segments=model.segments, links=2),
