@@ -9,7 +9,16 @@ from dataclasses import dataclass, replace
 
 from ..ir import program as ir
 from ..ir.builder import narrowed
-from ..ir.dataflow import forward_slice, inner_arrays, names, pruned, rewritten, rule_of, writes
+from ..ir.dataflow import (
+    forward_slice,
+    inner_arrays,
+    names,
+    pruned,
+    reads,
+    rewritten,
+    rule_of,
+    writes,
+)
 from .angles import SinesAndCosinesArray, angle_inputs, kinds, sines_and_cosines_arrays
 from .step import tangent
 
@@ -101,16 +110,20 @@ def without_writes(body: ir.Body, arrays: Collection[str]) -> ir.Body:
 
 def _partly_written(body: ir.Body) -> list[ir.Ref]:
     """Return the wide arrays of which some statement writes only a part of the lanes, and that are
-    read beyond: outputs, and where the part grows from iteration to iteration.
+    read beyond: outputs, what is read without a bound, and where the part grows from iteration to
+    iteration.
     """
     arrays: dict[str, ir.Array] = {}
+    beyond: set[str] = set()
     for statement, _ in ir.statements(body):
         if isinstance(statement, ir.Apply) and statement.columns:
             for ref in writes(statement):
-                grows = bool(statement.columns.terms)
-                if ref.array.lanes and (grows or ref.array.role == "output"):
+                if ref.array.lanes:
                     arrays[ref.array.name] = ref.array
-    return [a.whole() for a in arrays.values()]
+                    beyond |= {ref.array.name} if statement.columns.terms else set()
+        else:
+            beyond |= names(reads(statement))
+    return [a.whole() for a in arrays.values() if a.role == "output" or a.name in beyond]
 
 
 class _Tangents:
