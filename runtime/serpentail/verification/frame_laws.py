@@ -110,7 +110,7 @@ def links_have_their_length(model: Model, s: Case) -> Errors:
         if {*model.kinds[chain.segments]} != {"articulated"}:
             continue
         p, points = values_of(chain, model.parameters), every[chain.points]
-        mount = np.array(p["tail_mount"]) * (1, -1 if chain.mirrored else 1, 1)
+        mount = np.array(p["tail_mount"]) * (-1 if chain.mirrored else 1, 1, 1)
         there = pose[POSITION] + rotation_matrix(pose[QUATERNION]) @ mount
         found = np.linalg.norm(np.diff(points, axis=0), axis=1)
         wanted = p.get("link_lengths", np.full(len(found), p["tail_length"] / len(found)))
