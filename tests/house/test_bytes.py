@@ -16,7 +16,7 @@ DIGESTS = Path(__file__).with_name("emitted.json")
 
 
 def digest(folder):
-    """A digest of all files of a generated folder and of their names, but not of what uses leave."""
+    """A digest of all files of a generated folder and of their names, but not of traces of use."""
     content = hashlib.sha256()
     for path in sorted(path for path in folder.rglob("*") if path.is_file()):
         name = path.relative_to(folder)

@@ -184,9 +184,15 @@ def test_without_webassembly_the_page_says_so_and_replays(browser, tmp_path):
 def test_what_cannot_be_computed_is_replayed_with_the_reason(tmp_path):
     flight = flown("m1_n3", lambda t, q, v: [0.0, 0.0], **TUMBLE)
     many = st.simulate(zoo.model("m1_n3"), flight.q[0], flight.v[0], output_step=1e-4)
+    parts = [st.Phase(name, 0.01) for name in ("first", "second")]
+    state = flight.q[0], flight.v[0]
+    joined = (
+        st.Sequence(zoo.model("ground"), parts, gamma=3.7, delta=-0.3).simulate(*state).trajectory
+    )
     for motion, words in (
         (flight, "its controller is a function"),
-        (dataclasses.replace(flight), "only what simulate"),
+        (dataclasses.replace(flight), "only one run"),
+        (joined, "only one run"),
         (flown("single", height=1), 'real = "double"'),
         (flown("baked", height=1), "baked = false"),
         (many, "longer output_step"),

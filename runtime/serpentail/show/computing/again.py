@@ -49,8 +49,8 @@ def computed_again(model: Model, motion: Trajectory, most: int) -> dict[str, Any
     Where that cannot be, return the reason. Errors as of ``webassembly``.
     """
     again = vars(motion).get(AGAIN)
-    if again is None:
-        return "only what simulate has just made can be computed again, not a file, a plan, a part"
+    if not isinstance(again, RunAgain):
+        return "only one run that simulate has just made can be computed again, no file and no plan"
     run = CompiledRun(again.runs(again.start, again.ground, again.method))
     parts, method, rows = run.actuation.parts, again.method.name, len(motion.t)
     unfit = model.manifest["real"] != "double" or model.manifest["scene"]["baked"]
