@@ -70,14 +70,16 @@ def test_every_slight_fault_is_not_what_the_program_means():
 
 
 def test_every_slight_fault_disagrees_with_references():
-    """Those of all functions together, too: of another animal, which obeys the laws."""
+    """Those of all functions together, too: of another animal, which obeys the laws but for those
+    of its parameters.
+    """
     for library in ("pinocchio", "mujoco"):
         pytest.importorskip(library)
     model = zoo.own("m1_n3")
     inertia = [x * (1 + SLIGHT_FAULT) for x in model.parameters["torso_inertia"]]
     other = model.with_parameters(torso_inertia=inertia)
     other.parameters = model.parameters
-    assert laws_broken(other) == set()
+    assert laws_broken(other) == {"a planar tail turns the torso as bodies at pins"}
     cases = list(states.states(model, 1))
     for reference in verify_model.REFERENCES[:3]:
         for name in reference.names:

@@ -17,10 +17,8 @@ from ..basics.errors import UnusualSize
 from ..basics.near_names import NearNames
 from ..model.model import Model
 from ..model.parameters import independent, total_mass
-from .resample import inside
 from .text import as_text
 from .trajectory import Trajectory
-from .validation import real
 
 if TYPE_CHECKING:
     from ..show.pictures.plot import Figure
@@ -34,7 +32,8 @@ AXES = ("pitch", "roll", "yaw")
 class MomentumShares(NearNames):
     """Who turned the torso, and who has the angular momentum, at the K times of a motion.
 
-    Printed, it tells the turns of the whole motion in degrees.
+    Printed, it tells the turns of the whole motion in degrees. What happened from one time to
+    another is the difference of the turns at both.
 
     Attributes
     ----------
@@ -57,21 +56,6 @@ class MomentumShares(NearNames):
     turned: Array
     momentum: dict[str, Array]
 
-    def between(self, start: float, end: float) -> dict[str, Array]:
-        """Return what turned the torso (3,), rad, from one time (s) to another, by cause.
-
-        Raises
-        ------
-        ValueError
-            A time is outside the motion.
-        """
-        times = inside(real("t", [start, end]), self.motion.t)
-        ends = {
-            cause: np.array([np.interp(times, self.motion.t, x) for x in turn.T])
-            for cause, turn in self.turns.items()
-        }
-        return {cause: x[:, 1] - x[:, 0] for cause, x in ends.items()}
-
     def __str__(self) -> str:
         whole = {name: turn[-1] for name, turn in (self.turns | {"sum": self.turned}).items()}
         rows = {
@@ -84,21 +68,12 @@ class MomentumShares(NearNames):
     def plot(self, path: str | os.PathLike[str] | None = None) -> tuple["Figure", Any]:
         """Draw the turns over time; return Matplotlib's figure and its axes.
 
-        Parameters
-        ----------
-        path : str or path, optional
-            A .pdf, .png or .svg file to write the figure to, whole or not at all.
-
-        Raises
-        ------
-        ViewError
-            The suffix of the path is unknown.
-        ExtraMissing
-            Matplotlib is not installed; it comes with the extra "plot".
+        path: also write the figure to this .pdf, .png or .svg file. ViewError for another suffix,
+        ExtraMissing without the extra "plot".
         """
         from ..show.pictures.shares import shares_figure
 
-        return shares_figure(self.motion, self.turns, self.turned, path)
+        return shares_figure(self, path)
 
 
 def momentum_shares(model: Model, motion: Any) -> MomentumShares:
@@ -115,8 +90,7 @@ def momentum_shares(model: Model, motion: Any) -> MomentumShares:
     Returns
     -------
     MomentumShares
-        Turns of the torso by cause, and the angular momentum of each part. ``print`` shows the
-        turns, ``plot`` draws them over time.
+        Turns of the torso by cause, and the angular momentum of each part.
 
     Raises
     ------
@@ -162,16 +136,13 @@ def momentum_shares(model: Model, motion: Any) -> MomentumShares:
     h = h_of(torso, v[:, OMEGA]) + sum(by.values())
     causes = {SPIN: np.broadcast_to(h[0], h.shape)} | {name: -x for name, x in by.items()}
     causes[OUTSIDE] = h - h[0]
-    turns = {name: _integral(motion.t, _solved(A, each)) for name, each in causes.items()}
-    whole = _integral(motion.t, v[:, OMEGA])
+    rates = {name: np.linalg.solve(A, each[..., None])[..., 0] for name, each in causes.items()}
+    turns = {name: _integral(motion.t, rate) for name, rate in rates.items()}
 
     parts = {name: _part(model, name, q, v) for name in chains}
-    return MomentumShares(motion, turns, whole, {TORSO: h - sum(parts.values())} | parts)
-
-
-def _solved(A: Array, x: Array) -> Array:
-    """A^-1 x at each time."""
-    return np.asarray(np.linalg.solve(A, x[..., None])[..., 0], float)
+    return MomentumShares(
+        motion, turns, _integral(motion.t, v[:, OMEGA]), {TORSO: h - sum(parts.values())} | parts
+    )
 
 
 def _integral(t: Array, rates: Array) -> Array:

@@ -86,7 +86,7 @@ def check(entry: Law, model: Model, cases: list[Case]) -> Check:
     model = model if reason else rid_of(model, entry.without)
     errors = [] if reason else [pair for case in cases for pair in errors_at(entry, model, case)]
     if not errors:
-        omitted = reason or "not generated: the functions that it is about"
+        omitted = reason or "it says nothing about this model"
         return Check(entry.name, entry.text, 0.0, limit, omitted=omitted)
     where, error = max(errors, key=lambda pair: (np.isnan(pair[1]), pair[1]))
     return Check(entry.name, entry.text, float(error), limit, "" if error == 0 else where)

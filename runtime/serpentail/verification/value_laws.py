@@ -101,6 +101,39 @@ def momentum_is_mass_times_velocity(model: Model, s: Case) -> Errors:
     }
 
 
+@law("momentum", VALUE_LIMIT, only="articulated")
+def a_planar_tail_turns_the_torso_as_bodies_at_pins(model: Model, s: Case) -> Errors:
+    """Bent in pitch alone, links turn a torso without angular momentum by -h / J: J is the inertia
+    of all bodies in the plane, h their angular momentum about the COM if the torso is at rest.
+    """
+    p, counts = model.parameters, model.joints_each
+    if model.fixed or "mount_angles" in p or len(model.layout.chains) > 1:
+        return {}
+    n = int(np.sum(counts))
+    pitch = np.arange(0, model.layout.nt, 2)
+    angles, rates = (np.cumsum(np.repeat(x[-model.layout.nt :][pitch], counts)) for x in (s.q, s.v))
+
+    # y + i z of each link's ends and COM, and its rate
+    lengths = np.array(p.get("link_lengths", np.full(n, p["tail_length"] / n)))
+    along = -np.exp(1j * angles)
+    ends = complex(*p["tail_mount"][1:]) + np.cumsum(lengths * along)
+    back = np.array(p.get("link_centers", lengths / 2)) - lengths
+    places = np.concatenate([[0], ends + back * along])
+    turning = 1j * rates * along
+    moving = np.concatenate([[0], np.cumsum(lengths * turning) + back * turning])
+    masses = np.array([p["torso_mass"], *p.get("link_masses", np.full(n, p["tail_mass"] / n))])
+    inertias = np.resize(p.get("link_inertias", p.get("link_inertia")), (n, 3))[:, 0]
+
+    arms = places - np.average(places, weights=masses)
+    J = p["torso_inertia"][0] + np.sum(inertias) + masses @ abs(arms) ** 2
+    each = np.concatenate([inertias * rates, masses * (arms.conj() * moving).imag])
+    q, swing = np.zeros(model.nq), np.zeros(model.nv)
+    q[3], q[7 + pitch], swing[6 + pitch] = 1.0, s.q[7 + pitch], s.v[6 + pitch]
+    turn, h = np.eye(model.nv)[3], np.sum(each)
+    found = [model.momentum(q, v)[1][0] for v in (turn, swing)]
+    return {"J": relative(found[0], J), "h": relative(found[1], h, np.sum(abs(each)))}
+
+
 def center_of_mass(model: Model, q: np.ndarray) -> np.ndarray:
     """Return the COM (..., 3) from H: p + R h / M with H_p,omega = -R skew(h)."""
     H, R = model.mass_matrix(q).astype(float), rotation_matrix(q[..., QUATERNION])
