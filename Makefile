@@ -21,7 +21,7 @@ WANTED  := $(call option,real,$(REAL)) $(call option,emission,$(EMISSION)) $(cal
 # what it makes and how it is called is the generator's to tell: options are part of the name
 GENERATE := $(PY) -m serpentail_codegen
 
-.PHONY: help setup demo test test-slow test-all lint docs bench paper model verify mutants wheels golden clean
+.PHONY: help setup demo test test-slow test-all lint docs bench paper gallery-data model verify mutants wheels golden clean
 help:
 	@sed -n 's/^#> //p' Makefile
 
@@ -98,6 +98,9 @@ bench: $(READY)
 #> make paper                             the paper's figures and tables again, beside its numbers; FIGURES="fig8 table2"
 paper: $(READY)
 	$(PY) -m examples.paper $(FIGURES)
+#> make gallery-data                      published animals and robots beside our models: docs/measurements.md
+gallery-data: $(READY)
+	$(PY) -m examples.gallery_data
 #> make mutants                           do tests notice small changes of the sources? MUTANTS=200 SEED=1 JOBS=2
 mutants: $(READY)
 	$(PY) -m checks.mutants --mutants $(or $(MUTANTS),200) --seed $(or $(SEED),1) --jobs $(or $(JOBS),2)

@@ -1,4 +1,4 @@
-"""What the paper says (published.toml), and whether a value of ours is inside its band."""
+"""What papers say (published.toml), and whether a value of ours is inside its band."""
 
 import tomllib
 from dataclasses import dataclass
@@ -14,15 +14,16 @@ INSIDE, OUTSIDE, INCOMPARABLE = "inside", "outside", "not comparable"
 
 @dataclass(frozen=True)
 class Row:
-    """A number or a sentence of the paper.
+    """A number or a sentence of a paper.
 
-    value: True for a sentence. band: least and most of ours, None for a sentence and where there is
-    no comparison; incomparable: why there is none. why: what is known of a difference.
+    value: True for a sentence, a text where no number is published. band: least and most of ours,
+    None for a sentence and where there is no comparison; incomparable: why there is none. why: what
+    is known of a difference.
     """
 
     name: str
     says: str
-    value: float
+    value: float | str
     unit: str = ""
     band: tuple[float, float] | None = None
     incomparable: str = ""
@@ -39,7 +40,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Item:
-    """A figure or a table: its title, where it stands, the page that moves, its rows."""
+    """A figure or an animal: its title, where it stands, the page that moves, its rows."""
 
     title: str
     where: str
@@ -68,9 +69,11 @@ def row(field: str, of: dict) -> Row:
     known = set(Row.__dataclass_fields__)
     if not {"name", "says", "value"} <= set(of) <= known:
         raise refused(field, sorted(of), f"name, says and value, of {', '.join(sorted(known))}")
-    found, is_sentence = Row(**of), of["value"] is True
-    if is_sentence == ("unit" in of) or is_sentence + ("band" in of) + ("incomparable" in of) != 1:
-        raise refused(field, of, "true alone, or a number, a unit, and band or incomparable")
+    found, is_sentence, is_text = Row(**of), of["value"] is True, isinstance(of["value"], str)
+    reasons = is_sentence + ("band" in of) + ("incomparable" in of)
+    if reasons != 1 or (is_text and "band" in of) or not (is_text or is_sentence != ("unit" in of)):
+        needs = "true alone, a text and incomparable, or a number, a unit, and band or incomparable"
+        raise refused(field, of, needs)
     if found.band is not None and (len(found.band) != 2 or found.verdict(found.value) != INSIDE):
         raise refused(f"{field}.band", found.band, f"[least, most] around {found.value}")
     return found

@@ -24,6 +24,7 @@ SOUND = ("m1_n1", "arcs1", "elastic", "single_ground", "baked")
 OTHERS = [name for name in zoo.ZOO if name not in (*SOUND, "polar")]  # polar ones have no states
 REASONS = {f"only for {kind} models" for kind in ("double", "articulated", "contact", "passive")}
 REASONS |= {"no even m or n of links", "only for a torso that moves", verify_model.PLAIN}
+REASONS |= {"it says nothing about this model"}
 REASONS |= {"the passive tail cannot be left out: parameters are baked"}
 REASONS |= {f"No module named {x!r}" for x in ("pinocchio", "mujoco") if find_spec(x) is None}
 OTHER_NUMBERS = {  # of a large animal, and of one without weight

@@ -1,0 +1,1 @@
+"""Published animals and robots, and what our models of them do."""

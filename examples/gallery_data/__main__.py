@@ -1,0 +1,51 @@
+"""Computes what published animals and robots do, and prints it beside what was measured.
+
+NAMES make only some: gecko yaw. All together also write the table of docs/measurements.md. Pages
+that move go to output/gallery_data. It takes about a minute.
+"""
+
+from argparse import ArgumentTypeError
+from collections.abc import Iterable
+from pathlib import Path
+
+from examples import front
+
+FOLDER = front.ROOT / "output" / "gallery_data"
+PUBLISHED = Path(__file__).with_name("published.toml")
+PAGE = front.ROOT / "docs" / "measurements.md"
+SYSTEMS = ("template", "tailbot", "squirrel", "gecko", "joints", "yaw")  # others need what we lack
+
+
+def main(names: list[str], folder: Path) -> int:
+    """Compute the named systems, or all, and print them."""
+    from examples.paper import page, published
+
+    items = published.read(PUBLISHED)
+    values = computed(folder, names or SYSTEMS)
+    print("\n".join(page.lines({name: items[name] for name in names or items}, values)))
+    if not names:
+        page.write(items, values, PAGE)
+        print(f"\nwritten: {PAGE}")
+    print(f"pages that move: {folder}")
+    return 0
+
+
+def computed(folder: Path, names: Iterable[str] = SYSTEMS) -> dict[str, dict]:
+    """Return the values of systems by row; write their pages that move."""
+    from examples.gallery_data import systems
+
+    folder.mkdir(parents=True, exist_ok=True)
+    return {name: getattr(systems, name)(folder) for name in names}
+
+
+def system(text: str) -> str:
+    """Return the name of a system; ArgumentTypeError where it is none."""
+    if text not in SYSTEMS:
+        raise ArgumentTypeError(f"{text!r}: needs one of {', '.join(SYSTEMS)}")
+    return text
+
+
+if __name__ == "__main__":
+    parser = front.parser(__doc__)
+    parser.add_argument("names", nargs="*", metavar="NAME", type=system, help="gecko, yaw")
+    front.run(main, parser.parse_args().names, FOLDER)
