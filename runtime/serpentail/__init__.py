@@ -27,7 +27,7 @@ _HOME = {
     "Contact": "motion.contact",
     "Trajectory": "motion.trajectory",
     "summary": "motion.summary",
-    **dict.fromkeys(["momentum_shares", "MomentumShares"], "motion.shares"),
+    **dict.fromkeys(["momentum_shares", "MomentumShares"], "show.shares"),
     **dict.fromkeys(["compare", "Comparison"], "show.compare"),
     **dict.fromkeys(["pitch_roll_yaw", "rotation_matrix"], "basics.attitude"),
     **dict.fromkeys(["polar_to_bend", "bend_to_polar"], "model.polar"),

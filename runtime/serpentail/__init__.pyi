@@ -24,8 +24,8 @@ from .simulation.controllers.schedules import Reference as Reference
 from .motion.contact import Contact as Contact
 from .motion.trajectory import Trajectory as Trajectory
 from .motion.summary import summary as summary
-from .motion.shares import momentum_shares as momentum_shares
-from .motion.shares import MomentumShares as MomentumShares
+from .show.shares import momentum_shares as momentum_shares
+from .show.shares import MomentumShares as MomentumShares
 from .show.compare import compare as compare
 from .show.compare import Comparison as Comparison
 from .basics.attitude import pitch_roll_yaw as pitch_roll_yaw

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...basics.extras import needed
-from ...motion.shares import AXES, MomentumShares
+from ..shares import AXES, SUM, MomentumShares
 from .panels import Panel, colour_of
 from .plot import stacked
 from .style import INK, drawn
@@ -20,7 +20,7 @@ def shares_figure(
 ) -> tuple["Figure", Any]:
     """Draw turns by cause and their sum, about the axes that the torso turns about."""
     needed("matplotlib", "plot")
-    names = [*shares.turns, "sum"]
+    names = [*shares.turns, SUM]
     styles = [*((colour_of(k), "-") for k in range(len(shares.turns))), (INK, "--")]
     curves = np.degrees([*shares.turns.values(), shares.turned])
     panels = [

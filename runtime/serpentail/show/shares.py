@@ -17,14 +17,14 @@ from ..basics.errors import UnusualSize
 from ..basics.near_names import NearNames
 from ..model.model import Model
 from ..model.parameters import independent, total_mass
-from .text import as_text
-from .trajectory import Trajectory
+from ..motion.text import as_text
+from ..motion.trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from ..show.pictures.plot import Figure
+    from .pictures.plot import Figure
 
 MASSES = ("tail_mass", "link_masses", "arc_masses", "link_inertia", "link_inertias")
-TORSO, TAIL, SPIN, OUTSIDE = "torso", "tail", "spin", "outside"
+TORSO, TAIL, SPIN, OUTSIDE, SUM = "torso", "tail", "spin", "outside", "sum"
 AXES = ("pitch", "roll", "yaw")
 
 
@@ -57,13 +57,10 @@ class MomentumShares(NearNames):
     momentum: dict[str, Array]
 
     def __str__(self) -> str:
-        whole = {name: turn[-1] for name, turn in (self.turns | {"sum": self.turned}).items()}
-        rows = {
-            name: "".join(f"{x:9.2f}" for x in np.degrees(turn)) for name, turn in whole.items()
-        }
-        return as_text(
-            {"": "".join(f"{axis:>9}" for axis in AXES)} | rows, dict.fromkeys(rows, "deg")
-        )
+        whole = {name: np.degrees(x[-1]) for name, x in (self.turns | {SUM: self.turned}).items()}
+        rows = {name: "".join(f"{x:9.2f}" for x in turn) for name, turn in whole.items()}
+        heads = {"": "".join(f"{axis:>9}" for axis in AXES)}
+        return as_text(heads | rows, dict.fromkeys(rows, "deg"))
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> tuple["Figure", Any]:
         """Draw the turns over time; return Matplotlib's figure and its axes.
@@ -71,7 +68,7 @@ class MomentumShares(NearNames):
         path: also write the figure to this .pdf, .png or .svg file. ViewError for another suffix,
         ExtraMissing without the extra "plot".
         """
-        from ..show.pictures.shares import shares_figure
+        from .pictures.shares import shares_figure
 
         return shares_figure(self, path)
 
@@ -108,10 +105,6 @@ def momentum_shares(model: Model, motion: Any) -> MomentumShares:
     - h(0)) - sum of A^-1 B_c q_dot_c: spin, outside, chains. Each is integrated by the trapezoidal
     rule over the samples, so the shares add up to rounding; give samples that follow the motion.
     In flight "outside" is zero but for the errors of the motion.
-
-    Examples
-    --------
-    >>> print(st.momentum_shares(model, motion))  # doctest: +SKIP
     """
     model.refuse_fixed("momentum_shares")
     motion = getattr(motion, "trajectory", motion)
@@ -137,22 +130,20 @@ def momentum_shares(model: Model, motion: Any) -> MomentumShares:
     causes = {SPIN: np.broadcast_to(h[0], h.shape)} | {name: -x for name, x in by.items()}
     causes[OUTSIDE] = h - h[0]
     rates = {name: np.linalg.solve(A, each[..., None])[..., 0] for name, each in causes.items()}
-    turns = {name: _integral(motion.t, rate) for name, rate in rates.items()}
+    rates[SUM] = v[:, OMEGA]
+    turns = {
+        name: np.asarray(cumulative_trapezoid(rate, motion.t, axis=0, initial=0.0))
+        for name, rate in rates.items()
+    }
 
     parts = {name: _part(model, name, q, v) for name in chains}
-    return MomentumShares(
-        motion, turns, _integral(motion.t, v[:, OMEGA]), {TORSO: h - sum(parts.values())} | parts
-    )
-
-
-def _integral(t: Array, rates: Array) -> Array:
-    """The integral (K, 3) of rates by the trapezoidal rule."""
-    return np.asarray(cumulative_trapezoid(rates, t, axis=0, initial=0.0))
+    momentum = {TORSO: h - sum(parts.values())} | parts
+    return MomentumShares(motion, turns, turns.pop(SUM), momentum)
 
 
 def _part(model: Model, chain: str, q: Array, v: Array) -> Array:
-    """Angular momentum (K, 3) of a chain about the moving centre of mass: what its mass adds to
-    the sums over all masses, if it is doubled.
+    """Angular momentum (K, 3) of a chain about the moving centre of mass: what its doubled masses
+    add to the sums over all.
     """
     names = [name_in("" if chain == TAIL else chain, name) for name in MASSES]
     own = independent(model.manifest, model.parameters)

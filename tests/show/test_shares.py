@@ -9,11 +9,10 @@ from scipy.integrate import quad
 
 import serpentail as st
 from tests.functions.test_trees import TREE
+from tests.motion.conftest import made, simulated
 from tests.references.body_set import exact
 from tests.support import own_tails, zoo
 from tests.support.rows import row
-
-from .conftest import made
 
 RIGHT, AT_REST = np.r_[np.zeros(3), 1, np.zeros(3)], np.zeros(8)
 
@@ -87,7 +86,8 @@ def test_momenta_of_the_parts_of_a_tree_are_those_of_its_bodies():
                 assert np.abs(found - own.astype(float)).max() < 1e-13
 
 
-def test_shares_add_up_and_the_ground_is_outside(leap):
+def test_shares_add_up_and_the_ground_is_outside():
+    leap = simulated("tail_support_jump")
     shares = st.momentum_shares(leap.model, leap)
     total = sum(shares.turns.values())
     assert np.abs(total - shares.turned).max() < 1e-12
