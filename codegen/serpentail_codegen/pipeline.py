@@ -4,6 +4,7 @@ from collections.abc import Callable, Collection, Iterator
 from dataclasses import replace
 from pathlib import Path
 
+from serpentail_scene.keys import KINDS
 from serpentail_scene.parameters import PARTS
 
 from . import __version__
@@ -81,6 +82,7 @@ def tail_of(scene: Scene) -> Tail:
                     name=name,
                     mirrored=described.pair and name != described.names[0],
                     segments_before=last.segments_before + last.segments,
+                    coordinates_before=last.coordinates_before + last.nt,
                     points_before=last.points_before + last.tail_points,
                 )
             )
@@ -91,7 +93,8 @@ def _tree(tail: Tail, chains: tuple[Tail, ...]) -> Tail:
     """Return the sizes of an animal of several chains: those of all segments, one after another."""
     stretches = [stretch for chain in chains for stretch in chain.stretches]
     each = [stretch for stretch in stretches for _ in range(stretch.stop - stretch.first)]
-    kinds, counts = (tuple(getattr(s, name) for s in each) for name in ("kind", "points"))
+    own = [replace(s, kind=s.kind if s.kind in KINDS else "hinge") for s in each]
+    kinds, counts = (tuple(getattr(s, name) for s in own) for name in ("kind", "points"))
     mixed = len(set(kinds)) > 1
     return replace(
         tail,

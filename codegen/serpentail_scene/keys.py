@@ -6,9 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from .drives import DRIVES
 from .purposes import PURPOSES
 from .rules import (
     ANY,
+    BODY_INERTIA,
     COUNT,
     FINITE,
     FLAG,
@@ -25,6 +27,7 @@ from .rules import (
 )
 
 KINDS = ("articulated", "continuum", "mixed")
+LIMBS = ("limb", "placed_limb")  # of other chains: all bodies along -y, or bodies anywhere
 GROUPS = ("feet", "tail", "torso")  # of contact points, in their order
 TARGETS = ("c", "casadi")  # languages to emit, in their order
 # a model with such a name would hide the system's header
@@ -127,12 +130,15 @@ class Only:
 
 OF_LINKS = ("link_masses", "link_lengths", "link_centers", "link_inertias")
 OF_ARCS = ("arc_masses", "arc_lengths")
+OF_PLACED = ("link_masses", "link_tips", "link_offsets", "link_inertias")
 ONLY = {
     "articulated": Only(
         ("links",), ("links",), ("link_radius", "link_inertia", *OF_LINKS), ("joint",)
     ),
     "continuum": Only(("samples", "bend_range"), (), OF_ARCS, ("bend", "polar")),
     "mixed": Only(("samples", "bend_range"), (), (*OF_LINKS, *OF_ARCS), ("mixed",)),
+    "limb": Only((), (), (*OF_LINKS, "rotors"), ("joint",)),
+    "placed_limb": Only((), (), (*OF_PLACED, "rotors"), ("joint",)),
 }
 
 
@@ -147,7 +153,16 @@ def foreign_to(kind: str) -> tuple[list[str], list[str]]:
 
 
 # keys of a table [chain.NAME], besides its parameters
-CHAIN = ("on", "pair", "kind", "segments", "links", "samples", "bend_range", "taper")
+CHAIN = ("on", "pair", "kind", "drive", "segments", "links", "samples", "bend_range", "taper")
+OF_LIMB = (
+    "on",
+    "pair",
+    "kind",
+    "drive",
+    "joints",
+    "mount",
+    "mount_angles",
+)  # of one that is a limb
 
 
 # ---- keys of tables ------------------------------------------------------------------------------
@@ -205,6 +220,23 @@ INERTIAS = {
     "radii": Key("m", POSITIVE, 2),
 }
 SEGMENT = {**LENGTHS, **MASSES, **INERTIAS, "link_centers": Key("m", each_link=True)}
+# of the tables in `joints` of a limb
+JOINT = {
+    "length": Key("m", POSITIVE),
+    "tip": Key("m", size=3),
+    "mass": Key("kg", POSITIVE),
+    "center": Key("m", size=3),
+    "inertia": Key("kg m^2", BODY_INERTIA, 3),
+    "radius": Key("m", NOT_NEGATIVE),
+    "stiffness": Key("N m/rad", NOT_NEGATIVE),
+    "rest": Key("rad"),
+    "damping": Key("N m s", NOT_NEGATIVE),
+    "stops": Key("rad", size=2),
+    "stop_stiffness": Key("N m/rad", POSITIVE),
+    "stop_width": Key("rad", POSITIVE),
+    "rotor": Key("kg m^2", NOT_NEGATIVE),
+}
+JOINT_WORDS = {"name": one_word(), "axis": one_word(*"xyz"), "drive": one_word(*DRIVES)}
 # of the table `body`; a torso's shape -> its three lengths, and its density
 BODY = {"scale": Key("1", within(1e-3, 1e3)), "mass": Key("kg", within(1e-9, 1e9))}
 DENSITY = {"density": Key("kg/m^3", within(1e-3, 1e5))}

@@ -15,7 +15,7 @@ TORSO_NQ, TORSO_NV = 7, 6  # numbers of the torso in q and in v
 TORSO_Q = slice(0, TORSO_NQ)  # in q
 TORSO_V = slice(0, TORSO_NV)  # in v and in generalised forces
 TAIL_Q, TAIL_V = slice(TORSO_NQ, None), slice(TORSO_NV, None)  # tail coordinates, and their rates
-PER_SEGMENT = 2  # coordinates of a segment
+PER_SEGMENT = 2  # coordinates of a segment; of one that is a hinge there is one
 # in q, of all segments: alpha, a or phi; and beta, b or theta
 FIRST_Q, SECOND_Q = slice(TORSO_NQ, None, PER_SEGMENT), slice(TORSO_NQ + 1, None, PER_SEGMENT)
 
@@ -23,16 +23,18 @@ FIRST_Q, SECOND_Q = slice(TORSO_NQ, None, PER_SEGMENT), slice(TORSO_NQ + 1, None
 class Sizes:
     """The sizes of a model of m segments: q (nq,), v (nv,), tau (nt,).
 
-    fixed: the base never moves, so that q and v are those of the tail alone.
+    fixed: the base never moves, so that q and v are those of the tail alone. hinges: how many
+    segments have one coordinate.
     """
 
     segments: int
     fixed: bool
+    hinges: int
 
     @property
     def nt(self) -> int:
-        """Number of tail coordinates and of torques, 2m for m segments."""
-        return PER_SEGMENT * self.segments
+        """Number of tail coordinates and of torques: two for a segment, one for a hinge."""
+        return PER_SEGMENT * self.segments - self.hinges
 
     @property
     def nq(self) -> int:

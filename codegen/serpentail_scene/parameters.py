@@ -19,7 +19,7 @@ class Parameter:
     ``needs`` is a group of contact points, "contacts" for any of them, or a part of the passive
     tail; empty: every scene has the parameter.  ``tail`` says which tails have it: "equal", tails
     of equal pieces; "link" or "arc", tails whose pieces have their own values, ``size`` numbers
-    each; "tilted", tails on turned axes; "free", tails of a torso that moves; "weight", all but
+    each; "geared", limbs with rotors; "tilted", tails on turned axes; "free", tails of a torso that moves; "weight", all but
     weightless ones; empty: all.
     """
 
@@ -35,7 +35,7 @@ class Parameter:
     @property
     def of_pieces(self) -> bool:
         """Tell if each link or arc has its own values."""
-        return self.tail in ("link", "arc")
+        return self.tail in ("link", "arc", "geared")
 
     @property
     def of_chain(self) -> bool:
@@ -103,6 +103,16 @@ PARAMETERS = (
         ("link_inertias", 3, None, "kg m^2", NOT_NEGATIVE,
          "principal moments of inertia of each link about its COM, y along the link"),
         tail="link",
+    ),
+    *_rows(
+        ("link_tips", 3, None, "m", FINITE, "place of the next joint, from each joint"),
+        ("link_offsets", 3, None, "m", FINITE, "place of each link's COM, from its joint"),
+        tail="link",
+    ),
+    *_rows(
+        ("rotors", 1, None, "kg m^2", NOT_NEGATIVE,
+         "inertia of each hinge's rotor, times the square of the gear ratio"),
+        tail="geared",
     ),
     *_rows(
         ("arc_masses", 1, None, "kg", POSITIVE, "mass of each segment"),

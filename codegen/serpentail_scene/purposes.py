@@ -3,6 +3,7 @@
 from collections.abc import Collection, Mapping
 from typing import Any
 
+from .drives import drives_of
 from .parameters import parts_of
 from .signatures.table import AIRBORNE, ALL, DERIVATIVES, EXACT_DERIVATIVES, FIXED, NEEDS, OF_TREES
 
@@ -73,6 +74,9 @@ def possible(tables: Mapping[str, Any], names: Collection[str], polar: bool = Tr
         without |= {*ALL} - {*FIXED}
     if tables.get("chain"):
         without |= {*ALL} - {*OF_TREES}
+        tables_of_chains = _keys(tables["chain"]).values()
+        passive = any("passive" in drives_of(_keys(each)) for each in tables_of_chains)
+        without |= {"pfl"} if passive else set()
     return [name for name in ALL if name in names and name not in without]
 
 

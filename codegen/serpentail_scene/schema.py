@@ -3,7 +3,22 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .keys import BODY, CHAIN, KEYS, ONLY, SEGMENT, TAPER, TORSOS, Key, foreign_to, one_word
+from .drives import DRIVE
+from .keys import (
+    BODY,
+    CHAIN,
+    JOINT,
+    JOINT_WORDS,
+    KEYS,
+    KINDS,
+    ONLY,
+    SEGMENT,
+    TAPER,
+    TORSOS,
+    Key,
+    foreign_to,
+    one_word,
+)
 from .parameters import PARAMETERS, PASSIVE, Parameter, key_in_chain
 from .purposes import ADDED
 from .rules import COUNT, FLAG
@@ -22,7 +37,7 @@ def scene_schema(verbs: Mapping[str, Key]) -> Schema:
     sorts = [list(ALL), [f"{ADDED}{name}" for name in ALL]]
     arrays = [listed | {"items": {"enum": names}} for names in sorts]
     keys["functions"] = {"anyOf": [{"const": "all"}, *arrays]}
-    keys["coordinates"] = {"enum": [name for only in ONLY.values() for name in only.coordinates]}
+    keys["coordinates"] = {"enum": [name for kind in KINDS for name in ONLY[kind].coordinates]}
     keys["parameters"] = _table({p.name: _parameter(p) for p in (*PARAMETERS, *PASSIVE)})
     of_segment: Schema = {"kind": {"enum": ["articulated", "continuum"]}, "links": COUNT.schema}
     of_segment |= {name: key_schema(key) for name, key in SEGMENT.items()}
@@ -37,13 +52,16 @@ def scene_schema(verbs: Mapping[str, Key]) -> Schema:
     of_chain: Schema = {name: keys[name] for name in CHAIN if name in keys}
     of_chain |= {"on": {"const": "torso"}, "pair": dict(FLAG.schema)}
     of_chain |= {key_in_chain(p.name): _parameter(p) for p in (*PARAMETERS, *PASSIVE) if p.of_chain}
-    needed = ["kind", "segments", "mount"]
+    of_chain["kind"] = {"enum": [*KINDS, "limb"]}
+    joint = Key(keys=JOINT | JOINT_WORDS | {"name": Key(form=KEYS["name"].rule.schema)})
+    of_chain |= {"joints": key_schema(Key(each=joint)), "drive": DRIVE.schema}
+    needed = ["kind", "mount"]
     keys["chain"] = {"type": "object", "additionalProperties": _table(of_chain, needed)}
     for name, key in KEYS.items():
         keys[name] |= {"description": key.rule.text} if key.rule.text else {}
     for name, verb in verbs.items():
         keys[name] |= key_schema(verb)
-    of_kinds = [rule for kind in ONLY for rule in _of_kind(kind)]
+    of_kinds = [rule for kind in KINDS for rule in _of_kind(kind)]
     head = {"$schema": DRAFT, "title": "A scene of serpentail"}
     return head | _table(keys, ["kind", "segments"]) | {"allOf": of_kinds}
 

@@ -15,7 +15,7 @@ from ..ir.builder import Builder, narrowed
 from ..ir.program import Array, Index, Program, Ref
 from ..ir.step import Step, specialised
 from ..ir.tape import Number
-from ..mechanics.lower import declared_shapes, derive
+from ..mechanics.lower import declared_shapes, derive, derived
 from ..scene.variant import Stretch
 from .layout import block
 from .scope import Instead, Scope, State, Vectors
@@ -93,7 +93,7 @@ class Draft(Builder):
         Parameters are found by their names, all other inputs are passed. From a scope the step
         takes the vectors that it declares; from a plain dictionary it must read all.
         """
-        step = function if isinstance(function, Step) else derive(function)
+        step = derived(function)
         if step.name in SIGNATURES:  # the CasADi module defines both, and would keep only one
             raise ValueError(
                 f"{step.name} in {self.name}: a step has the name of an emitted function: rename it"
@@ -118,6 +118,12 @@ class Draft(Builder):
                     f"{ref.array.name}"
                 )
         self.apply(step, refs, **writes)
+
+    def of_segment(self, function: Callable[..., dict]) -> Step:
+        """Return a step that reads what belongs to all coordinates of a segment, for the chain that
+        the draft stands on.
+        """
+        return derive(function, **{"one_coordinate": True} if self.tail.width == 1 else {})
 
     def _refs(self, step: str, declared: set[str], reads: Iterable[Reads]) -> dict[str, Ref]:
         """Return what a step reads by name; refuse unknown names, repeated ones and parameters."""

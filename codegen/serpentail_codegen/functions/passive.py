@@ -12,7 +12,6 @@ from ..ir.program import Array, Index, Ref
 from ..mechanics import passive
 from ..mechanics.lower import declared_shapes
 from .draft import Draft
-from .layout import coordinates
 from .scope import Instead, State, Vectors
 from .sweeps.chains import each_chain
 from .tails.mechanism import StepFunction
@@ -37,7 +36,7 @@ def each_passive_force(draft: Draft, state: State) -> Iterator[tuple[Index, Ref]
     """Open a loop over the segments of a chain; yields the segment and the forces of its passive
     parts.
     """
-    force = draft.vector("passive", 2)
+    force = draft.vector("passive", draft.tail.width)
     with draft.loop("i", draft.tail.segments) as i:
         draft.fill(force, 0)
         _add_forces(draft, state, i, force)
@@ -48,8 +47,8 @@ def _add_forces(draft: Draft, state: State, i: Index, force: Ref) -> None:
     reads = Vectors({"angles": state.angles(i), "rates": state.rates(i)})
     for name in draft.tail.passive:
         step = FORCES[name]
-        own = passive_parameters(draft, step, partial(coordinates, i=i))
-        draft.step(step, reads, own, passive_=force)
+        own = passive_parameters(draft, step, partial(draft.tail.of_chain, i=i))
+        draft.step(draft.of_segment(step), reads, own, passive_=force)
 
 
 def add_passive_forces(draft: Draft, state: State, force: Callable[[Index], Ref]) -> None:
@@ -67,7 +66,7 @@ def add_passive_power(draft: Draft, state: State, multiplier: Array, power: Ref)
             with each_passive_force(draft, state.on(chain)) as (i, passive_force):
                 rates = {"virtual_rates": chain.segment_v(multiplier, i)}
                 reads = {"passive": passive_force} | rates
-                draft.step(passive.virtual_power, reads, power_=power)
+                draft.step(draft.of_segment(passive.virtual_power), reads, power_=power)
 
 
 def net_torques(draft: Draft, state: State, tau: Array) -> Array:
@@ -78,7 +77,7 @@ def net_torques(draft: Draft, state: State, tau: Array) -> Array:
     for chain in each_chain(draft):
         with each_passive_force(draft, state.on(chain)) as (i, passive_force):
             reads = {"tau": chain.segment_tau(tau, i), "passive": passive_force}
-            draft.step(passive.net_torque, reads, net=chain.segment_tau(net, i))
+            draft.step(draft.of_segment(passive.net_torque), reads, net=chain.segment_tau(net, i))
     return net
 
 
@@ -88,5 +87,10 @@ def add_elastic_energy(draft: Draft, state: State, potential: Ref) -> None:
         own_state = state.on(chain)
         for step in (ENERGIES[name] for name in chain.passive if name in ENERGIES):
             with draft.loop("i", chain.segments) as i:
-                own = passive_parameters(draft, step, partial(coordinates, i=i))
-                draft.step(step, {"angles": own_state.angles(i)}, own, potential_=potential)
+                own = passive_parameters(draft, step, partial(chain.of_chain, i=i))
+                draft.step(
+                    draft.of_segment(step),
+                    {"angles": own_state.angles(i)},
+                    own,
+                    potential_=potential,
+                )

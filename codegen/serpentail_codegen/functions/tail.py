@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from math import pi
 
+from serpentail_scene.keys import LIMBS
 from serpentail_scene.layout import PER_SEGMENT, Sizes
 from serpentail_scene.parameters import Parameter
 
@@ -35,12 +36,13 @@ class Tail(Sizes):
     # a tree has chains, the tail first; its segments and its shape are those of all
     branches: tuple["Tail", ...] = ()
     # of a chain besides the tail: its name, how the names of its parameters begin, whether it is
-    # the mirror image of what they describe, and how many segments and points the chains before
-    # it have
+    # the mirror image of what they describe, and how many segments, coordinates and points the
+    # chains before it have
     name: str = ""
     owner: str = ""
     mirrored: bool = False
     segments_before: int = 0
+    coordinates_before: int = 0
     points_before: int = 0
 
     @property
@@ -68,6 +70,18 @@ class Tail(Sizes):
         return self.shape.fixed
 
     @property
+    def width(self) -> int:
+        """Coordinates of each segment of a chain."""
+        return 1 if self.kind in LIMBS else PER_SEGMENT
+
+    @property
+    def hinges(self) -> int:  # type: ignore[override]
+        """Number of segments with one coordinate."""
+        if self.branches:
+            return sum(chain.hinges for chain in self.branches)
+        return self.segments * (PER_SEGMENT - self.width)
+
+    @property
     def free(self) -> int:
         """1 if the torso moves, 0 on a fixed base: a factor of shapes."""
         return 0 if self.fixed else 1
@@ -92,15 +106,25 @@ class Tail(Sizes):
 
     def segment_q(self, q: Array, i: Index | int) -> Ref:
         """Return the coordinates of segment i."""
-        return q.part(self.torso_nq + PER_SEGMENT * (self.segments_before + i), PER_SEGMENT)
+        return q.part(self.torso_nq + self.coordinate(i), self.width)
 
     def segment_v(self, v: Array, i: Index | int) -> Ref:
         """Return the rates, accelerations or forces of segment i."""
-        return v.part(self.torso_nv + PER_SEGMENT * (self.segments_before + i), PER_SEGMENT)
+        return v.part(self.torso_nv + self.coordinate(i), self.width)
 
     def segment_tau(self, tau: Array, i: Index | int) -> Ref:
         """Return the torques of segment i."""
-        return tau.part(PER_SEGMENT * (self.segments_before + i), PER_SEGMENT)
+        return tau.part(self.coordinate(i), self.width)
+
+    def of_chain(self, array: Array, i: Index | int) -> Ref:
+        """Return the part of segment i of an array with a number for each coordinate of the
+        chain.
+        """
+        return array.part(self.width * i, self.width)
+
+    def coordinate(self, i: Index | int) -> Index | int:
+        """Return the number of the first coordinate of segment i."""
+        return self.width * i + self.coordinates_before
 
     def coordinate_v(self, v: Array, k: Index | int) -> Ref:
         """Return the rate, acceleration or force of tail coordinate k."""

@@ -59,9 +59,9 @@ def chain_load(let, side: V1, F_beyond: V6) -> dict:
 
 def mirrored_columns(let, side: V1, columns: V12) -> dict:
     """Momentum columns of a segment of a mirrored chain in torso axes."""
-    parts = [columns[k : k + 3, :] for k in range(0, 12, 3)]
-    turned = [polar(side, parts[0]), axial(side, parts[1]), polar(side, parts[2])]
-    return {"columns": Matrix.vstack(*turned, axial(side, parts[3]))}
+    parts = [columns[k : k + 3, :] for k in range(0, len(columns), 3)]
+    turned = [(polar, axial)[k % 2](side, part) for k, part in enumerate(parts)]
+    return {"columns": Matrix.vstack(*turned)}
 
 
 def mirrored_motion(let, side: V1, w: V3, w_dot: V3, a: V3) -> dict:

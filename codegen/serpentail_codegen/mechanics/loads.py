@@ -26,8 +26,9 @@ def load_at_point(let, R: M33, P: V3, f_point: V3, F_beyond: V6) -> dict:
 def joint_load(let, S: V12, F_beyond: V6) -> dict:
     """Generalised force of the tail loads on one joint: J^T f by its spatial columns (Eq. 10)."""
     force, moment = F_beyond[0:3, :], F_beyond[3:6, :]
-    pitch = S[0:3, :].dot(moment) + S[3:6, :].dot(force)
-    return {"torque": Matrix([pitch, S[6:9, :].dot(moment) + S[9:12, :].dot(force)])}
+    starts = range(0, len(S), 6)
+    each = [S[k : k + 3, :].dot(moment) + S[k + 3 : k + 6, :].dot(force) for k in starts]
+    return {"torque": Matrix(each)}
 
 
 def point_jacobian_base(let, R: M33, arm: V3) -> dict:

@@ -154,14 +154,24 @@ def _shapes_of(function: Callable, argument: inspect.Parameter) -> dict[str, tup
     return dict.fromkeys(names, shape)
 
 
+def derived(function: "Callable | Step") -> Step:
+    """Return a step, or the one derived from a function."""
+    return function if isinstance(function, Step) else derive(function)
+
+
 @cache
-def derive(function: Callable, **settings: Any) -> Step:
-    """Derive a step: call ``function(let, *vectors)`` with SymPy vectors of the declared shapes."""
+def derive(function: Callable, one_coordinate: bool = False, **settings: Any) -> Step:
+    """Derive a step: call ``function(let, *vectors)`` with SymPy vectors of the declared shapes.
+
+    one_coordinate: for segments that have one instead of two, vectors of 2 numbers, or of 6 for
+    each, have half of these.
+    """
     # symbols of the declared shapes stand for the vectors
     recorder, first, values, inputs = Recorder(), 0, [], []
     for argument in _arguments(function):
         vectors = {}
         for name, (rows, columns) in _shapes_of(function, argument).items():
+            rows = rows // 2 if one_coordinate and rows in (2, 12) else rows
             size = rows * columns
             vectors[name] = recorder.vector(name, first, size).reshape(rows, columns)
             inputs.append((name, size))
@@ -182,4 +192,5 @@ def derive(function: Callable, **settings: Any) -> Step:
     name = function.__name__ + "".join(
         f"_{key}_{value}" for key, value in settings.items() if value
     )
+    name += "_of_hinge" if one_coordinate else ""
     return compacted(Step(name, doc, tuple(inputs), sizes, tuple(recorder.tape.nodes), results))

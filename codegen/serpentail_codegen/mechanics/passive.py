@@ -45,7 +45,7 @@ class StopsOfCoordinate:
 def stop_force(let, stops: Stops, angles: V2) -> dict:
     """Force of the stops: negative below the lower one, positive above the upper one."""
     forces = []
-    for k in range(2):
+    for k in range(len(angles)):
         stiffness, width = stops.tail_stop_stiffness[k], stops.tail_stop_width[k]
         under, over = ways_into(let, stops, k, angles[k])
         pushes = [s**3 - s**4 / 2 + beyond for s, beyond in (under, over)]
@@ -75,7 +75,7 @@ def spring_energy(let, tail_stiffness: V2, tail_rest: V2, angles: V2) -> dict:
 def stop_energy(let, stops: Stops, angles: V2) -> dict:
     """The integral of the stops' forces over the depth."""
     total = 0
-    for k in range(2):
+    for k in range(len(angles)):
         ways = ways_into(let, stops, k, angles[k])
         parts = sum(s**4 / 4 - s**5 / 10 + beyond * (beyond + 1) / 2 for s, beyond in ways)
         total += stops.tail_stop_stiffness[k] * stops.tail_stop_width[k] ** 2 * let("part", parts)

@@ -36,13 +36,16 @@ def segment_coupling(let, S: V12, columns: V12) -> dict:
     """Block of H between a segment and one beyond it: spatial columns at B times momentum columns
     at B (Eq. 16).
     """
-    block = [
-        S[a : a + 3, :].dot(columns[b + 3 : b + 6, :])
-        + S[a + 3 : a + 6, :].dot(columns[b : b + 3, :])
-        for b in (0, 6)
-        for a in (0, 6)
+    starts = range(0, len(columns), 6)  # of the columns of two coordinates, or of one
+    rows = [
+        [
+            S[a : a + 3, :].dot(columns[b + 3 : b + 6, :])
+            + S[a + 3 : a + 6, :].dot(columns[b : b + 3, :])
+            for a in starts
+        ]
+        for b in starts
     ]
-    return {"H_pitch": Matrix(block[0:2]), "H_yaw": Matrix(block[2:4])}
+    return {name: Matrix(row) for name, row in zip(("H_pitch", "H_yaw"), rows, strict=False)}
 
 
 def torso_composite(

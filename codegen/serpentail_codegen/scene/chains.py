@@ -4,11 +4,13 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from serpentail_scene.keys import CHAIN, NAME
+from serpentail_scene.drives import DRIVE, DRIVES, drives_of
+from serpentail_scene.keys import CHAIN, NAME, OF_LIMB
 from serpentail_scene.parameters import NAMES, PARAMETERS, PASSIVE, key_in_chain, name_in
 from serpentail_scene.signatures.table import ALL, OF_TREES
 
 from .checks import MOST_SEGMENTS, MOST_STRAIGHT, segments_in
+from .limbs import limb
 from .problems import Problem, SceneError, suggest
 from .scene import Chain, Parameters, Scene
 
@@ -84,7 +86,7 @@ def _in_table(place: str, problem: Problem) -> Problem:
 
 def _key_problems(place: str, table: Mapping[str, Any]) -> list[Problem]:
     """Return a problem for each key that no chain has, and for a wrong place or pair."""
-    known = (*CHAIN, *OF_CHAINS)
+    known = OF_LIMB if table.get("kind") == "limb" else (*CHAIN, *OF_CHAINS)
     problems = [
         Problem(f"{place}.{key}", value, f"unknown; {suggest(key, known)}")
         for key, value in table.items()
@@ -93,6 +95,8 @@ def _key_problems(place: str, table: Mapping[str, Any]) -> list[Problem]:
     if table.get("on", "torso") != "torso":
         remedy = 'needs "torso": chains on the tips of others do not exist yet'
         problems.append(Problem(f"{place}.on", table["on"], remedy))
+    if not DRIVE.holds(table.get("drive", DRIVES[0])):
+        problems.append(Problem(f"{place}.drive", table["drive"], f"needs {DRIVE.text}"))
     if not isinstance(table.get("pair", False), bool):
         problems.append(Problem(f"{place}.pair", table["pair"], "needs true or false"))
     return problems
@@ -100,7 +104,10 @@ def _key_problems(place: str, table: Mapping[str, Any]) -> list[Problem]:
 
 def _chain(name: str, table: Mapping[str, Any], own: Mapping[str, Any], parse: Parse) -> Chain:
     """Return a chain, read as a tail without torso; what a chain must say has no default."""
-    keys = {key: table[key] for key in CHAIN if key in table and key not in ("on", "pair")}
+    if table.get("kind") == "limb":
+        named = {OF_CHAINS[n.removeprefix(f"{name}_")].name: value for n, value in own.items()}
+        return Chain(name, table.get("pair") is True, limb(name, table, named))
+    keys = {key: table[key] for key in CHAIN if key in table and key not in ("on", "pair", "drive")}
     values = {p.name: table[key] for key, p in OF_CHAINS.items() if key in table}
     values |= {OF_CHAINS[n.removeprefix(f"{name}_")].name: value for n, value in own.items()}
     inner = {**keys, "functions": ["mass_matrix"], "parameters": values}
@@ -145,6 +152,14 @@ def tree_problems(values: Mapping[str, Any], chains: Collection[Chain]) -> list[
     others = [name for name in listed if name in ALL and name not in OF_TREES]
     remedy = f"{this}leave it out; there are {', '.join(OF_TREES)}"
     problems += [Problem("functions", name, remedy) for name in others]
+    passive = [
+        n
+        for n, t in values["chain"].items()
+        if isinstance(t, Mapping) and "passive" in drives_of(t)
+    ]
+    if passive and "pfl" in listed:
+        remedy = f"needs a torque for each coordinate, and chain.{passive[0]} has passive ones"
+        problems.append(Problem("functions", "pfl", f"{remedy}: leave it out"))
     segments = values["segments"]
     total = len(segments) if isinstance(segments, list | tuple) else segments_in(values)
     total += sum(chain.scene.segments * len(chain.names) for chain in chains)

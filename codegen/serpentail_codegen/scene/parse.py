@@ -8,7 +8,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from serpentail_scene.keys import CONTACTS, GROUPS, KEYS, ONLY, TARGETS, Only, foreign_to
+from serpentail_scene.keys import CONTACTS, GROUPS, KEYS, KINDS, ONLY, TARGETS, Only, foreign_to
 from serpentail_scene.parameters import PARAMETERS, name_in
 from serpentail_scene.purposes import functions_of
 from serpentail_scene.signatures.table import ALL
@@ -112,7 +112,7 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
 def _kind(table: Mapping[str, Any]) -> str:
     """Return the kind of tail; a table with a wrong kind is checked as an articulated tail."""
     kind = table.get("kind")
-    return kind if isinstance(kind, str) and kind in ONLY else "articulated"
+    return kind if isinstance(kind, str) and kind in KINDS else "articulated"
 
 
 def _with_defaults(table: Mapping[str, Any], name: str, rules: Only) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
-from serpentail_scene.keys import foreign_to
+from serpentail_scene.keys import LIMBS, foreign_to
 from serpentail_scene.parameters import (
     NAMES,
     PARAMETERS,
@@ -55,7 +55,7 @@ def parameters_of(
     parameters = tuple(replace(p, size=p.size * count) for p, count in counted if count)
     if kind == "mixed":
         parameters = tuple(replace(p, meaning=MEANINGS.get(p.name, p.meaning)) for p in parameters)
-    return parameters + passive_parameters(passive, segments)
+    return parameters + passive_parameters(passive, segments * (1 if kind in LIMBS else 2))
 
 
 def each_parameter(model: Any) -> Iterator[tuple[Any, Parameter]]:
@@ -99,7 +99,7 @@ def resolve_parameters(
             numbers[p.name] = for_all(p, numbers[p.name])
         if not fits(p, numbers[p.name]):
             problems.append(number_problem(p, named[p.name]))
-    problems += [] if problems else piece_problems(numbers, shape)
+    problems += [] if problems else piece_problems(numbers, shape, foreign_to(kind)[1])
     if not problems and "stops" in passive:
         problems += stop_problems(numbers)
     if problems:
@@ -108,7 +108,8 @@ def resolve_parameters(
     # defaults for what is not named; the link's inertia follows from its radius, or replaces it
     unused = "link_radius" if "link_inertia" in named else "link_inertia"
     values = {p.name: p.default for p in parameters if p.name != unused}
-    values |= numbers if not shape.links else with_link_defaults(numbers, shape.links)
+    own = shape.links and kind not in LIMBS
+    values |= with_link_defaults(numbers, shape.links) if own else numbers
     floats = {name: _floats(value) for name, value in values.items()}
     if "link_radius" in floats:
         floats["link_inertia"] = _ellipsoid_inertia(floats, tail_links)
@@ -135,13 +136,15 @@ def of_pieces(parameter: Parameter, value: Any) -> Any:
     return numbers[0] if parameter.size == len(numbers) == 1 else numbers
 
 
-def piece_problems(numbers: Mapping[str, Any], shape: Shape) -> list[Problem]:
+def piece_problems(
+    numbers: Mapping[str, Any], shape: Shape, foreign: Collection[str] = ()
+) -> list[Problem]:
     """Return a problem for each missing value of single links or arcs, and for each parameter that
-    this tail or base does not have.
+    this tail or base does not have; ``foreign``: those of other kinds.
     """
     problems = []
     for p in PARAMETERS:
-        required = p.default is None and p.tail and p.name not in OPTIONAL
+        required = p.default is None and p.tail and p.name not in (*OPTIONAL, *foreign)
         if p.tail in HAS_NOT and not shape.numbers_of(p.tail) and p.name in numbers:
             remedy = f"{HAS_NOT[p.tail]}; remove it"
             problems.append(Problem(f"parameters.{p.name}", plain(numbers[p.name]), remedy))
@@ -171,9 +174,8 @@ def _floats(value: Any) -> Value:
 # ---- the passive tail ---------------------------------------------------------------------------
 
 
-def passive_parameters(passive: Collection[str], segments: int) -> tuple[Parameter, ...]:
+def passive_parameters(passive: Collection[str], size: int) -> tuple[Parameter, ...]:
     """Return the parameters of a tail's passive parts, with one number for each coordinate."""
-    size = 2 * segments
     return tuple(
         replace(p, size=size, default=(p.default,) * size if isinstance(p.default, float) else None)
         for p in PASSIVE

@@ -11,7 +11,7 @@ from serpentail_scene.layout import OMEGA, PER_SEGMENT, QUATERNION, VELOCITY
 from ...ir.program import Array, Index, Loop, Ref
 from ...mechanics import rotations
 from ..draft import Draft
-from ..layout import block, coordinate
+from ..layout import block
 from ..tail import Tail
 
 # directions of the torso: their position in the tangent of q or v, and whether it is q
@@ -38,12 +38,24 @@ class Directions:
     @property
     def each(self) -> int:
         """Lanes of one segment."""
-        return (self.coordinates + self.rates) * PER_SEGMENT
+        return (self.coordinates + self.rates) * self.width
+
+    @property
+    def width(self) -> int:
+        """Coordinates whose lanes are neighbours: those of a segment, or one if some segments have
+        one.
+        """
+        return 1 if self.tail.hinges else PER_SEGMENT
+
+    @property
+    def segments(self) -> int:
+        """Number of groups of so many coordinates."""
+        return self.tail.nt // self.width
 
     @property
     def count(self) -> int:
         """All lanes."""
-        return self.base + self.each * self.tail.segments
+        return self.base + self.each * self.segments
 
     def outward(self, loops: tuple[Loop, ...]) -> Index | None:
         """Return how many lanes a sweep outward needs: segment i depends only on the segments up to
@@ -63,7 +75,7 @@ class Directions:
 
     def of_v(self, i: Index) -> Index:
         """First lane of the rates of segment i."""
-        return self.each * i + (self.base + PER_SEGMENT * self.coordinates)
+        return self.each * i + (self.base + self.width * self.coordinates)
 
     @property
     def label(self) -> str:
@@ -91,11 +103,14 @@ class Directions:
                 draft.step(
                     rotations.turned_quaternion, turn, rate=block(tangents["d_q"], QUATERNION)
                 )
-        with draft.loop("i", self.tail.segments) as i:
+        with draft.loop("i", self.segments) as i:
+            own, tail = self.width * i, self.tail
             if self.coordinates:
-                draft.unit(draft.tail.segment_q(tangents["d_q"], i), self.of_q(i))
+                where = tangents["d_q"].part(own + tail.torso_nq, self.width)
+                draft.unit(where, self.of_q(i))
             if self.rates:
-                draft.unit(draft.tail.segment_v(tangents["d_v"], i), self.of_v(i))
+                where = tangents["d_v"].part(own + tail.torso_nv, self.width)
+                draft.unit(where, self.of_v(i))
         return tangents
 
     def turn(self, draft: Draft) -> Ref:
@@ -114,8 +129,8 @@ class Directions:
                 where, is_q = TORSO[name]
                 target = of_q if is_q or not of_v else of_v
                 draft.copy(target.part(nv * r + where.start, 3), source.lane(r, 3 * lane, 3))
-            with draft.loop("i", self.tail.segments) as i:
-                column = nv * r + coordinate(i) + self.tail.torso_nv
-                draft.copy(of_q.part(column, 2), source.lane(r, self.of_q(i), PER_SEGMENT))
+            with draft.loop("i", self.segments) as i:
+                column, n = nv * r + self.width * i + self.tail.torso_nv, self.width
+                draft.copy(of_q.part(column, n), source.lane(r, self.of_q(i), n))
                 if of_v:
-                    draft.copy(of_v.part(column, 2), source.lane(r, self.of_v(i), PER_SEGMENT))
+                    draft.copy(of_v.part(column, n), source.lane(r, self.of_v(i), n))

@@ -47,7 +47,7 @@ def assemble_factor(draft: Draft, arrays: dict[str, Array]) -> None:
     add_gains(draft, f, weight | {"gains": arrays["gains"][0]})
     for chain in each_chain(draft):
         with draft.loop("k", chain.nt) as own:
-            k = coordinate(chain.segments_before) + own
+            k = own + chain.coordinates_before
             damping = {"damping": arrays["damping"].part(k, 1)}
             draft.step(stiffness.damped, weight, damping, damped=f("damped", k))
             add_passive_stiffness(draft, f, state, (k, own))

@@ -10,7 +10,6 @@ from typing import TypeVar
 from ...ir.program import Ref
 from ...ir.step import Step, specialised
 from ...mechanics import branch
-from ...mechanics.lower import derive
 from ..draft import Draft
 from ..scope import Motion, State, Vectors
 from ..tail import Tail
@@ -42,7 +41,7 @@ def prepared(draft: Draft, state: State, doubled: bool = False) -> list[Segments
 
 def sided(draft: Draft, function: Callable[..., dict]) -> Step:
     """Return a step of `mechanics.branch` for the side of the chain that the draft stands on."""
-    step, side = derive(function), -1 if draft.tail.mirrored else 1
+    step, side = draft.of_segment(function), -1 if draft.tail.mirrored else 1
     name = step.name if side > 0 else f"mirrored_{step.name.removeprefix('mirrored_')}"
     return specialised(step, name, side=(side,))
 

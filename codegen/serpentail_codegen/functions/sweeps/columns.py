@@ -127,7 +127,7 @@ def _own_blocks(
     """Store the rows in ``A``; blocks of one segment are completed."""
     with draft.loop("i", draft.tail.segments) as i:
         pitch, yaw = coordinate(i), coordinate(i, 1)
-        reads = {"own": own_joints[i], "columns": columns_of(columns, i)}
+        reads = {"own": own_joints[i], "columns": columns_of(draft.tail, columns, i)}
         reads |= {"H_pp": rows.lane(pitch, pitch), "H_py": rows.lane(pitch, yaw)}
         reads |= {"H_yp": rows.lane(yaw, pitch), "H_yy": rows.lane(yaw, yaw)}
         writes = {

@@ -5,10 +5,10 @@ consists of.
 from collections.abc import Callable
 
 from ...ir.program import Array, Index, Ref, as_index
-from ...mechanics import branch, mount, torso
+from ...mechanics import branch, hinge, mount, torso
 from ..draft import Draft
-from ..layout import coordinate
 from ..scope import Pose, State, Vectors
+from ..tail import Tail
 from ..tails.mechanism import Segments
 from .chains import add, each_chain, on_each, prepared, sided
 from .pieces import across, each_segment, mechanism, pieces_of, torso_pose
@@ -26,20 +26,23 @@ def gather_inertia(
     """Composite inertia of a chain in ``mass, h, I`` at its mount, torso axes; each segment's
     momentum columns at B and its own block of H.
     """
-    composite = draft.vectors(mass=1, h=3, I=6)
-    momenta, first = draft.vectors(pitch=6, yaw=6), draft.tail.segments_before
+    composite, tail = draft.vectors(mass=1, h=3, I=6), draft.tail
+    names, to_torso = (("pitch", "yaw"), torso.column_at_torso)
+    if tail.width == 1:
+        names, to_torso = ("column",), hinge.hinge_at_torso
+    momenta = draft.vectors(**dict.fromkeys(names, 6))
     for ref in composite.named.values():
         draft.fill(ref, 0)
     for stretch, i in each_segment(draft, downward=True):
         # the segment's own block of H and its columns start from zero; the sums of all beyond go on
-        own = _own_block(H_tail, first + i) if H_tail else {}
+        own = _own_block(H_tail, tail, i) if H_tail else {}
         for ref in (*momenta.named.values(), *own.values()):
             draft.fill(ref, 0)
         with pieces_of(draft, stretch, i, downward=True) as g:
             step = mechanism(draft).gather
             draft.step(step, segments.at(i, g), composite, momenta, **composite, **momenta, **own)
         root = {name: array[i] for name, array in roots.items()}
-        draft.step(torso.column_at_torso, root, momenta, columns=columns_of(columns, first + i))
+        draft.step(to_torso, root, momenta, columns=columns_of(tail, columns, i))
     across(draft, mount.composite_at_mount, composite.only("h", "I").named)
     return composite
 
@@ -56,9 +59,12 @@ def with_torso(draft: Draft, composite: Vectors, total: Vectors) -> Vectors:
     return composite
 
 
-def _own_block(H_tail: Block, i: Index) -> dict[str, Ref]:
-    """Return the lower triangle of H of one segment's two coordinates, to be added to."""
-    pitch, yaw = coordinate(i), coordinate(i, 1)
+def _own_block(H_tail: Block, tail: Tail, i: Index) -> dict[str, Ref]:
+    """Return the lower triangle of H of one segment's coordinates, to be added to."""
+    pitch = tail.coordinate(i)
+    if tail.width == 1:
+        return {"H_own_": H_tail(pitch, pitch)}
+    yaw = pitch + 1
     return {
         "H_pp_": H_tail(pitch, pitch),
         "H_py_": H_tail(yaw, pitch),
@@ -133,20 +139,18 @@ def tail_inertia(
     segments = mechanism(draft).prepare(draft, state, True)
     pose = torso_pose(draft, R)
     roots = segment_roots(draft)
-    S = draft.array("S", 12, max(draft.tail.segments - 1, 1))
+    tail, step = draft.tail, draft.of_segment(torso.segment_coupling)
+    S = draft.array("S", 6 * tail.width, max(tail.segments - 1, 1))
     forward_roots(draft, segments, pose, roots, S)
     composite = with_torso(draft, gather_inertia(draft, segments, roots, columns, H_tail), total)
 
     # blocks of two segments
-    before = draft.tail.segments_before
-    with draft.loop("i", draft.tail.segments, start=1) as i, draft.loop("l", i) as other:
-        first, own = coordinate(before + other), before + i
-        blocks = {
-            "H_pitch": H_tail(coordinate(own), first, 2),
-            "H_yaw": H_tail(coordinate(own, 1), first, 2),
-        }
-        reads = {"S": S[other], "columns": columns_of(columns, own)}
-        draft.step(torso.segment_coupling, reads, **blocks)
+    with draft.loop("i", tail.segments, start=1) as i, draft.loop("l", i) as other:
+        first, own = tail.coordinate(other), tail.coordinate(i)
+        names = ("H_pitch", "H_yaw")[: tail.width]
+        blocks = {name: H_tail(own + k, first, tail.width) for k, name in enumerate(names)}
+        reads = {"S": S[other], "columns": columns_of(tail, columns, i)}
+        draft.step(step, reads, **blocks)
     turn_columns(draft, columns)
     return segments, composite
 
@@ -154,9 +158,9 @@ def tail_inertia(
 def turn_columns(draft: Draft, columns: Array) -> None:
     """Turn the momentum columns of a mirrored chain into the axes of the torso."""
     if draft.tail.mirrored:
-        step, first = sided(draft, branch.mirrored_columns), draft.tail.segments_before
+        step = sided(draft, branch.mirrored_columns)
         with draft.loop("i", draft.tail.segments) as i:
-            own = columns_of(columns, first + i)
+            own = columns_of(draft.tail, columns, i)
             draft.step(step, {"columns": own}, columns=own)
 
 
@@ -179,6 +183,6 @@ def column_of(columns: Array, k: Index) -> Ref:
     return columns.part(6 * k, 6)
 
 
-def columns_of(columns: Array, i: Index) -> Ref:
-    """Both momentum columns of segment i."""
-    return columns.part(12 * i, 12)
+def columns_of(tail: Tail, columns: Array, i: Index) -> Ref:
+    """All momentum columns of segment i of a chain."""
+    return columns.part(6 * tail.coordinate(i), 6 * tail.width)

@@ -12,7 +12,8 @@ from .pieces import each_point, mechanism, torso_pose
 def sample_joints(draft: Draft, state: State) -> tuple[Array, Array]:
     """Compute spatial columns between tail points, and all tail points, in torso axes from B."""
     tail, samples = draft.tail, mechanism(draft).prepare_samples(draft, state, None)
-    S, points = draft.array("S_joint", 12, tail.total), draft.array("tail_point", 3, tail.total + 1)
+    S = draft.array("S_joint", 6 * tail.width, tail.total)
+    points = draft.array("tail_point", 3, tail.total + 1)
     pose = torso_pose(draft, name="joint")
     draft.copy(points[0], pose.P)
     for i, g in each_point(draft):
@@ -50,6 +51,6 @@ def gather_chain_loads(draft: Draft, state: State, R: Ref, f_ext: Array, torques
     for i, g in each_point(draft, downward=True):
         add_load(g + 1)
         own = draft.tail.segment_tau(torques, i)
-        draft.step(loads.joint_load, {"S": S[g]}, beyond, torque_=own)
+        draft.step(draft.of_segment(loads.joint_load), {"S": S[g]}, beyond, torque_=own)
     add_load(Index())
     return beyond

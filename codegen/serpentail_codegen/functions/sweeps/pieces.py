@@ -8,6 +8,8 @@ updated in place.
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 
+from serpentail_scene.keys import LIMBS
+
 from ...ir.program import Index, Ref
 from ...mechanics import mount, rotations, torso
 from ...scene.variant import Stretch
@@ -15,6 +17,7 @@ from ..draft import Draft
 from ..scope import Pose, State
 from ..tails.articulated import ARTICULATED
 from ..tails.continuum import CONTINUUM
+from ..tails.limb import limb
 from ..tails.mechanism import Mechanism
 from ..tails.mixed import MIXED
 from ..tails.polar import POLAR
@@ -25,13 +28,16 @@ IDENTITY = (1, 0, 0, 0, 1, 0, 0, 0, 1)
 def mechanism(draft: Draft) -> Mechanism:
     """Return the steps of the draft's tail.
 
-    In a mixed tail these are the steps of the segments that the open loop is over; outside of such
+    In a mixed tail, and in a limb, these are the steps of the segments that the open loop is over; outside of such
     loops, those that describe all segments.
     """
     if draft.tail.polar:
         return POLAR
+    kind = draft.stretch.kind if draft.stretch else ""
     if draft.tail.kind == "mixed":
-        return MIXED[draft.stretch.kind if draft.stretch else ""]
+        return MIXED[kind]
+    if draft.tail.kind in LIMBS:
+        return limb(draft.tail.kind, draft.tail.shape.rotors > 0, kind)
     return {"articulated": ARTICULATED, "continuum": CONTINUUM}[draft.tail.kind]
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 from ...ir.program import Array, Index, Ref
 from ...ir.step import Step, specialised
-from ...mechanics.lower import derive
+from ...mechanics.lower import derived
 from ..draft import Draft
 from ..scope import Motion, State, Vectors
 
@@ -100,19 +100,19 @@ class Mechanism:
     declare_torques: Callable[[Draft], Array | None]
     move: Callable[[Draft, Segments, Place, Motion, Array | None, Vectors], None]
     momentum: Callable[[Draft, Segments, Place, Vectors, Mapping[str, Ref]], None]
-    pose: StepFunction
-    twist: StepFunction
-    gather: StepFunction
-    gather_wrench: StepFunction
-    gather_moment: StepFunction
-    power: StepFunction
+    pose: StepFunction | Step
+    twist: StepFunction | Step
+    gather: StepFunction | Step
+    gather_wrench: StepFunction | Step
+    gather_moment: StepFunction | Step
+    power: StepFunction | Step
 
 
-def simplified(function: StepFunction, state: State, forced: bool = True) -> Step:
+def simplified(function: StepFunction | Step, state: State, forced: bool = True) -> Step:
     """Return a step, specialised to an animal at rest or to a tail that does not accelerate."""
-    step = derive(function)
+    step, none = derived(function), (0,) * state.tail.width
     if state.v is None:
-        step = specialised(step, f"{step.name}_rest", rates=(0, 0), w=(0, 0, 0))
+        step = specialised(step, f"{step.name}_rest", rates=none, w=(0, 0, 0))
     if not forced:
-        step = specialised(step, f"{step.name}_unforced", accelerations=(0, 0))
+        step = specialised(step, f"{step.name}_unforced", accelerations=none)
     return step

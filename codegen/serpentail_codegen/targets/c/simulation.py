@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from itertools import accumulate
 from typing import Any
 
-from serpentail_scene.layout import PER_SEGMENT
 from serpentail_scene.parameters import name_in
 
 from ...functions.tail import Tail
@@ -53,11 +52,10 @@ def damped_chains(tail: Tail) -> list[tuple[str, int, int]]:
     """Return the damping parameter of each chain of a tree, and its coordinates from which to
     which.
     """
-    starts = [PER_SEGMENT * chain.segments_before for chain in tail.branches]
     return [
-        (name_in(chain.owner, "tail_damping"), first, first + chain.nt)
-        for chain, first in zip(tail.branches, starts, strict=True)
-        if "damping" in chain.passive
+        (name_in(c.owner, "tail_damping"), c.coordinates_before, c.coordinates_before + c.nt)
+        for c in tail.branches
+        if "damping" in c.passive
     ]
 
 

@@ -1,0 +1,106 @@
+"""A limb: hinge by hinge, each about an axis of its own, with a body or without."""
+
+from collections.abc import Mapping
+from functools import cache, partial
+
+from ...ir.program import Array, Ref
+from ...ir.step import Step
+from ...mechanics import hinge
+from ...mechanics.lower import declared_shapes, derive
+from ..draft import Draft
+from ..scope import Instead, Motion, State, Vectors
+from .mechanism import Mechanism, Place, Segments, simplified
+from .mixed import NOTHING
+
+BODIES = {"limb": hinge.along_body, "placed_limb": hinge.placed_body}
+BARE = "bare"
+
+
+def form_of(kind: str, hinge_kind: str) -> str:
+    """Return which numbers of a hinge's body are known to be 0."""
+    bare = hinge_kind.endswith(BARE)
+    return BARE if bare else {"limb": "along", "placed_limb": ""}[kind]
+
+
+def prepare_hinges(draft: Draft, state: State, doubled: bool = False) -> Segments:
+    """Bodies and rotors, and the trigonometry of every hinge."""
+    tail, bodies, fill = draft.tail, 0, BODIES[draft.tail.kind]
+    sizes = {"joint": 2, "body": 13} | ({"twice": 5} if doubled else {})
+    sizes |= {"rotor": 1} if tail.shape.rotors else {}
+    arrays = {name: draft.array(name, size, tail.segments) for name, size in sizes.items()}
+    segments = Segments(state, arrays)
+    for stretch in tail.stretches:
+        with draft.loop("i", stretch.stop, start=stretch.first) as i:
+            own, k = segments.at(i), i + (bodies - stretch.first)
+            if not stretch.kind.endswith(BARE):
+                shapes = declared_shapes(fill).items()
+                entries = {name: draft.entry(name, k, size) for name, (size, _) in shapes}
+                draft.step(fill, Instead(entries), body=own["body"])
+            draft.step(hinge.hinge_trigonometry, own, joint=own["joint"])
+            if doubled:
+                draft.step(hinge.hinge_double_angle, own, twice=own["twice"])
+            if tail.shape.rotors:
+                draft.copy(own["rotor"], draft.entry("rotors", i, 1))
+        bodies += 0 if stretch.kind.endswith(BARE) else stretch.stop - stretch.first
+    return segments
+
+
+def samples_of_hinges(draft: Draft, state: State, segments: Segments | None) -> Segments:
+    """The points are the joints and the tip, so the data of the hinges serve for them, too."""
+    return segments or prepare_hinges(draft, state)
+
+
+def rotor_torques(draft: Draft) -> Array | None:
+    """Declare the torques of all rotors, if there are any."""
+    return draft.array("torque_own", 1, draft.tail.segments) if draft.tail.shape.rotors else None
+
+
+def move_hinge(
+    step: Step,
+    draft: Draft,
+    segments: Segments,
+    place: Place,
+    motion: Motion,
+    v_dot: Array | None,
+    wrench: Vectors,
+) -> None:
+    """Carry ``w, w_dot, a`` over one hinge and store the inertial wrench of its body."""
+    simple = simplified(step, segments.state, v_dot is not None)
+    moving = segments.motion(place[0], v_dot)
+    draft.step(simple, segments.at(*place), moving, motion, **wrench, **motion)
+
+
+def hinge_momentum(
+    step: Step,
+    draft: Draft,
+    segments: Segments,
+    place: Place,
+    velocity: Vectors,
+    writes: Mapping[str, Ref],
+) -> None:
+    """Carry ``w, u`` over one hinge and give the momentum or kinetic energy of its body."""
+    moving = segments.motion(place[0])
+    draft.step(step, segments.at(*place), moving, velocity, **writes, **velocity)
+
+
+@cache
+def limb(kind: str, geared: bool, stretch: str = "") -> Mechanism:
+    """Return the steps of hinges of one kind, such as "x" or "y_bare"; outside of loops over
+    segments only the data of all hinges are there.
+    """
+    steps = dict(NOTHING)
+    if stretch:
+        setting = {"axis": stretch[0], "form": form_of(kind, stretch)}
+        gear = setting | {"geared": geared}
+        steps |= {
+            "move": partial(move_hinge, derive(hinge.hinge_motion, **gear)),
+            "momentum": partial(hinge_momentum, derive(hinge.hinge_momentum, **gear)),
+            "pose": derive(hinge.hinge_pose, **setting),
+            "twist": derive(hinge.hinge_twist, axis=stretch[0]),
+            "gather": derive(hinge.gather_hinge, **gear),
+            "gather_wrench": derive(hinge.gather_hinge_wrench, **gear),
+            "gather_moment": derive(hinge.gather_hinge_moment, **setting),
+            "power": derive(hinge.hinge_power, **gear),
+        }
+    steps |= {"prepare": prepare_hinges, "prepare_samples": samples_of_hinges}
+    return Mechanism(**steps | {"declare_torques": rotor_torques})
