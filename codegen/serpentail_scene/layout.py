@@ -4,6 +4,7 @@ A velocity, its derivative, a generalised force and a row of H have the same lay
 """
 
 from dataclasses import dataclass, field
+from itertools import accumulate, chain
 
 from .messages import did_you_mean, shown
 
@@ -53,7 +54,7 @@ class ChainLayout:
     tail points.
 
     owner: the beginning of the names of its parameters; a mirrored chain is their mirror image.
-    names: of its coordinates.
+    names: of its coordinates; driven: whether each has an actuator.
     """
 
     name: str
@@ -65,35 +66,56 @@ class ChainLayout:
     segments: slice
     points: slice
     names: tuple[str, ...]
+    driven: tuple[bool, ...]
 
 
 @dataclass(frozen=True)
 class Layout(Sizes):
     """Where numbers lie in q, v and tau; ``layout["hind_left"]`` is that of one chain.
 
-    chains: those of a model, the tail first.
+    chains: those of a model, the tail first. hinges: how many segments have one coordinate.
     """
 
     segments: int
     fixed: bool = False
     chains: tuple[ChainLayout, ...] = field(default=(), compare=False)
+    hinges: int = 0
+
+    @property
+    def widths(self) -> tuple[int, ...]:
+        """The number of coordinates of each segment."""
+        each = [(c.tau, c.segments.stop - c.segments.start) for c in self.chains]
+        runs = [((tau.stop - tau.start) // count,) * count for tau, count in each]
+        return tuple(chain.from_iterable(runs)) or (PER_SEGMENT,) * self.segments
+
+    @property
+    def firsts(self) -> list[int]:
+        """The number of the first coordinate of each segment."""
+        return list(accumulate(self.widths, initial=0))[:-1]
+
+    @property
+    def driven(self) -> tuple[bool, ...]:
+        """Whether each tail coordinate has an actuator."""
+        return tuple(chain.from_iterable(c.driven for c in self.chains)) or (True,) * self.nt
 
     def __getitem__(self, name: str) -> ChainLayout:
-        found = {chain.name: chain for chain in self.chains}
+        found = {own.name: own for own in self.chains}
         if name not in found:
             remedy = did_you_mean(name, found) or f"there are {', '.join(found)}"
             raise KeyError(f"chain: value {shown(name)}: {remedy}")
         return found[name]
 
     @classmethod
-    def of_width(cls, nq: int) -> "Layout | None":
-        """Return the layout in which q has ``nq`` numbers; None if there is none.
+    def of_width(cls, nq: int, nv: int = 0) -> "Layout | None":
+        """Return the layout in which q has ``nq`` numbers and v ``nv``; None if there is none.
 
-        With a free torso the number is odd.
+        With a free torso q is longer than v; where nv is not known, nq is odd unless the base is
+        fixed.
         """
-        fixed = nq % PER_SEGMENT == 0
-        segments = (nq if fixed else nq - TORSO_NQ) // PER_SEGMENT
-        return cls(segments, fixed) if segments >= fixed else None
+        fixed = nq % PER_SEGMENT == 0 and nv != nq - 1
+        nt = nq if fixed else nq - TORSO_NQ
+        hinges = nt % PER_SEGMENT
+        return cls((nt + hinges) // PER_SEGMENT, fixed, (), hinges) if nt >= fixed else None
 
     @property
     def tail_q(self) -> slice:

@@ -19,8 +19,8 @@ class Parameter:
     ``needs`` is a group of contact points, "contacts" for any of them, or a part of the passive
     tail; empty: every scene has the parameter.  ``tail`` says which tails have it: "equal", tails
     of equal pieces; "link" or "arc", tails whose pieces have their own values, ``size`` numbers
-    each; "geared", limbs with rotors; "tilted", tails on turned axes; "free", tails of a torso that moves; "weight", all but
-    weightless ones; empty: all.
+    each; "geared", limbs with rotors; "tilted", tails on turned axes; "free", tails of a torso that
+    moves; "weight", all but weightless ones; empty: all.
     """
 
     name: str

@@ -37,6 +37,21 @@ class Arc:
 
 
 @dataclass(frozen=True)
+class Hinge:
+    """A joint about one axis, and a body with its COM and the next joint anywhere (m), or none.
+
+    moments about the COM, axes of its frame; rotor: kg m^2, felt by the hinge's angle alone.
+    """
+
+    axis: int
+    mass: float = 0.0
+    center: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    inertia: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    tip: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    rotor: float = 0.0
+
+
+@dataclass(frozen=True)
 class Chain:
     """A chain besides the tail; a mirrored one is the image of what it says in the plane x = 0."""
 
@@ -48,7 +63,7 @@ class Chain:
 
 @dataclass(frozen=True)
 class Animal:
-    """A torso and a tail, with other chains: each segment is a list of links, or an arc."""
+    """A torso and a tail, with other chains: each segment is a list of links, an arc or a hinge."""
 
     segments: tuple
     torso_mass: float
@@ -63,8 +78,14 @@ class Animal:
         return (Chain(self.segments, self.tail_mount, self.mount_angles), *self.chains)
 
     @property
+    def _rotors(self):
+        each = [segment for chain in self._all for segment in chain.segments]
+        rotors = [[s.rotor] if isinstance(s, Hinge) else [0, 0] for s in each]
+        return np.concatenate([[0] * 6, *rotors])
+
+    @property
     def _size(self):
-        return 6 + 2 * sum(len(chain.segments) for chain in self._all)
+        return len(self._rotors)
 
     # ---- places ----------------------------------------------------------------------------
 
@@ -75,7 +96,7 @@ class Animal:
         place, R, at = q[:3], rotation(q[3:7]), 7
         found, points = [(MP.mpf(self.torso_mass), place, R, exact(self.torso_inertia))], []
         for chain in self._all:
-            stop = at + 2 * len(chain.segments)
+            stop = at + sum(2 - isinstance(segment, Hinge) for segment in chain.segments)
             flip = (1 - 2 * chain.mirrored, 1, 1) * ONE
             bodies, own = self._of_chain(chain, q[at:stop])
             for mass, com, turn, moments in bodies:  # a turn of the image is proper again
@@ -89,9 +110,17 @@ class Animal:
         """The bodies and the points of a chain in torso axes, as if it were not mirrored."""
         joint, (pitch, roll, yaw) = exact(chain.mount), exact(chain.mount_angles)
         frame = about(2, yaw).dot(about(0, pitch)).dot(about(1, roll))
-        found, points = [], [joint]
-        for i, segment in enumerate(chain.segments):
-            first, second = angles[2 * i], angles[2 * i + 1]
+        found, points, left = [], [joint], list(angles)
+        for segment in chain.segments:
+            first = left.pop(0)
+            if isinstance(segment, Hinge):
+                frame = frame.dot(about(segment.axis, first))
+                com = joint + frame.dot(exact(segment.center))
+                found.append((MP.mpf(segment.mass), com, frame, exact(segment.inertia)))
+                joint = joint + frame.dot(exact(segment.tip))
+                points.append(joint)
+                continue
+            second = left.pop(0)
             if isinstance(segment, Arc):
                 for x, weight in nodes():
                     local, _ = bent(first * x, second * x, segment.length * x)
@@ -133,12 +162,12 @@ class Animal:
         ):
             J, W = np.array(linear).T, np.array(angular).T
             H = H + mass * J.T.dot(J) + W.T.dot(R * moments).dot(R.T.dot(W))
-        return H
+        return H + np.diag(exact(self._rotors))
 
     def inverse_dynamics(self, q, v, v_dot):
         """H v_dot + C: forces and moments of all bodies through their Jacobians."""
         q, v, v_dot = exact(q), exact(v), exact(v_dot)
-        force = np.full(len(v), MP.mpf(0))
+        force = exact(self._rotors) * v_dot
         before, now, after = (
             self.bodies(moved(q, v, h, v_dot))[0] for h in (-STEP, 0 * STEP, STEP)
         )
@@ -158,7 +187,7 @@ class Animal:
     def energy(self, q, v):
         """Kinetic and potential energy."""
         q, v = exact(q), exact(v)
-        kinetic = potential = MP.mpf(0)
+        kinetic, potential = exact(self._rotors).dot(v * v) / 2, MP.mpf(0)
         for (mass, place, R, moments), (u, w) in zip(
             self.bodies(q)[0], self._rates(q, v), strict=True
         ):

@@ -3,13 +3,15 @@
 import numpy as np
 import pinocchio as pin
 
+from .body_set import Hinge
+
 MIRROR = np.diag([-1.0, 1.0, 1.0])
 
 
 class PinocchioTree:
     """A free-flyer with two hinges (x, then z) for each link; G repeats the angles of a segment.
 
-    ``animal`` is the description of `body_set`; its segments are lists of links.
+    ``animal`` is the description of `body_set`; its segments are lists of links, or hinges.
     """
 
     def __init__(self, animal):
@@ -27,6 +29,17 @@ class PinocchioTree:
             F = MIRROR if chain.mirrored else np.eye(3)
             joint, place = torso, pin.SE3(F @ turn @ F, F @ np.array(chain.mount))
             for segment in chain.segments:
+                if isinstance(segment, Hinge):
+                    axis = np.linalg.det(F) * F @ np.eye(3)[segment.axis]
+                    hinge = pin.JointModelRevoluteUnaligned(axis)
+                    joint = self.model.addJoint(joint, hinge, place, str(self.model.njoints))
+                    columns.append(count)
+                    center = F @ np.array(segment.center)
+                    body = pin.Inertia(segment.mass, center, np.diag(segment.inertia))
+                    self.model.appendBodyToJoint(joint, body, pin.SE3.Identity())
+                    place = pin.SE3(np.eye(3), F @ np.array(segment.tip))
+                    count += 1
+                    continue
                 for link in segment:
                     for k, axis in enumerate(np.eye(3)[[0, 2]]):
                         hinge = pin.JointModelRevoluteUnaligned(np.linalg.det(F) * F @ axis)

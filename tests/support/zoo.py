@@ -83,6 +83,52 @@ CHAINS = {
         "stop_stiffness": 0.05,
     },
 }
+# along -y and anywhere, all axes, without bodies, with springs, rotors and stops
+LIMBS = {
+    "leg": {
+        "pair": True,
+        "kind": "limb",
+        "mount": [0.01, 0.02, -0.003],
+        "mount_angles": [0.4, -0.2, 1.3],
+        "joints": [
+            {"name": "swing", "axis": "y", "damping": 1e-4},
+            {"name": "hip", "length": "30 mm", "mass": "2 g", "radius": "4 mm"},
+            {
+                "name": "knee",
+                "length": "20 mm",
+                "mass": "1 g",
+                "center": "0, -8, 0 mm",
+                "inertia": "50, 4, 50 g mm^2",
+                "stiffness": 0.004,
+                "rest": -0.3,
+                "stops": [-0.5, 0.4],
+                "stop_stiffness": 0.05,
+            },
+        ],
+    },
+    "arm": {
+        "kind": "limb",
+        "mount": [0.002, 0.05, 0.01],
+        "joints": [
+            {"name": "turn", "axis": "z", "rotor": 2e-7},
+            {
+                "name": "lift",
+                "tip": "5, -20, 3 mm",
+                "mass": "1.5 g",
+                "center": "2, -8, -4 mm",
+                "inertia": "60, 40, 50 g mm^2",
+                "rotor": 3e-7,
+            },
+            {
+                "name": "wheel",
+                "axis": "y",
+                "tip": [0, 0, 0],
+                "mass": "3 g",
+                "inertia": "40, 70, 40 g mm^2",
+            },
+        ],
+    },
+}
 
 
 def _links(segments: int, links: int, **keys: Any) -> dict[str, Any]:
@@ -142,6 +188,7 @@ ZOO: dict[str, dict[str, Any]] = {
     "fixed_mixed": _own("mixed", MIXED, base="fixed", parameters=MOUNTED),
     # several chains
     "tree": _own("articulated", OWN_LINKS[:2], chain=CHAINS),
+    "limbs": _own("articulated", OWN_LINKS[1:2], chain=LIMBS),
     # other numbers
     "weightless": _links(1, 3, weightless=True),
     "single": _links(2, 2, real="float"),

@@ -171,9 +171,9 @@ def derive(function: Callable, one_coordinate: bool = False, **settings: Any) ->
     for argument in _arguments(function):
         vectors = {}
         for name, (rows, columns) in _shapes_of(function, argument).items():
-            rows = rows // 2 if one_coordinate and rows in (2, 12) else rows
-            size = rows * columns
-            vectors[name] = recorder.vector(name, first, size).reshape(rows, columns)
+            size = rows * columns // (2 if one_coordinate and rows in (2, 12) else 1)
+            shape = size // columns, columns
+            vectors[name] = recorder.vector(name, first, size).reshape(*shape)
             inputs.append((name, size))
             first += size
         kind: Any = argument.annotation

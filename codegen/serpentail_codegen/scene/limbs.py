@@ -1,6 +1,6 @@
 """Reads the table of a chain that is a limb: its `joints`, each a hinge with a body or without."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from serpentail_scene.drives import DRIVE
@@ -38,6 +38,11 @@ def limb(name: str, table: Mapping[str, Any], named: Mapping[str, Any]) -> Scene
     names = [each.get("name") for each in joints if isinstance(each, Mapping)]
     for k in [k for k, each in enumerate(names) if each in names[:k]]:
         problems.append(Problem(f"joints[{k}].name", names[k], "given before: choose another"))
+    axes = [each.get("axis", "x") for each in joints if isinstance(each, Mapping)]
+    for k in [k for k in range(len(axes) - 1) if "mass" not in hinges[k]]:
+        if not problems and axes[k] == axes[k + 1]:
+            remedy = f"nothing lies between it and joints[{k + 1}]: give a mass, or another axis"
+            problems.append(Problem(f"joints[{k}].axis", axes[k], remedy))
     if "mass" not in hinges[-1] and not problems:
         remedy = "at the end of a chain: its angle would have no inertia. Give a mass"
         problems.append(Problem(f"joints[{len(joints) - 1}].mass", None, remedy))
@@ -70,34 +75,34 @@ def limb(name: str, table: Mapping[str, Any], named: Mapping[str, Any]) -> Scene
 def _hinge(place: str, table: Any, problems: list[Problem]) -> Hinge:
     """Return the numbers of one table of `joints`."""
     words = WORDS if isinstance(table, Mapping) else {}
-    for key in words.keys() & {*table}:
-        if not words[key].holds(table[key]):
-            problems.append(Problem(f"{place}.{key}", table[key], f"needs {words[key].text}"))
+    for key in [key for key in words if key in table or key == "name"]:
+        if not words[key].holds(table.get(key)):
+            problems.append(Problem(f"{place}.{key}", table.get(key), f"needs {words[key].text}"))
     numbers = {k: x for k, x in table.items() if k not in words} if words else table
-    if words and "name" not in table:
-        problems.append(Problem(f"{place}.name", None, 'needs a name, such as "knee"'))
     before = len(problems)
-    found: Hinge = dict(numbers_of(place, numbers, JOINT, 1, problems))
-    if len(problems) > before:
-        return found
+    found = dict(numbers_of(place, numbers, JOINT, 1, problems))
+    if len(problems) == before:
+        for key, remedy in _combined(found):
+            value = found.get(key, (None,))
+            shown = value[0] if len(value) == 1 else value
+            problems.append(Problem(f"{place}.{key}", shown, remedy))
+    return found
 
-    def wrong(key: str, remedy: str) -> None:
-        value = found.get(key)
-        shown = value[0] if value and len(value) == 1 else value
-        problems.append(Problem(f"{place}.{key}", shown, remedy))
 
+def _combined(found: Hinge) -> Iterator[tuple[str, str]]:
+    """Yield keys of a hinge that do not go with others, each with a remedy."""
     for key in [key for key in found if NEEDS.get(key, key) not in found]:
-        wrong(key, f"means nothing without {NEEDS[key]}: give it, too, or remove {key}")
+        yield key, f"means nothing without {NEEDS[key]}: give it, too, or remove {key}"
     for one, other in (("length", "tip"), ("inertia", "radius")):
         if "mass" in found and (one in found) == (other in found):
-            wrong(one, f"needs either {one} or {other}")
+            yield one, f"needs either {one} or {other}"
     if "radius" in found and "tip" in found:
-        wrong("radius", "is that of a body along -y: give length instead of tip, or inertia")
-    if "stops" in found and not found["stops"][0] < found["stops"][1]:
-        wrong("stops", "needs the lower angle first")
-    if "stops" in found and "stop_stiffness" not in found:
-        wrong("stop_stiffness", "stops need it: give it in N m/rad")
-    return found
+        yield "radius", "is that of a body along -y: give length instead of tip, or inertia"
+    if "stops" in found:
+        if not found["stops"][0] < found["stops"][1]:
+            yield "stops", "needs the lower angle first"
+        if "stop_stiffness" not in found:
+            yield "stop_stiffness", "stops need it: give it in N m/rad"
 
 
 def _off_axis(place: tuple[float, ...]) -> bool:

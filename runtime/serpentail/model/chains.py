@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from serpentail_scene.layout import PER_SEGMENT, ChainLayout, Layout
+from serpentail_scene.drives import drives_of
+from serpentail_scene.layout import ChainLayout, Layout
 from serpentail_scene.parameters import NAMES, PASSIVE, name_in
 
 from .passive import OUT_OF_REACH
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 
 # coordinates of a segment by its kind
 COORDINATES = {"articulated": ("alpha", "beta"), "continuum": ("a", "b"), "polar": ("phi", "theta")}
+HINGE = "hinge"  # the kind of segments of limbs
 # what stands for springs, damping and stops where a chain has none
 NONE = dict.fromkeys(("tail_stiffness", "tail_rest", "tail_damping", "tail_stop_stiffness"), 0.0)
 NONE |= {"tail_stop_lower": -OUT_OF_REACH, "tail_stop_upper": OUT_OF_REACH, "tail_stop_width": 1.0}
@@ -51,14 +53,19 @@ def bend_ranges(manifest: Mapping[str, Any]) -> np.ndarray:
 def layout_of(manifest: Mapping[str, Any], kinds: tuple[str, ...]) -> Layout:
     """Return the layout of a model whose segments are of these kinds."""
     fixed = manifest["scene"].get("base") == "fixed"
-    layout = Layout(len(kinds), fixed)
+    layout = Layout(len(kinds), fixed, (), kinds.count(HINGE))
     polar = manifest["scene"]["coordinates"] == "polar"
-    chains = []
+    chains, first = [], 0
     for entry in entries(manifest):
-        first, stop = (PER_SEGMENT * end for end in entry["segments"])
         start = f"{entry['name']}_" if owner_of(entry) else ""
         own = kinds[slice(*entry["segments"])]
-        pairs = [COORDINATES["polar" if polar else kind] for kind in own]
+        table = manifest["scene"]["chain"][owner_of(entry)] if start else {}
+        if HINGE in own:
+            names = [joint["name"] for joint in table["joints"]]
+        else:
+            pairs = [COORDINATES["polar" if polar else kind] for kind in own]
+            names = [f"{name}_{i + 1}" for i, pair in enumerate(pairs) for name in pair]
+        stop, drives = first + len(names), drives_of(table)
         chains.append(
             ChainLayout(
                 name=entry["name"],
@@ -69,12 +76,12 @@ def layout_of(manifest: Mapping[str, Any], kinds: tuple[str, ...]) -> Layout:
                 tau=slice(first, stop),
                 segments=slice(*entry["segments"]),
                 points=slice(*entry["points"]),
-                names=tuple(
-                    f"{start}{name}_{i + 1}" for i, pair in enumerate(pairs) for name in pair
-                ),
+                names=tuple(f"{start}{name}" for name in names),
+                driven=tuple(drives[k % len(drives)] != "passive" for k in range(len(names))),
             )
         )
-    return Layout(len(kinds), fixed, tuple(chains))
+        first = stop
+    return Layout(len(kinds), fixed, tuple(chains), layout.hinges)
 
 
 def values_of(chain: ChainLayout, values: Mapping[str, Any]) -> dict[str, Any]:

@@ -11,12 +11,12 @@ import numpy as np
 from numpy import ndarray
 from numpy.typing import ArrayLike, DTypeLike
 
-from serpentail_scene.layout import PER_SEGMENT, QUATERNION
+from serpentail_scene.layout import QUATERNION
 
 from ..basics.checks import real_array, refuse_not_finite
 from ..basics.errors import StateError
 from ..compiling.threads import shared
-from .chains import bend_ranges
+from .chains import HINGE, bend_ranges
 from .fast_call import Call, fast_call, no_call
 from .library import NOT_POSITIVE_DEFINITE, OUT_OF_RANGE, BatchLibrary, RecordFunction
 from .memory import Out, address_of, aligned, aligned_rows, received
@@ -269,9 +269,12 @@ class Kernel:
         tail = q[QUATERNIONS[self.names[0]].stop :]
         if self.names[0] == "x":  # the rates are there, too
             tail = tail[: len(tail) // 2]
-        first, second = tail[::PER_SEGMENT], tail[1::PER_SEGMENT]
-        bends = abs(second) if self.polar else np.hypot(first, second)
-        bends = np.where(np.array(self.kinds) == "continuum", bends, 0.0)  # only arcs have a range
+        kinds = np.broadcast_to(self.kinds, self.bend_ranges.shape)
+        widths, arcs = np.where(kinds == HINGE, 1, 2), kinds == "continuum"
+        firsts = (widths.cumsum() - widths)[arcs]
+        first, second = tail[firsts], tail[firsts + 1]
+        bends = np.zeros(len(arcs))  # only arcs have a range
+        bends[arcs] = abs(second) if self.polar else np.hypot(first, second)
         least, worst = int(bends.argmin()), int((bends / self.bend_ranges).argmax())
         if self.polar and bends[worst] <= self.bend_ranges[worst]:
             what = f"segment {least + 1}{state} has theta = {bends[least]:.6g} rad"

@@ -67,7 +67,7 @@ class Model(ModelMethods, ModelStates, NearNames):
     segments : int
         Number m of segments.
     kinds : tuple of str
-        Kind of each segment: "articulated" or "continuum".
+        Kind of each segment: "articulated", "continuum", or "hinge" in limbs.
     links : int, tuple of int or None
         Links of every segment; a tuple if the numbers differ, with 0 for an arc; None for a
         continuum tail.
@@ -78,7 +78,8 @@ class Model(ModelMethods, ModelStates, NearNames):
     fixed : bool
         Whether the base is fixed, so that only the tail moves.
     nq, nv, nu : int
-        Lengths of ``q``, ``v`` and ``tau``: 7 + 2m, 6 + 2m and 2m; on a fixed base all are 2m.
+        Lengths of ``q``, ``v`` and ``tau``: 7 + nt, 6 + nt and nt, with nt two for each segment,
+        and one for a hinge; on a fixed base all are nt.
     coordinates, velocities, torques : list of str
         Names of their numbers, such as "z", "vz", "alpha_1", "alpha_1_dot" and "tau_alpha_1".
     contacts : dict

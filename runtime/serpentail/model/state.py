@@ -188,10 +188,13 @@ def _numbers(model: Model, field: str, word: str, value: Any, error: type[Except
     if word in OF_TAIL:
         if model.manifest["scene"]["coordinates"] == "polar":
             raise error(f"{field}: is no polar coordinate: leave it out, and set q")
-        m = model.segments
-        if array.shape not in ((), (m,), (2 * m,), (m, 2)):
-            needs = f"pitch and yaw of each segment, {2 * m} numbers; {m} pitches; or one pitch"
+        m, nt, hinges = model.segments, model.layout.nt, model.layout.hinges
+        if array.shape not in ((), (m,), (nt,), *[(m, 2)] * (not hinges)):
+            each = "the angle of each hinge, " if hinges else ""
+            needs = f"pitch and yaw of each segment, {each}{nt} numbers; {m} pitches; or one pitch"
             raise refusal(field, value, needs, error)
+        if hinges and array.shape == (nt,):
+            return array / np.repeat(model.joints_each, model.layout.widths)
         array = np.broadcast_to(array, m) if array.ndim == 0 else array
         return shared_among_links(model, array.reshape(1, m, -1))[0]
     if array.shape != (3,):
@@ -200,7 +203,9 @@ def _numbers(model: Model, field: str, word: str, value: Any, error: type[Except
 
 
 def shared_among_links(model: Model, bends: Array) -> Array:
-    """Return tail coordinates (K, 2m) of bends of the segments, (K, m, 1 or 2), rad: pitch, yaw."""
-    both = np.zeros((*bends.shape[:2], 2))
+    """Return tail coordinates (K, nt) of bends of the segments, (K, m, 1 or 2), rad: pitch, yaw; of
+    hinges the first is their angle.
+    """
+    both, widths = np.zeros((*bends.shape[:2], 2)), np.array(model.layout.widths)
     both[..., : bends.shape[2]] = bends
-    return both.reshape(len(bends), model.layout.nt) / np.repeat(model.joints_each, 2)
+    return both[:, np.arange(2) < widths[:, None]] / np.repeat(model.joints_each, widths)

@@ -30,7 +30,7 @@ class Asked:
     @property
     def names(self) -> Names:
         """Name and unit of each number of q, v and tau."""
-        return Names.of(layout_of(self.q), self.model)
+        return Names.of(layout_of(self.q, self.v), self.model)
 
     def __len__(self) -> int:
         return len(self.t)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from serpentail_scene.layout import PER_SEGMENT, POSITION, QUATERNION
+from serpentail_scene.layout import POSITION, QUATERNION
 
 from ..basics.attitude import Array, rotation_matrix
 from ..basics.errors import StateError
@@ -189,13 +189,14 @@ def _bends(model: Model, motion: "Trajectory") -> list[str]:
 
 def _bend(model: Model, tail: Array) -> Array:
     """How far the segments are bent, (K, m), rad: of joints the larger of pitch and yaw."""
-    first, second = (tail[:, k::PER_SEGMENT] for k in range(PER_SEGMENT))
+    firsts, widths = np.array(model.layout.firsts), np.array(model.layout.widths)
+    first, second = tail[:, firsts], tail[:, firsts + widths - 1]  # the same of a hinge
     of_joints = model.joints_each * np.maximum(np.abs(first), np.abs(second))
     if model.kind == "articulated":
         return of_joints
     if model.manifest["scene"]["coordinates"] == "polar":
         return np.abs(second)
-    jointed = np.array(model.kinds) == "articulated"
+    jointed = np.array(model.kinds) != "continuum"
     return np.where(jointed, of_joints, np.hypot(first, second))
 
 

@@ -28,9 +28,11 @@ def real(name: str, value: ArrayLike) -> Array:
     return array
 
 
-def layout_of(q: Array) -> Layout:
-    """Return the layout of configurations (K, nq); ``shapes`` has checked that they have one."""
-    layout = Layout.of_width(q.shape[1])
+def layout_of(q: Array, v: Array) -> Layout:
+    """Return the layout of configurations (K, nq) and velocities (K, nv); ``shapes`` has checked
+    that they have one.
+    """
+    layout = Layout.of_width(q.shape[1], v.shape[1])
     assert layout is not None
     return layout
 
@@ -40,10 +42,10 @@ def shapes(t: Array, q: Array, like: tuple[Array, ...]) -> dict[str, tuple[int, 
     samples = len(t) if t.ndim == 1 else 0
     if not samples:
         raise ValueError(f"t has shape {t.shape}: give one row of at least one time")
-    layout = Layout.of_width(q.shape[1]) if q.ndim == 2 else None
+    layout = Layout.of_width(q.shape[1], like[0].shape[-1]) if q.ndim == 2 else None
     if layout is None or (layout.fixed and any(each.shape != q.shape for each in like)):
         raise ValueError(
-            f"q has shape {q.shape}: give ({samples}, 7 + 2m), position, quaternion and 2m tail "
+            f"q has shape {q.shape}: give ({samples}, 7 + nt), position, quaternion and tail "
             f"coordinates, or ({samples}, 2m) of a tail on a fixed base"
         )
     return {

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from serpentail_scene.layout import POSITION, ChainLayout
 
 from ..basics.attitude import Array, pose_of
-from ..model.chains import values_of
+from ..model.chains import HINGE, values_of
 from ..model.model import Model
 from ..model.polar import polar_to_bend
 from ..motion.body import semi_axes
@@ -133,13 +133,17 @@ def _radii_of(model: Model, chain: ChainLayout) -> Array:
     usual, radii = usual_radius(p), np.zeros(count)
     if not {"link_masses", "arc_masses"} & p.keys():
         return usual * (THICKER - np.arange(count) / (2 * count + 2))
-    jointed = np.repeat(np.array(model.kinds[chain.segments]) == "articulated", counts)
+    kinds = model.kinds[chain.segments]
+    jointed = np.repeat(np.array(kinds) != "continuum", counts)
+    if HINGE in kinds:  # of which some have no body
+        joints = model.manifest["scene"]["chain"][chain.owner]["joints"]
+        jointed = np.array(["mass" in joint for joint in joints])
     if "link_masses" in p:
         along, masses = np.reshape(p["link_inertias"], (-1, 3))[:, 1], np.array(p["link_masses"])
         radii[jointed] = np.where(along > 0, np.sqrt(2 * along / masses), usual)
     if "arc_masses" in p:
         sections = np.array(p["arc_masses"]) / p["arc_lengths"] / WATER
-        arcs = np.array(model.kinds[chain.segments]) == "continuum"
+        arcs = np.array(kinds) == "continuum"
         radii[~jointed] = np.repeat(np.sqrt(sections / np.pi), counts[arcs])
     return radii
 
@@ -177,12 +181,12 @@ def centre_of_mass(model: Model, q: Array, v: Array) -> Array:
 
 
 def bends(model: Model, tail: Array) -> Array:
-    """Return the bends (K, 2m) of the segments in pitch and yaw, rad, of tail coordinates (K, 2m).
+    """Return the bends (K, nt) of the segments in pitch and yaw, rad, of tail coordinates (K, nt).
 
-    The bend of an articulated segment is the sum of its links' angles.
+    The bend of an articulated segment is the sum of its links' angles, that of a hinge its angle.
     """
     if model.links is not None:
-        return np.repeat(model.joints_each, 2) * tail
+        return np.repeat(model.joints_each, model.layout.widths) * tail
     if model.manifest["scene"]["coordinates"] != "polar":
         return tail
     pitch, yaw, *_ = polar_to_bend(tail[:, 0::2], tail[:, 1::2])

@@ -9,7 +9,7 @@ from serpentail_scene.layout import POSITION, TORSO_NV, VELOCITY
 from ..model.model import Model
 from .errors import relative, sensitivity, worst
 from .law import PIECEWISE, SLOPE_LIMIT, VALUE_LIMIT, Errors, fastest, law, moved, slope
-from .states import Case, at_origin, is_fixed
+from .states import Case, at_origin
 
 DEPTH = 3e-3  # m, of the lowest point in the ground
 HEIGHT = 100.0  # m: far from the ground
@@ -37,9 +37,7 @@ def sunk(model: Model, s: Case) -> Case:
 
 
 def raised(q: np.ndarray, height: float) -> np.ndarray:
-    """Return the configuration with B higher by a height (m), unless it is fixed."""
-    if is_fixed(q):
-        return q
+    """Return the configuration with B higher by a height (m)."""
     q = q.copy()
     q[2] += height
     return q

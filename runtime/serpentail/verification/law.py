@@ -92,7 +92,7 @@ def slope(f: Callable[[float], np.ndarray], rate: float) -> tuple[np.ndarray, np
 
 def moved(q: np.ndarray, v: np.ndarray, time: float) -> np.ndarray:
     """Return the configuration that the constant velocity v leads to."""
-    if is_fixed(q):
+    if is_fixed(q, v):
         return q + time * v
     omega = v[OMEGA]
     angle = np.linalg.norm(omega) * time / 2
@@ -103,6 +103,6 @@ def moved(q: np.ndarray, v: np.ndarray, time: float) -> np.ndarray:
 
 def fastest(model: Model, v: np.ndarray) -> float:
     """Return a bound on the angular velocity of every link (rad/s)."""
-    turning = np.repeat(model.joints_each, 2) * abs(v[model.layout.tail_v])
+    turning = np.repeat(model.joints_each, model.layout.widths) * abs(v[model.layout.tail_v])
     of_torso = 0.0 if model.fixed else np.linalg.norm(v[OMEGA])
     return float(of_torso + np.sum(turning))

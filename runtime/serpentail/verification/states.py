@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, Layout
+from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V
 
 from ..basics.errors import ModelError
 from ..model.chains import bend_ranges
@@ -100,20 +100,20 @@ def tail_angles(model: Model, rng: np.random.Generator, kind: str, k: int) -> np
     Folded joints are, in turn, within 0.01 rad of +-pi and within two turns. The bends of a
     continuum stay within its range, also where a law moves on from the state.
     """
-    size = model.layout.nt
+    size, widths = model.layout.nt, model.layout.widths
     reach = bend_ranges(model.manifest)
     if kind == "straight":
         return np.zeros(size)
     if kind == "random":
-        return rng.uniform(-1, 1, size) * np.repeat(np.minimum(1, reach / 4), 2)
+        return rng.uniform(-1, 1, size) * np.repeat(np.minimum(1, reach / 4), widths)
     bent, turned = np.zeros(size), np.zeros(size)
     if "continuum" in model.kinds:
         bends = [rng.uniform(0.3, 0.6) * most * direction(rng, 2) for most in reach]
-        bent = np.concatenate(bends)
-    if "articulated" in model.kinds:
+        bent = np.concatenate([bend[:n] for bend, n in zip(bends, widths, strict=True)])
+    if {*model.kinds} != {"continuum"}:
         near_pi = rng.choice([-np.pi, np.pi], size) + rng.uniform(-0.01, 0.01, size)
         turned = near_pi if k % 2 == 0 else rng.uniform(-2 * np.pi, 2 * np.pi, size)
-    return np.where(np.repeat(model.kinds, 2) == "continuum", bent, turned)
+    return np.where(np.repeat(model.kinds, widths) == "continuum", bent, turned)
 
 
 def blocks(rng: np.random.Generator, tail: int, scales: tuple[float, float, float]) -> np.ndarray:
@@ -124,23 +124,22 @@ def blocks(rng: np.random.Generator, tail: int, scales: tuple[float, float, floa
 
 def at_origin(s: Case) -> Case:
     """Return the state with B at the origin."""
-    if is_fixed(s.q):
+    if is_fixed(s.q, s.v):
         return s
     q = s.q.copy()
     q[POSITION] = 0
     return replace(s, q=q)
 
 
-def is_fixed(q: np.ndarray) -> bool:
-    """Tell if a configuration is that of a tail on a fixed base."""
-    layout = Layout.of_width(len(q))
-    return layout is not None and layout.fixed
+def is_fixed(q: np.ndarray, v: np.ndarray) -> bool:
+    """Tell if a state is that of a tail on a fixed base."""
+    return len(q) == len(v)
 
 
 def scaled(s: Case, factor: float) -> Case:
     """Return another state: all but the attitude times a factor."""
     q = s.q * factor
-    if not is_fixed(q):
+    if not is_fixed(q, s.v):
         q[QUATERNION] = s.q[QUATERNION]
     return replace(
         s, q=q, v=s.v * factor, v_dot=s.v_dot * factor, tau=s.tau * factor, f_ext=s.f_ext * factor

@@ -141,9 +141,10 @@ function bent(facts) {
   const { live, rows, t } = facts;
   const { MOST_BEND: most, DEGREES } = live.limits;
   return live.kinds.flatMap((kind, m) => {
+    const at = live.firsts[m];
     const [bend, k] = largest(rows, (row) => {
-      const [first, second] = [2 * m, 2 * m + 1].map((i) => Math.abs(facts.angle(row, i)));
-      if (kind === "articulated") return live.joints[m] * Math.max(first, second);
+      const [first, second] = [at, at + (kind !== "hinge")].map((i) => Math.abs(facts.angle(row, i)));
+      if (kind !== "continuum") return live.joints[at] * Math.max(first, second);
       return live.polar ? second : norm(first, second);
     });
     const remedy = live.words[bend > DEGREES ? "degrees" : "damp"];

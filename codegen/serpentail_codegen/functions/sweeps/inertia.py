@@ -27,9 +27,8 @@ def gather_inertia(
     momentum columns at B and its own block of H.
     """
     composite, tail = draft.vectors(mass=1, h=3, I=6), draft.tail
-    names, to_torso = (("pitch", "yaw"), torso.column_at_torso)
-    if tail.width == 1:
-        names, to_torso = ("column",), hinge.hinge_at_torso
+    names = ("column",) if tail.width == 1 else ("pitch", "yaw")
+    to_torso = hinge.hinge_at_torso if tail.width == 1 else torso.column_at_torso
     momenta = draft.vectors(**dict.fromkeys(names, 6))
     for ref in composite.named.values():
         draft.fill(ref, 0)

@@ -129,7 +129,7 @@ def chains_of(tail: Tail) -> str:
 
 def words_of(tail: Tail) -> str:
     """Return the parts of a mixed tail in words."""
-    kinds = {"articulated": "links", "continuum": "samples of an arc"}
+    kinds = {"articulated": "links", "continuum": "samples of an arc", "hinge": "a hinge"}
     return f": {', '.join(kinds[kind] for kind in tail.shape.kinds)}" if tail.shape.kinds else ""
 
 

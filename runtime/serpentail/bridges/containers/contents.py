@@ -80,7 +80,7 @@ def contents(motion: Trajectory | Rollouts) -> Contents:
     leading = tuple(labels)
 
     # names of the numbers
-    layout = Layout.of_width(motion.q.shape[-1])
+    layout = Layout.of_width(motion.q.shape[-1], motion.v.shape[-1])
     assert layout is not None
     names = Names.of(layout, model)
     labels |= {"coordinate": [*names.q], "rate": [*names.v], "axis": AXES}

@@ -160,6 +160,8 @@ def _columns(array: str, motion: Trajectory) -> Sequence[str]:
     """The names of an array's columns; none if a motion does not have it."""
     if array in ("height", "tilt"):
         return [] if motion.layout.fixed else [""]
+    if array in ("bends", "torque") and motion.layout.hinges:
+        return motion.names.tail
     if array in ("bends", "torque"):
         return [f"{bend} {i + 1}" for i in range(motion.segments) for bend in ("pitch", "yaw")]
     if array == "force":

@@ -107,7 +107,7 @@ class Reference:
         if model.manifest["scene"]["coordinates"] != "polar":
             warn_of_degrees("bends", checked, calls=2)
         m = model.segments
-        if checked.shape[1:] not in ((m,), (m, 2)):
+        if checked.shape[1:] not in ((m,), *[(m, 2)] * (not model.layout.hinges)):
             raise SimulationError(
                 f"bends has shape {checked.shape}: give (times, {m}) or (times, {m}, 2): pitch, or "
                 "pitch and yaw, of each segment"
