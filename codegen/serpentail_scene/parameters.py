@@ -175,6 +175,7 @@ PASSIVE = (
     ),
 )
 # fmt: on
+OUT_OF_REACH = 1e6  # rad, which no coordinate reaches: stops there have no effect
 PASSIVE_NAMES = tuple(p.name for p in PASSIVE)
 NAMES = (*(p.name for p in PARAMETERS), *PASSIVE_NAMES)
 

@@ -37,44 +37,64 @@ TREE = Animal(
         Chain((THIRD,), (-0.004, 0.01, 0.02)),
     ),
 )
+SHANK = Hinge(0, 1e-3, (0, -0.008, 0), (5e-8, 4e-9, 5e-8), (0, -0.02, 0))
+THIGH = Hinge(0, 2e-3, (0, -0.015, 0), (9.64e-8, 1.28e-8, 9.64e-8), (0, -0.03, 0))
+LIFT = (1.5e-3, (0.002, -0.008, -0.004), (6e-8, 4e-8, 5e-8), (0.005, -0.02, 0.003))
+ARM = (Hinge(2, rotor=2e-7), Hinge(0, *LIFT, rotor=3e-7))
+WHEEL = Hinge(1, 3e-3, inertia=(4e-8, 7e-8, 4e-8))
+LIMB = ((Hinge(1), THIGH, SHANK), *LEG[1:])
+LIMBS = Animal(
+    segments=own_tails.LINK_BODIES[1:2],
+    mount_angles=own_tails.TILT,
+    **own_tails.VALUES,
+    chains=(Chain(*LIMB), Chain(*LIMB, mirrored=True), Chain((*ARM, WHEEL), (0.002, 0.05, 0.01))),
+)
+# the passive chains of models: their first coordinate, how many, the names of their parameters
+PASSIVE_CHAINS = {
+    "tree": ((4, 2, "leg"), (6, 2, "leg"), (10, 2, "third")),
+    "limbs": ((2, 3, "leg"), (5, 3, "leg")),
+}
 
 
 def passive(model, q, v):
-    """Generalised forces of springs, damping and stops of the zoo's tree, chain by chain."""
+    """Generalised forces of springs, damping and stops of a model of the zoo, chain by chain."""
     force = np.zeros(model.nv)
-    for first, owner in ((4, "leg"), (6, "leg"), (10, "third")):
+    for first, count, owner in PASSIVE_CHAINS[model.name]:
         names = {f"{owner}_{p.name.removeprefix('tail_')}": p.name for p in PASSIVE}
         own = {names[n]: x for n, x in model.parameters.items() if n in names}
-        angles, rates = q[7 + first : 9 + first], v[6 + first : 8 + first]
-        force[6 + first : 8 + first] = PassiveTail(own, 2).force(angles, rates)
+        angles, rates = q[7 + first :][:count], v[6 + first :][:count]
+        force[6 + first :][:count] = PassiveTail(own, count).force(angles, rates)
     return force
 
 
 @pytest.mark.slow  # 60 digits
-def test_a_tree_is_its_set_of_bodies():
-    model = zoo.model("tree")
+@pytest.mark.parametrize(("name", "bodies"), [("tree", TREE), ("limbs", LIMBS)])
+def test_a_tree_is_its_set_of_bodies(name, bodies):
+    model = zoo.model(name)
     for q, v, v_dot, tau in own_tails.states(model.nq, 1):
-        H, force, bias = own_tails.dynamics(TREE, q, v, v_dot)
+        H, force, bias = own_tails.dynamics(bodies, q, v, v_dot)
         own = passive(model, q, v)
         assert mass_matrix_error(model.mass_matrix(q), H) < 1e-13
         assert force_error(model.inverse_dynamics(q, v, v_dot), force + own, H) < 1e-13
         assert force_error(model.bias_force(q, v), bias + own, H) < 1e-13
-        assert (np.abs(model.mass_matrix(q)[6:10, 10:]) == 0).all()  # chains do not couple
+        second = model.layout.chains[1].v.start
+        assert (model.mass_matrix(q)[6:second, second:] == 0).all()  # chains do not couple
 
         expected = accelerated(H, np.concatenate([np.zeros(6), tau]) - bias - own)
         most = FORWARD * equilibrated_condition(H)
         assert block_error(model.forward_dynamics(q, v, tau), expected) < most
         graph = model.casadi.forward_dynamics(q, v, tau).full().ravel()
         assert block_error(graph, expected) < most
-        np.testing.assert_allclose(model.energy(q, v)[0], TREE.energy(q, v)[0], rtol=1e-14)
-        for found, momentum in zip(model.momentum(q, v), TREE.momentum(q, v), strict=True):
+        np.testing.assert_allclose(model.energy(q, v)[0], bodies.energy(q, v)[0], rtol=1e-14)
+        for found, momentum in zip(model.momentum(q, v), bodies.momentum(q, v), strict=True):
             assert np.abs(found - momentum).max() < 1e-13 * np.abs(momentum).max()
-        assert np.abs(model.tail_points(q) - TREE.tail_points(q)).max() < 1e-15
+        assert np.abs(model.tail_points(q) - bodies.tail_points(q)).max() < 1e-15
 
 
-def test_loads_do_their_work():
+@pytest.mark.parametrize("name", ["tree", "limbs"])
+def test_loads_do_their_work(name):
     """J^T f of a force at each point, by the points' velocities along v_dot of a load alone."""
-    model, step = zoo.model("tree"), 1e-6
+    model, step = zoo.model(name), 1e-6
     q, v, _, tau = next(own_tails.states(model.nq, 1))
     q[3:7] /= np.linalg.norm(q[3:7])
     rng = np.random.default_rng(4)
@@ -87,9 +107,10 @@ def test_loads_do_their_work():
     assert way @ force == pytest.approx(power, rel=1e-8)
 
 
-def test_derivatives_are_those_of_the_functions():
+@pytest.mark.parametrize("name", ["tree", "limbs"])
+def test_derivatives_are_those_of_the_functions(name):
     """Along one direction by differences; products with Jacobians to rounding."""
-    model, step, rng = zoo.model("tree"), 1e-6, np.random.default_rng(5)
+    model, step, rng = zoo.model(name), 1e-6, np.random.default_rng(5)
     q, v, v_dot, tau = next(own_tails.states(model.nq, 1))
     q[3:7] /= np.linalg.norm(q[3:7])
     dq, dv, weights = rng.normal(size=(3, model.nv))
@@ -120,8 +141,8 @@ def test_derivatives_are_those_of_the_functions():
             np.concatenate([by_q @ dq + by_v @ dv, turn_q @ dq + turn_v @ dv]),
         ),
     }
-    for name, (f, found) in cases.items():
-        with row(name):
+    for what, (f, found) in cases.items():
+        with row(what):
             expected = change(f)
             assert np.abs(found - expected).max() < 1e-7 * np.abs(expected).max()
 
@@ -133,16 +154,18 @@ def test_derivatives_are_those_of_the_functions():
         assert np.abs(found - weights @ J).max() < 1e-12 * np.abs(weights @ J).max()
 
 
-def test_torques_of_pfl_give_the_accelerations():
-    model = zoo.model("tree")
+@pytest.mark.parametrize("name", ["tree", "limbs"])
+def test_torques_of_pfl_give_the_accelerations(name):
+    model = zoo.model(name)
     q, v, v_dot, _ = next(own_tails.states(model.nq, 1))
     torques = model.pfl(q, v, v_dot[6:])
     found = model.forward_dynamics(q, v, torques)[6:]
     assert np.abs(found - v_dot[6:]).max() < 1e-9 * np.abs(v_dot).max()
 
 
-def test_every_law_holds():
-    wrong = [check for check in laws(zoo.model("tree")) if not check.passed]
+@pytest.mark.parametrize("name", ["tree", "limbs"])
+def test_every_law_holds(name):
+    wrong = [check for check in laws(zoo.model(name)) if not check.passed]
     assert not wrong
 
 

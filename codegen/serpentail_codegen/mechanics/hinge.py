@@ -1,11 +1,11 @@
 """The steps of a hinge: a joint that turns about one axis, and the body beyond it.
 
 ``joint`` = (cos, sin) of its angle; ``axis`` is x, y or z of the frame before it. ``body`` = (m, b,
-I, r): mass, first moment (3) and inertia (xx, yy, zz, xy, xz, yz) about the joint, place of the next
-joint (3). ``form`` says which of them are 0: of an "along" body what is not on -y, where it and the
-next joint lie; of a "bare" hinge all. A ``geared`` hinge has the inertia ``rotor`` of its motor's
-rotor, times the square of the gear ratio, which acts on its own angle alone. Other vectors are as in
-`link`.
+I, r): mass, first moment (3) and inertia (xx, yy, zz, xy, xz, yz) about the joint, and where the
+next joint is (3). ``form`` says which of them are 0: of an "along" body what is not on -y, where it
+and the next joint lie; of a "bare" hinge all. A ``geared`` hinge has the inertia ``rotor`` of its
+motor's rotor, times the square of the gear ratio, which resists its own angle alone. Other vectors
+are as in `link`.
 """
 
 from dataclasses import dataclass

@@ -5,7 +5,7 @@ from typing import Any
 
 from serpentail_scene.drives import DRIVE
 from serpentail_scene.keys import JOINT, NAME
-from serpentail_scene.parameters import ellipsoid
+from serpentail_scene.parameters import OUT_OF_REACH, ellipsoid
 from serpentail_scene.rules import one_of
 
 from .checks import MOST_SEGMENTS
@@ -21,7 +21,6 @@ NEEDS = {  # keys of a hinge that mean nothing without another one
     **{"rest": "stiffness", "stop_stiffness": "stops", "stop_width": "stops"},
 }
 EXAMPLE = 'joints = [{name = "knee", length = "40 mm", mass = "3 g", radius = "4 mm"}]'
-FAR = 1e6  # rad, where a hinge without stops has them
 Hinge = dict[str, tuple[float, ...]]  # the numbers of a table of `joints` by key, in SI units
 
 
@@ -142,8 +141,8 @@ def _passive(hinges: list[Hinge]) -> dict[str, list[float]]:
         found |= {"tail_damping": each("damping", 0.0)}
     if any("stops" in hinge for hinge in hinges):
         found |= {
-            "tail_stop_lower": each("stops", -FAR),
-            "tail_stop_upper": each("stops", FAR, 1),
+            "tail_stop_lower": each("stops", -OUT_OF_REACH),
+            "tail_stop_upper": each("stops", OUT_OF_REACH, 1),
             "tail_stop_stiffness": each("stop_stiffness", 1.0),
             "tail_stop_width": each("stop_width", 0.1),
         }

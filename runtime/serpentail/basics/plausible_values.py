@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from serpentail_scene.parameters import OUT_OF_REACH
 from serpentail_scene.units import DEEPEST, plain
 
 from .errors import UnlikeBodies, UnusualSize
@@ -78,7 +79,8 @@ def warn_of_sizes(units: Mapping[str, str], values: Values, calls: int = 2) -> N
     UnusualSize: no animal or robot has them. UnlikeBodies: H loses digits.
     """
     for name, value in values.items():
-        largest = float(np.max(np.abs(value), initial=0.0))
+        sizes = np.abs(value)
+        largest = float(np.max(sizes, initial=0.0, where=sizes != OUT_OF_REACH))
         warn_of_unusual(name, largest, units[name], calls + 1)
     free = "torso_inertia" in values
     for line in (*_too_small(values), *(_unlike_torsos(values) if free else ())):

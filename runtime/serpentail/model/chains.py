@@ -7,9 +7,7 @@ import numpy as np
 
 from serpentail_scene.drives import drives_of
 from serpentail_scene.layout import ChainLayout, Layout
-from serpentail_scene.parameters import NAMES, PASSIVE, name_in
-
-from .passive import OUT_OF_REACH
+from serpentail_scene.parameters import NAMES, OUT_OF_REACH, PASSIVE, name_in
 
 if TYPE_CHECKING:
     from .model import Model

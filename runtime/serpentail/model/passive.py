@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from serpentail_scene.parameters import OUT_OF_REACH
+
 if TYPE_CHECKING:
     from .model import Model
 
-# tail coordinates (rad) that no motion reaches: stops there have no effect
-OUT_OF_REACH = 1e6
 ENDS = (("tail_stop_lower", -1), ("tail_stop_upper", 1))
 BEHIND = (
     "{name} is {angle:.6g} rad, behind {stop} {at:.6g} by more than tail_stop_width {width:.6g}"

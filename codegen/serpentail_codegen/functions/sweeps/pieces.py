@@ -28,8 +28,8 @@ IDENTITY = (1, 0, 0, 0, 1, 0, 0, 0, 1)
 def mechanism(draft: Draft) -> Mechanism:
     """Return the steps of the draft's tail.
 
-    In a mixed tail, and in a limb, these are the steps of the segments that the open loop is over; outside of such
-    loops, those that describe all segments.
+    In a mixed tail, and in a limb, these are the steps of the segments that the open loop is over;
+    outside of such loops, those that describe all segments.
     """
     if draft.tail.polar:
         return POLAR
