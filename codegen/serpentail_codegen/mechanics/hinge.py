@@ -1,11 +1,11 @@
 """The steps of a hinge: a joint that turns about one axis, and the body beyond it.
 
-``joint`` = (cos, sin) of its angle; ``axis`` is x, y or z of the frame before it. ``body`` = (m, b,
-I, r): mass, first moment (3) and inertia (xx, yy, zz, xy, xz, yz) about the joint, and where the
-next joint is (3). ``form`` says which of them are 0: of an "along" body what is not on -y, where it
-and the next joint lie; of a "bare" hinge all. A ``geared`` hinge has the inertia ``rotor`` of its
-motor's rotor, times the square of the gear ratio, which resists its own angle alone. Other vectors
-are as in `link`.
+``joint`` = (cos, sin) of its angle. ``body`` = (m, b, I, r): mass, first moment (3) and inertia (xx,
+yy, zz, xy, xz, yz) about the joint, and where the next joint is (3). ``rotor`` is the inertia of the
+motor's rotor, times the square of the gear ratio, which resists the angle alone. The setting
+``kind`` begins with the axis, x, y or z of the frame before, and says what is 0: "along": all of the
+body that is not on -y; "bare": the whole body; without "geared" the rotor. Other vectors are as in
+`link`.
 """
 
 from dataclasses import dataclass
@@ -19,6 +19,16 @@ from .shapes import M33, V1, V2, V3, V5, V6, V13, FrameMotion, VirtualMotion
 
 
 @dataclass(frozen=True)
+class Hinge:
+    """The numbers of a hinge: ``twice`` are those of its doubled angle."""
+
+    joint: V2
+    twice: V5
+    rotor: V1
+    body: V13
+
+
+@dataclass(frozen=True)
 class HingeMotion:
     """Rate and acceleration of a hinge's angle, and a virtual rate."""
 
@@ -28,52 +38,40 @@ class HingeMotion:
 
 
 @dataclass(frozen=True)
-class Body:
-    """A hinge's body: mass, first moment and inertia about the joint, place of the next joint."""
+class Known:
+    """A hinge of some kind: numbers of the axes that it turns, and of its own, its rotation and
+    axis, rotor and body.
+    """
 
+    axes: tuple[int, int, int]
+    turn: Matrix
+    axis: Matrix
+    rotor: Any
     mass: Any
     first: Matrix
     about: Matrix
     tip: Matrix
 
 
-def body_of(form: str, body: Matrix) -> Body:
-    """Return a body, in which numbers are 0 that its form says to be so."""
-    if form == "bare":
-        return Body(0, zeros(3, 1), zeros(6, 1), zeros(3, 1))
-    mass, b, about, tip = body[0], body[1:4, :], body[4:10, :], body[10:13, :]
-    if form != "along":
-        return Body(mass, b, about, tip)
-    return Body(mass, Matrix([0, b[1], 0]), Matrix([*about[0:3], 0, 0, 0]), Matrix([0, tip[1], 0]))
-
-
-def axes_of(axis: str) -> tuple[int, int, int]:
-    """Return the numbers of the two axes that a hinge turns, and of its own."""
-    k = "xyz".index(axis)
-    return (k + 1) % 3, (k + 2) % 3, k
-
-
-def turn_of(axis: str, joint: Matrix) -> Matrix:
-    """Return the rotation of a hinge."""
-    (i, j, _), R = axes_of(axis), eye(3)
-    R[i, i] = R[j, j] = joint[0]
-    R[i, j], R[j, i] = -joint[1], joint[1]
-    return R
-
-
-def unit(axis: str) -> Matrix:
-    """Return the axis as a vector."""
-    return eye(3).col(axes_of(axis)[2])
+def known(hinge: Hinge, kind: str) -> Known:
+    """Return a hinge with zeros where its kind says so."""
+    k = "xyz".index(kind[0])
+    i, j = (k + 1) % 3, (k + 2) % 3
+    turn, body = eye(3), hinge.body
+    turn[i, i] = turn[j, j] = hinge.joint[0]
+    turn[i, j], turn[j, i] = -hinge.joint[1], hinge.joint[1]
+    if "along" in kind:
+        body = Matrix([*body[0:1], 0, body[2], 0, *body[4:7], 0, 0, 0, 0, body[11], 0])
+    body = zeros(13, 1) if "bare" in kind else body
+    parts = body[0], body[1:4, :], body[4:10, :], body[10:13, :]
+    rotor = hinge.rotor[0] if "geared" in kind else 0
+    return Known((i, j, k), turn, eye(3).col(k), rotor, *parts)
 
 
 def along_body(let, link_masses: V1, link_lengths: V1, link_centers: V1, link_inertias: V3) -> dict:
     """A body along -y, its COM ``link_centers`` from the joint."""
-    m, center = link_masses[0], link_centers[0]
-    first = let("b", m * center)
-    steiner = let("steiner", first * center)
-    Ix, Iy, Iz = link_inertias
-    about = [Ix + steiner, Iy, Iz + steiner, 0, 0, 0]
-    return {"body": Matrix([m, 0, -first, 0, *about, 0, -link_lengths[0], 0])}
+    center = Matrix([0, -link_centers[0], 0])
+    return placed_body(let, link_masses, Matrix([0, -link_lengths[0], 0]), center, link_inertias)
 
 
 def placed_body(let, link_masses: V1, link_tips: V3, link_offsets: V3, link_inertias: V3) -> dict:
@@ -96,16 +94,17 @@ def hinge_double_angle(let, joint: V2) -> dict:
     return {"twice": Matrix([square, product, 2 * product, 1 - 2 * square, c * c])}
 
 
-def hinge_pose(let, joint: V2, body: V13, R: M33, P: V3, axis="x", form="") -> dict:
+def hinge_pose(let, hinge: Hinge, R: M33, P: V3, kind="x") -> dict:
     """Attitude beyond the hinge, and place of the next joint."""
-    turned_R = let("turned", R * turn_of(axis, joint))
-    return {"R": turned_R, "P": P + turned_R * body_of(form, body).tip}
+    own = known(hinge, kind)
+    R = let("turned", R * own.turn)
+    return {"R": R, "P": P + R * own.tip}
 
 
-def hinge_twist(let, R: M33, P: V3, axis="x") -> dict:
+def hinge_twist(let, hinge: Hinge, R: M33, P: V3, kind="x") -> dict:
     """Spatial column of the hinge at B."""
-    e = R * unit(axis)
-    return {"S": Matrix([e, P.cross(e)])}
+    axis = R * known(hinge, kind).axis
+    return {"S": Matrix([axis, P.cross(axis)])}
 
 
 def hinge_at_torso(let, R: M33, P: V3, column: V6) -> dict:
@@ -114,144 +113,95 @@ def hinge_at_torso(let, R: M33, P: V3, column: V6) -> dict:
     return {"columns": Matrix([force, R * column[3:6, :] + P.cross(force)])}
 
 
-def _moved(let, axis, joint, rates, accelerations, base) -> FrameMotion:
+def moved(let, own: Known, moving: HingeMotion, base: FrameMotion) -> FrameMotion:
     """Return the motion of the frame beyond the hinge."""
-    back, e = turn_of(axis, joint).T, unit(axis)
-    before, spin = let("w_before", back * base.w), rates[0] * e
-    w_dot = back * base.w_dot + accelerations[0] * e + before.cross(spin)
-    return FrameMotion(
-        let("w_here", before + spin), let("w_dot_here", w_dot), let("a_here", back * base.a)
-    )
+    before, spin = let("w_before", own.turn.T * base.w), moving.rates[0] * own.axis
+    w_dot = own.turn.T * base.w_dot + moving.accelerations[0] * own.axis + before.cross(spin)
+    w, a = let("w_here", before + spin), let("a_here", own.turn.T * base.a)
+    return FrameMotion(w, let("w_dot_here", w_dot), a)
 
 
-def _wrench(let, body: Body, at: FrameMotion) -> Matrix:
+def wrench_of(let, own: Known, at: FrameMotion) -> Matrix:
     """Return the inertial wrench of a body at its joint."""
-    swing = let("swing", at.w.cross(body.first))
-    force = body.mass * at.a + at.w_dot.cross(body.first) + at.w.cross(swing)
-    I = symmetric(body.about)
-    moment = I * at.w_dot + at.w.cross(let("I_w", I * at.w)) + body.first.cross(at.a)
+    swing, I = let("swing", at.w.cross(own.first)), symmetric(own.about)
+    force = own.mass * at.a + at.w_dot.cross(own.first) + at.w.cross(swing)
+    moment = I * at.w_dot + at.w.cross(let("I_w", I * at.w)) + own.first.cross(at.a)
     return Matrix([force, moment])
 
 
-def _carried(let, body: Body, at: FrameMotion) -> dict:
+def carried(let, own: Known, at: FrameMotion) -> dict:
     """Return the motion of the frame at the next joint."""
-    sling = let("sling", at.w.cross(body.tip))
-    a = at.a + at.w_dot.cross(body.tip) + at.w.cross(sling)
+    sling = let("sling", at.w.cross(own.tip))
+    a = at.a + at.w_dot.cross(own.tip) + at.w.cross(sling)
     return {"w": at.w, "w_dot": at.w_dot, "a": a}
 
 
-def hinge_motion(
-    let,
-    joint: V2,
-    rates: V1,
-    accelerations: V1,
-    rotor: V1,
-    body: V13,
-    base: FrameMotion,
-    axis="x",
-    form="",
-    geared=False,
-) -> dict:
+def hinge_motion(let, hinge: Hinge, moving: HingeMotion, base: FrameMotion, kind="x") -> dict:
     """Carry the motion over the hinge; the body's inertial wrench at the joint, the rotor's
     torque.
     """
-    at, own = _moved(let, axis, joint, rates, accelerations, base), body_of(form, body)
-    torque = {"torque_own": [rotor[0] * accelerations[0]]} if geared else {}
-    return {"F": _wrench(let, own, at), **torque, **_carried(let, own, at)}
+    own = known(hinge, kind)
+    at, torque = moved(let, own, moving, base), own.rotor * moving.accelerations[0]
+    return {"F": wrench_of(let, own, at), "torque_own": [torque], **carried(let, own, at)}
 
 
 def hinge_power(
-    let,
-    joint: V2,
-    moving: HingeMotion,
-    rotor: V1,
-    body: V13,
-    base: FrameMotion,
-    virtual: VirtualMotion,
-    axis="x",
-    form="",
-    geared=False,
+    let, hinge: Hinge, moving: HingeMotion, base: FrameMotion, virtual: VirtualMotion, kind="x"
 ) -> dict:
-    """Power of the body's inertial wrench under a virtual motion; both motions carried on."""
-    at, own = (
-        _moved(let, axis, joint, moving.rates, moving.accelerations, base),
-        body_of(form, body),
-    )
-    F, back = let("F", _wrench(let, own, at)), turn_of(axis, joint).T
-    turn = let("turn", back * virtual.w_virtual + moving.virtual_rates[0] * unit(axis))
-    slide = let("slide", back * virtual.u_virtual)
+    """Power of the body's inertial wrench and of the rotor under a virtual motion; both motions
+    carried on.
+    """
+    own = known(hinge, kind)
+    at = moved(let, own, moving, base)
+    F, rate = let("F", wrench_of(let, own, at)), moving.virtual_rates[0]
+    turn = let("turn", own.turn.T * virtual.w_virtual + rate * own.axis)
+    slide = let("slide", own.turn.T * virtual.u_virtual)
     power = F[0:3, :].dot(slide) + F[3:6, :].dot(turn)
-    if geared:
-        power += rotor[0] * moving.accelerations[0] * moving.virtual_rates[0]
-    carried = {"w_virtual": turn, "u_virtual": slide + turn.cross(own.tip)}
-    return {"power": [power], **_carried(let, own, at), **carried}
+    power += own.rotor * moving.accelerations[0] * rate
+    beyond = {"w_virtual": turn, "u_virtual": slide + turn.cross(own.tip)}
+    return {"power": [power], **carried(let, own, at), **beyond}
 
 
-def hinge_momentum(
-    let,
-    joint: V2,
-    rates: V1,
-    rotor: V1,
-    body: V13,
-    w: V3,
-    u: V3,
-    axis="x",
-    form="",
-    geared=False,
-) -> dict:
+def hinge_momentum(let, hinge: Hinge, moving: HingeMotion, w: V3, u: V3, kind="x") -> dict:
     """Carry angular and linear velocity over the hinge; momentum at the joint, kinetic energy."""
-    own, back = body_of(form, body), turn_of(axis, joint).T
-    w, u = let("w_here", back * w + rates[0] * unit(axis)), let("u_here", back * u)
+    own, rate = known(hinge, kind), moving.rates[0]
+    w, u = let("w_here", own.turn.T * w + rate * own.axis), let("u_here", own.turn.T * u)
     p = let("p", own.mass * u + w.cross(own.first))
     L = let("L", symmetric(own.about) * w + own.first.cross(u))
-    twice = u.dot(p) + w.dot(L) + (rotor[0] * rates[0] ** 2 if geared else 0)
-    return {"F": Matrix([p, L]), "kinetic": [twice / 2], "w": w, "u": u + w.cross(own.tip)}
+    kinetic = (u.dot(p) + w.dot(L) + own.rotor * rate**2) / 2
+    return {"F": Matrix([p, L]), "kinetic": [kinetic], "w": w, "u": u + w.cross(own.tip)}
 
 
-def gather_hinge(
-    let,
-    joint: V2,
-    twice: V5,
-    rotor: V1,
-    body: V13,
-    mass: V1,
-    h: V3,
-    I: V6,
-    axis="x",
-    form="",
-    geared=False,
-) -> dict:
+def gather_hinge(let, hinge: Hinge, mass: V1, h: V3, I: V6, kind="x") -> dict:
     """Composite of the body and all beyond in the frame before the hinge, its momentum column, and
     its entry of H.
     """
-    own, (i, j, k) = body_of(form, body), axes_of(axis)
+    own = known(hinge, kind)
     at_tip = let("at_tip", h + mass[0] * own.tip)
     spread = let("spread", (h + at_tip).dot(own.tip))
-    moved = symmetric(I) + spread * eye(3) - (h * own.tip.T + own.tip * at_tip.T)
-    h, I = let("h_sum", at_tip + own.first), let("I_sum", entries(moved) + own.about)
-    turn, e = turn_of(axis, joint), unit(axis)
+    about = symmetric(I) + spread * eye(3) - (h * own.tip.T + own.tip * at_tip.T)
+    h, I = let("h_sum", at_tip + own.first), let("I_sum", entries(about) + own.about)
+    column = Matrix([own.axis.cross(h), symmetric(I) * own.axis])
     return {
         "mass": mass + Matrix([own.mass]),
-        "h": turn * h,
-        "I": turned_inertia(let, (i, j, k), turn, twice, I),
-        "column": turned(let, "out", turn, Matrix([e.cross(h), symmetric(I) * e])),
-        "H_own": [I[k] + (rotor[0] if geared else 0)],
+        "h": own.turn * h,
+        "I": turned_inertia(let, own.axes, own.turn, hinge.twice, I),
+        "column": turned(let, "out", own.turn, column),
+        "H_own": [I[own.axes[2]] + own.rotor],
     }
 
 
-def gather_hinge_wrench(
-    let, joint: V2, body: V13, F: V6, F_next: V6, torque_own: V1, axis="x", form="", geared=False
-) -> dict:
+def gather_hinge_wrench(let, hinge: Hinge, F: V6, F_next: V6, torque_own: V1, kind="x") -> dict:
     """Add what all beyond passes on, read the torque, pass on to the frame before the hinge."""
-    force = F_next[0:3, :]
-    moved = Matrix([force, F_next[3:6, :] + body_of(form, body).tip.cross(force)])
-    total = let("total", (F if form != "bare" else zeros(6, 1)) + moved)
-    torque = total[3 + axes_of(axis)[2]] + (torque_own[0] if geared else 0)
-    return {"F_next": turned(let, "out", turn_of(axis, joint), total), "torque": [torque]}
+    own, force = known(hinge, kind), F_next[0:3, :]
+    beyond = Matrix([force, F_next[3:6, :] + own.tip.cross(force)])
+    total = let("total", beyond if "bare" in kind else F + beyond)
+    torque = total[3 + own.axes[2]] + (torque_own[0] if "geared" in kind else 0)
+    return {"F_next": turned(let, "out", own.turn, total), "torque": [torque]}
 
 
-def gather_hinge_moment(let, joint: V2, body: V13, mass: V1, h: V3, axis="x", form="") -> dict:
+def gather_hinge_moment(let, hinge: Hinge, mass: V1, h: V3, kind="x") -> dict:
     """Mass and first moment of the body and all beyond, in the frame before the hinge."""
-    own = body_of(form, body)
+    own = known(hinge, kind)
     moment = let("moment", h + mass[0] * own.tip + own.first)
-    return {"mass": mass + Matrix([own.mass]), "h": turn_of(axis, joint) * moment}
+    return {"mass": mass + Matrix([own.mass]), "h": own.turn * moment}

@@ -13,20 +13,13 @@ from .mechanism import Mechanism, Place, Segments, simplified
 from .mixed import NOTHING
 
 BODIES = {"limb": hinge.along_body, "placed_limb": hinge.placed_body}
-BARE = "bare"
-
-
-def form_of(kind: str, hinge_kind: str) -> str:
-    """Return which numbers of a hinge's body are known to be 0."""
-    bare = hinge_kind.endswith(BARE)
-    return BARE if bare else {"limb": "along", "placed_limb": ""}[kind]
+BARE = "bare"  # ends the kind of hinges without bodies
 
 
 def prepare_hinges(draft: Draft, state: State, doubled: bool = False) -> Segments:
     """Bodies and rotors, and the trigonometry of every hinge."""
     tail, bodies, fill = draft.tail, 0, BODIES[draft.tail.kind]
-    sizes = {"joint": 2, "body": 13} | ({"twice": 5} if doubled else {})
-    sizes |= {"rotor": 1} if tail.shape.rotors else {}
+    sizes = {"joint": 2, "rotor": 1, "body": 13} | ({"twice": 5} if doubled else {})
     arrays = {name: draft.array(name, size, tail.segments) for name, size in sizes.items()}
     segments = Segments(state, arrays)
     for stretch in tail.stretches:
@@ -51,8 +44,8 @@ def samples_of_hinges(draft: Draft, state: State, segments: Segments | None) -> 
 
 
 def rotor_torques(draft: Draft) -> Array | None:
-    """Declare the torques of all rotors, if there are any."""
-    return draft.array("torque_own", 1, draft.tail.segments) if draft.tail.shape.rotors else None
+    """Declare the torques of all rotors."""
+    return draft.array("torque_own", 1, draft.tail.segments)
 
 
 def move_hinge(
@@ -84,23 +77,18 @@ def hinge_momentum(
 
 
 @cache
-def limb(kind: str, geared: bool, stretch: str = "") -> Mechanism:
+def limb(kind: str, geared: bool, hinges: str = "") -> Mechanism:
     """Return the steps of hinges of one kind, such as "x" or "y_bare"; outside of loops over
     segments only the data of all hinges are there.
     """
-    steps = dict(NOTHING)
-    if stretch:
-        setting = {"axis": stretch[0], "form": form_of(kind, stretch)}
-        gear = setting | {"geared": geared}
-        steps |= {
-            "move": partial(move_hinge, derive(hinge.hinge_motion, **gear)),
-            "momentum": partial(hinge_momentum, derive(hinge.hinge_momentum, **gear)),
-            "pose": derive(hinge.hinge_pose, **setting),
-            "twist": derive(hinge.hinge_twist, axis=stretch[0]),
-            "gather": derive(hinge.gather_hinge, **gear),
-            "gather_wrench": derive(hinge.gather_hinge_wrench, **gear),
-            "gather_moment": derive(hinge.gather_hinge_moment, **setting),
-            "power": derive(hinge.hinge_power, **gear),
-        }
-    steps |= {"prepare": prepare_hinges, "prepare_samples": samples_of_hinges}
-    return Mechanism(**steps | {"declare_torques": rotor_torques})
+    steps = {**NOTHING, "prepare": prepare_hinges, "prepare_samples": samples_of_hinges}
+    steps["declare_torques"] = rotor_torques
+    if hinges:
+        own = hinges + "_along" * (kind == "limb" and BARE not in hinges) + "_geared" * geared
+        names = {"pose": hinge.hinge_pose, "twist": hinge.hinge_twist, "power": hinge.hinge_power}
+        names |= {"gather": hinge.gather_hinge, "gather_wrench": hinge.gather_hinge_wrench}
+        names |= {"gather_moment": hinge.gather_hinge_moment}
+        steps |= {name: derive(function, kind=own) for name, function in names.items()}
+        steps["move"] = partial(move_hinge, derive(hinge.hinge_motion, kind=own))
+        steps["momentum"] = partial(hinge_momentum, derive(hinge.hinge_momentum, kind=own))
+    return Mechanism(**steps)
