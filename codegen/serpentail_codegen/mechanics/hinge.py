@@ -1,11 +1,11 @@
 """The steps of a hinge: a joint that turns about one axis, and the body beyond it.
 
-``joint`` = (cos, sin) of its angle. ``body`` = (m, b, I, r): mass, first moment (3) and inertia (xx,
-yy, zz, xy, xz, yz) about the joint, and where the next joint is (3). ``rotor`` is the inertia of the
-motor's rotor, times the square of the gear ratio, which resists the angle alone. The setting
-``kind`` begins with the axis, x, y or z of the frame before, and says what is 0: "along": all of the
-body that is not on -y; "bare": the whole body; without "geared" the rotor. Other vectors are as in
-`link`.
+``joint`` = (cos, sin) of its angle. ``body`` = (m, b, I, r): mass, first moment (3) and inertia
+(xx, yy, zz, xy, xz, yz) about the joint, and where the next joint is (3). ``rotor`` is the inertia
+of the motor's rotor, times the square of the gear ratio, which resists the angle alone. The setting
+``kind`` begins with the axis, x, y or z of the frame before, and says what is 0: "along": all of
+the body that is not on -y; "bare": the whole body; without "geared" the rotor. Other vectors are as
+in `link`.
 """
 
 from dataclasses import dataclass

@@ -35,6 +35,8 @@ class Actuation:
         phases = phases_of(controller)
         begins = [begin for begin, _ in phases]
         all_parts = [parts_of(each, self.nt).since(begin) for begin, each in phases]
+        for each in all_parts:
+            self._refuse_passive(each)
         self.parts = [*map(self._available, all_parts)]
         if self.of_python:  # the user's: SciPy's methods work with their own
             self.float_errors = np.geterr()
@@ -95,6 +97,28 @@ class Actuation:
             if parts.state is not None:
                 info |= parts.state.info()
         return info
+
+    def _refuse_passive(self, parts: Parts) -> None:
+        """SimulationError if a torque would act on a passive coordinate."""
+        if parts.pfl is not None and not all(self.model.layout.driven):
+            raise SimulationError(
+                f"Pfl: needs a torque for each coordinate, and {self.model.name} has passive ones: "
+                "use another controller"
+            )
+        curve = None if parts.torques is None else parts.torques.coefficients
+        for acts in (parts.damping, None if curve is None else (curve != 0).any(axis=(0, 2))):
+            if acts is not None:
+                self._refuse_torques(acts, "")
+
+    def _refuse_torques(self, torques: np.ndarray, where: str) -> None:
+        """SimulationError if one of nt torques that is not 0 belongs to a passive coordinate."""
+        wrong = (torques != 0) & ~np.array(self.model.layout.driven)
+        if wrong.any():
+            name = self.model.names.tail[int(wrong.argmax())]
+            raise SimulationError(
+                f"the controller drives {name}{where}, which is passive: give it 0, or set "
+                'drive = "torque" in the scene'
+            )
 
     def _available(self, parts: Parts) -> Parts:
         """Return the parts for this model: PFL in Python if its C is missing."""
@@ -179,6 +203,7 @@ class Actuation:
             raise SimulationError(
                 f"the controller gave {given!r:.200} at t = {t:.6g} s, not {self.nt} finite torques"
             )
+        self._refuse_torques(torques, f" at t = {t:.6g} s")
         return torques
 
 
