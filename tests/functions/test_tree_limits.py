@@ -65,6 +65,49 @@ def test_it_does_not_matter_which_chain_is_the_tail():
     assert block_error(other.forward_dynamics(q2, v2, tau2), expected) < most
 
 
+def test_hinges_about_x_and_z_are_a_segment_of_one_link():
+    """A bare hinge and one with a link are a segment of one link: the same H, C and v_dot."""
+    place = {"mount": [0.01, 0.02, -0.003], "mount_angles": [0.4, -0.2, 1.3]}
+    link = {"length": 0.03, "mass": 2e-3, "inertia": [4e-8, 2e-9, 3.9e-8]}
+    joints = [{"name": "a"}, {"name": "b", "axis": "z", **link}]
+    limb = built("limb", chain={"leg": place | {"kind": "limb", "joints": joints}})
+    own = {**link, "link_inertia": link["inertia"], "links": 1}
+    del own["inertia"]
+    chain = built("one", chain={"leg": place | {"kind": "articulated", "segments": [own]}})
+    for q, v, _, tau in own_tails.states(limb.nq):
+        H = chain.mass_matrix(q)
+        assert mass_matrix_error(limb.mass_matrix(q), H) < 1e-14
+        assert force_error(limb.bias_force(q, v), chain.bias_force(q, v), H) < 1e-13
+        most, expected = FORWARD * equilibrated_condition(H), chain.forward_dynamics(q, v, tau)
+        assert block_error(limb.forward_dynamics(q, v, tau), expected) < most
+
+
+def test_a_reaction_wheel_turns_the_body_back():
+    """By J / (J + I) of its own turn, if all lies on its axis; its rotor only resists the motor."""
+    J, rotor, moments = 7e-8, 2e-7, [4e-8, 7e-8, 4e-8]
+    spin = {"name": "spin", "axis": "y", "tip": [0, 0, 0], "mass": 3e-3, "inertia": moments}
+    wheel = {"kind": "limb", "mount": [0, 0.01, 0], "joints": [spin | {"rotor": rotor}]}
+    along = zoo.TORSO | {"tail_mount": [0, -0.04, 0]}
+    model = built("wheel", chain={"wheel": wheel}, parameters=along)
+    H, (_, Iy, _) = model.mass_matrix(model.neutral().q), along["torso_inertia"]
+    of_tail = 3 * model.parameters["link_inertia"][1]
+    assert H[4, 8] / H[4, 4] == pytest.approx(J / (J + Iy + of_tail), rel=1e-12)
+    assert H[8, 8] == pytest.approx(J + rotor, rel=1e-12)
+
+
+def test_a_limb_without_mass_changes_nothing():
+    leg = zoo.LIMBS["leg"] | {"joints": [dict(each) for each in zoo.LIMBS["leg"]["joints"][1:]]}
+    for joint in leg["joints"]:
+        joint |= {"mass": 1e-14, "inertia": [1e-20, 1e-21, 1e-20]}
+        for key in ("radius", "stiffness", "rest", "stops", "stop_stiffness"):
+            joint.pop(key, None)
+    tree, alone = built(chain={"leg": leg}), built()
+    q, v, _, tau = next(own_tails.states(tree.nq, 1))
+    tau[2:] = 0
+    v_dot = alone.forward_dynamics(q[:9], v[:8], tau[:2])
+    assert block_error(tree.forward_dynamics(q, v, tau)[:8], v_dot) < 1e-9
+
+
 # ---- the gecko -----------------------------------------------------------------------------------
 
 
@@ -86,6 +129,19 @@ def test_a_pair_at_equal_angles_neither_yaws_nor_rolls(gecko):
     for pair in ("hind", "fore"):
         right, left = (v_dot[gecko.layout[f"{pair}_{side}"].v] for side in ("right", "left"))
         np.testing.assert_allclose(left, right, rtol=1e-11)
+
+
+def test_equal_legs_of_a_rat_neither_yaw_nor_roll():
+    rat = st.build("rat_legs", targets=["c"])
+    q, v, tau = np.zeros(rat.nq), np.zeros(rat.nv), np.zeros(rat.nu)
+    q[3] = 1
+    for side in ("right", "left"):
+        leg = rat.layout[f"hind_{side}"]
+        q[leg.q], v[leg.v], tau[leg.tau] = (0.3, -0.5, 0.2), (2, -7, 3), (1e-3, 3e-3, -1e-3)
+    v_dot = rat.forward_dynamics(q, v, tau)
+    assert np.abs(v_dot[[0, 4, 5]]).max() < 1e-12 * np.abs(v_dot).max()
+    right, left = (v_dot[rat.layout[f"hind_{side}"].v] for side in ("right", "left"))
+    np.testing.assert_allclose(left, right, rtol=1e-11)
 
 
 @pytest.mark.parametrize("method", ["tsit5", "dp8", "rk4", "ros34pw2", "implicit_euler"])

@@ -1,9 +1,10 @@
 """Tables [chain.NAME] of scenes: what is read, what is refused, and that scenes survive a trip."""
 
+import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.basics.errors import ExportError
+from serpentail.basics.errors import ExportError, SimulationError
 from serpentail_codegen.scene.parse import load_scene, parse_scene, scene_to_dict
 from serpentail_codegen.scene.problems import SceneError
 from serpentail_scene.source import tables_of
@@ -15,6 +16,7 @@ GECKO = tables_of(SCENES / "gecko_legs.toml")
 LEG = GECKO["chain"]["hind"]
 PLAIN = {"kind": "articulated", "segments": 1, "links": 1, "mount": [0, 0, 0]}
 PLAIN |= {"mass": "1 g", "length": "2 cm"}
+BONE = {"name": "knee", "length": "4 cm", "mass": "3 g", "radius": "4 mm"}
 
 
 def problems(**keys):
@@ -33,7 +35,10 @@ def test_wrong_chains_are_refused():
         ("chain.a.mass", None, {"a": {k: x for k, x in PLAIN.items() if k != "mass"}}),
         ("chain.a.mass", -1, {"a": PLAIN | {"mass": -1}}),
         ("chain.a.length", "3 kg", {"a": PLAIN | {"length": "3 kg"}}),
-        ("chain.a.kind", "limb", {"a": PLAIN | {"kind": "limb"}}),
+        ("chain.a.kind", "limbs", {"a": PLAIN | {"kind": "limbs"}}),
+        ("chain.a.segments", 1, {"a": PLAIN | {"kind": "limb"}}),
+        ("chain.a.joints", [BONE], {"a": PLAIN | {"joints": [BONE]}}),
+        ("chain.a.drive", "prescribed", {"a": PLAIN | {"drive": "prescribed"}}),
         ("chain.a.damping", -1, {"a": PLAIN | {"damping": -1}}),
         ("chain.tail", "tail", {"tail": PLAIN}),
         ("chain.torso", "torso", {"torso": PLAIN}),
@@ -50,6 +55,92 @@ def test_wrong_chains_are_refused():
         len(parse_scene(GECKO | {"chain": {f"c{k}": PLAIN for k in range(40)}}, "x").chains) == 40
     )
     assert parse_scene(GECKO | {"chain": {}}, "x").chains == ()
+
+
+def limb(*joints, **keys):
+    return {"kind": "limb", "mount": [0, 0, 0], "joints": list(joints)} | keys
+
+
+def without(*keys):
+    return {key: x for key, x in BONE.items() if key not in keys}
+
+
+def test_wrong_limbs_are_refused():
+    for field, found, table in (
+        ("joints", None, {"kind": "limb", "mount": [0, 0, 0]}),
+        ("joints", [], limb()),
+        ("joints", 3, limb() | {"joints": 3}),
+        ("joints[0]", 3, limb(3)),
+        ("joints[0].name", None, limb(without("name"))),
+        ("joints[0].name", "Knee", limb(BONE | {"name": "Knee"})),
+        ("joints[1].name", "knee", limb(BONE, BONE)),
+        ("joints[0].axis", "w", limb(BONE | {"axis": "w"})),
+        ("joints[0].axis", 1, limb(BONE | {"axis": 1})),
+        ("joints[0].axis", "y", limb({"name": "a", "axis": "y"}, BONE | {"axis": "y"})),
+        ("joints[0].drive", "motor", limb(BONE | {"drive": "motor"})),
+        ("joints[0].mas", 3, limb(BONE | {"mas": 3})),
+        ("joints[0].mass", 0, limb(BONE | {"mass": 0})),
+        ("joints[0].mass", "3 m", limb(BONE | {"mass": "3 m"})),
+        ("joints[1].mass", None, limb(BONE, {"name": "end"})),
+        ("joints[0].length", None, limb(without("length"))),
+        ("joints[0].length", 0.04, limb(without("mass"))),
+        ("joints[0].length", 0.04, limb(BONE | {"tip": [0, 0, 0]})),
+        ("joints[0].inertia", None, limb(without("radius"))),
+        ("joints[0].inertia", (1.0, 1.0, 1.0), limb(BONE | {"inertia": [1, 1, 1]})),
+        ("joints[0].inertia", [1, 1, 3], limb(without("radius") | {"inertia": [1, 1, 3]})),
+        ("joints[0].radius", 0.004, limb(without("length") | {"tip": [0, -1, 0]})),
+        ("joints[0].rest", 1.0, limb(BONE | {"rest": 1})),
+        ("joints[0].stops", (1.0, -1.0), limb(BONE | {"stops": [1, -1], "stop_stiffness": 1})),
+        ("joints[0].stop_stiffness", None, limb(BONE | {"stops": [-1, 1]})),
+        ("joints[0].rotor", -1, limb(BONE | {"rotor": -1})),
+        ("mount", None, {"kind": "limb", "joints": [BONE]}),
+        ("mount_angles", [0, 0], limb(BONE, mount_angles=[0, 0])),
+        ("stiffness", 1, limb(BONE, stiffness=1)),
+        ("on", "fore", limb(BONE, on="fore")),
+    ):
+        with row(field, found):
+            assert (f"chain.a.{field}", found) in problems(chain={"a": table})
+
+
+def test_what_a_limb_leaves_out_has_defaults():
+    """The COM half way, an ellipsoid of the radius, no spring; only one of two has a damper."""
+    two = limb(BONE | {"damping": 2e-4}, BONE | {"name": "b", "stops": "-20, 30 deg"})
+    two["joints"][1]["stop_stiffness"] = 1
+    p = parse_scene(GECKO | {"chain": {"a": two}}, "x").parameters
+    assert p["a_link_lengths"] == (0.04, 0.04)
+    assert p["a_link_centers"] == (0.02, 0.02)
+    across, along = 3e-3 / 5 * (0.02**2 + 0.004**2), 3e-3 / 5 * 2 * 0.004**2
+    assert p["a_link_inertias"] == pytest.approx((across, along, across) * 2, rel=1e-15)
+    assert p["a_damping"] == (2e-4, 0)
+    assert p["a_stop_lower"] == pytest.approx((-1e6, -0.34906585))
+    assert "a_rotors" not in p
+    assert "a_link_tips" not in p
+    offset = parse_scene(GECKO | {"chain": {"a": limb(BONE | {"center": [1, 0, 0]})}}, "x")
+    assert offset.parameters["a_link_tips"] == (0, -0.04, 0)
+    changed = {"parameters": {"a_link_masses": "5 g"}}
+    assert parse_scene(GECKO | {"chain": {"a": limb(BONE)}} | changed, "x").parameters[
+        "a_link_masses"
+    ] == pytest.approx(5e-3)
+
+
+def test_passive_coordinates_have_no_torques():
+    chain = {"a": limb(BONE | {"drive": "passive", "stiffness": 0.01}, BONE | {"name": "b"})}
+    assert ("functions", "pfl") in problems(chain=chain, functions=["pfl"])
+    assert "pfl" not in parse_scene(GECKO | {"chain": chain, "functions": "all"}, "x").functions
+    model = st.build("gecko_legs", chain=chain)
+    assert model.layout.driven == (True, True, False, True)
+    assert model.layout["a"].names == ("a_knee", "a_b")
+    start = {"t_span": 0.01}
+    torques = np.array([1e-4, 0, 0, 2e-4])
+    st.simulate(
+        model, model.neutral().q, np.zeros(model.nv), **start, controller=lambda *_: torques
+    )
+    wrong = np.array([0, 0, 1e-4, 0])
+    for controller in (lambda *_: wrong, st.Damping(1e-3), st.TorqueTable([0, 1], [wrong, wrong])):
+        with row(controller), pytest.raises(SimulationError, match="a_knee"):
+            st.simulate(
+                model, model.neutral().q, np.zeros(model.nv), **start, controller=controller
+            )
 
 
 def test_what_trees_lack_is_refused():
@@ -75,6 +166,7 @@ def test_a_scene_with_chains_survives_a_trip():
         "gecko": load_scene(SCENES / "gecko_legs.toml"),
         "larger": parse_scene(GECKO | {"body": {"scale": 2.0}}, "larger"),
         "tree": zoo.scene("tree"),
+        "limbs": zoo.scene("limbs"),
         "changed": parse_scene(GECKO | {"parameters": {"hind_mount": [0, 0.01, 0]}}, "changed"),
     }.items():
         with row(name):
