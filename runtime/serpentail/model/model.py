@@ -78,8 +78,7 @@ class Model(ModelMethods, ModelStates, NearNames):
     fixed : bool
         Whether the base is fixed, so that only the tail moves.
     nq, nv, nu : int
-        Lengths of ``q``, ``v`` and ``tau``: 7 + nt, 6 + nt and nt, with nt two for each segment,
-        and one for a hinge; on a fixed base all are nt.
+        Lengths of ``q``, ``v``, ``tau``: 7 + nt, 6 + nt, nt (``layout.nt``); nt on a fixed base.
     coordinates, velocities, torques : list of str
         Names of their numbers, such as "z", "vz", "alpha_1", "alpha_1_dot" and "tau_alpha_1".
     contacts : dict
@@ -102,10 +101,10 @@ class Model(ModelMethods, ModelStates, NearNames):
     Notes
     -----
     A configuration ``q`` (nq,) holds the position of B in the world (m), the quaternion
-    (w, x, y, z) from body to world axes, and the 2m tail coordinates (rad). The quaternion may
+    (w, x, y, z) from body to world axes, and the nt tail coordinates (rad). The quaternion may
     have any norm except 0. The coordinates of a segment are the joint angles (alpha, beta) that
-    all its links share; the bend components (a, b) of an arc; or the polar angles (phi, theta)
-    of an arc if the scene has ``coordinates = "polar"``, which serves comparisons only.
+    all its links share; the bend components (a, b) of an arc, or its polar angles (phi, theta)
+    if the scene has ``coordinates = "polar"``, which serves comparisons only; a hinge's angle.
 
     A velocity ``v`` (nv,) holds the velocity of B in the world (m/s), the angular velocity in
     the body frame (rad/s), and the rates of the tail coordinates (rad/s). On a fixed base ``q``

@@ -31,7 +31,8 @@ class Names:
     @classmethod
     def of(cls, layout: Layout, model: Model | None) -> Names:
         """Return the names of a layout; of a motion without model, whose tail is of no kind."""
-        tail = tuple(f"{name}_{i + 1}" for i in range(layout.segments) for name in WITHOUT_MODEL)
+        each = (f"{name}_{i + 1}" for i in range(layout.segments) for name in WITHOUT_MODEL)
+        tail = tuple(each)[: layout.nt]
         if model is not None:
             tail = tuple(name for chain in model.layout.chains for name in chain.names)
         torso_q, torso_v = ({}, {}) if layout.fixed else (TORSO_Q, TORSO_V)

@@ -118,10 +118,6 @@ def totals(values: Values, owner: str = "") -> dict[str, Any]:
         own = [np.sum(values[each], axis=-1) for each in names if each in values]
         if own:
             found[name_in(owner, name)] = sum(own)
-    tips = values.get(name_in(owner, "link_tips"))
-    if tips is not None:
-        lengths = np.linalg.norm(np.reshape(tips, (*np.shape(tips)[:-1], -1, 3)), axis=-1)
-        found[name_in(owner, "tail_length")] = lengths.sum(axis=-1)
     return found
 
 

@@ -150,7 +150,7 @@ class Trajectory(Asked, Exports, Showable):
     @property
     def layout(self) -> Layout:
         """Where the parts of q, v and tau are."""
-        return layout_of(self.q, self.v)
+        return self.model.layout if self.model else layout_of(self.q, self.v)
 
     @property
     def pose(self) -> Array:

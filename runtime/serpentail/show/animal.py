@@ -130,7 +130,7 @@ def _radii_of(model: Model, chain: ChainLayout) -> Array:
     p, points = values_of(chain, model.parameters), model.manifest["dimensions"]["links"]
     counts = np.broadcast_to(points, model.segments)[chain.segments]
     count = int(counts.sum())
-    usual, radii = usual_radius(p), np.zeros(count)
+    usual, radii = usual_radius(p) if "tail_length" in p else 0.0, np.zeros(count)
     if not {"link_masses", "arc_masses"} & p.keys():
         return usual * (THICKER - np.arange(count) / (2 * count + 2))
     kinds = model.kinds[chain.segments]
