@@ -142,8 +142,9 @@ function bent(facts) {
   const { MOST_BEND: most, DEGREES } = live.limits;
   return live.kinds.flatMap((kind, m) => {
     const at = live.firsts[m];
+    const numbersOf = [at, at + (kind !== "hinge")];
     const [bend, k] = largest(rows, (row) => {
-      const [first, second] = [at, at + (kind !== "hinge")].map((i) => Math.abs(facts.angle(row, i)));
+      const [first, second] = numbersOf.map((i) => Math.abs(facts.angle(row, i)));
       if (kind !== "continuum") return live.joints[at] * Math.max(first, second);
       return live.polar ? second : norm(first, second);
     });
