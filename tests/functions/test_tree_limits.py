@@ -95,6 +95,21 @@ def test_a_reaction_wheel_turns_the_body_back():
     assert H[8, 8] == pytest.approx(J + rotor, rel=1e-12)
 
 
+def test_a_wheel_may_spin_in_the_body():
+    """The robot's tails begin in the body and its wheel is there: no reason to warn; many at once
+    are what each is alone.
+    """
+    robot = st.build("robot_two_tails", targets=["c"])
+    v = np.zeros((3, robot.nv))
+    v[:, robot.layout["wheel"].v] = [[0], [40], [80]]
+    q = np.tile(robot.state(height=1.0).q, (3, 1))
+    runs = st.simulate(robot, q, v, 0.2, output_step=0.05)
+    alone = st.simulate(robot, q[2], v[2], 0.2, output_step=0.05)
+    assert not alone.warnings
+    assert alone["wheel_spin"][-1] > 15
+    assert (runs.q[2] == alone.q).all()
+
+
 def test_a_limb_without_mass_changes_nothing():
     leg = zoo.LIMBS["leg"] | {"joints": [dict(each) for each in zoo.LIMBS["leg"]["joints"][1:]]}
     for joint in leg["joints"]:

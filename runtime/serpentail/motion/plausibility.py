@@ -131,10 +131,11 @@ def torso_is_known(model: Model) -> bool:
 
 
 def depth_in_torso(model: Model, q: Array) -> Array:
-    """Return how far tails go into the torso, (K,), of states q (K, nq); see ``sunk``."""
+    """Return how far chains go into the torso, (K,), of states q (K, nq); see ``sunk``."""
     from_b = model.tail_points(q) - q[:, None, POSITION]
     own = np.einsum("kij,kpi->kpj", rotation_matrix(q[:, QUATERNION]), from_b)
-    return sunk(own / semi_axes(model))
+    scaled = own / semi_axes(model)
+    return np.max([sunk(scaled[:, chain.points]) for chain in model.layout.chains], axis=0)
 
 
 def sunk(points: Array) -> Array:
@@ -188,15 +189,16 @@ def _bends(model: Model, motion: "Trajectory") -> list[str]:
 
 
 def _bend(model: Model, tail: Array) -> Array:
-    """How far the segments are bent, (K, m), rad: of joints the larger of pitch and yaw."""
+    """How far the segments are bent, (K, m), rad: of joints the larger of pitch and yaw; hinges may
+    turn on and on.
+    """
     firsts, widths = np.array(model.layout.firsts), np.array(model.layout.widths)
-    first, second = tail[:, firsts], tail[:, firsts + widths - 1]  # the same of a hinge
-    of_joints = model.joints_each * np.maximum(np.abs(first), np.abs(second))
-    if model.kind == "articulated":
-        return of_joints
+    first, second = tail[:, firsts], tail[:, firsts + widths - 1]
+    joints = model.joints_each * (widths > 1)
     if model.manifest["scene"]["coordinates"] == "polar":
         return np.abs(second)
     jointed = np.array(model.kinds) != "continuum"
+    of_joints = joints * np.maximum(np.abs(first), np.abs(second))
     return np.where(jointed, of_joints, np.hypot(first, second))
 
 

@@ -119,7 +119,7 @@ export class LiveRun {
 }
 
 // Pitch and yaw of a segment: the sum of its joints' angles, or those of an arc (phi, theta).
-const jointed = (facts, k, i) => facts.live.joints[i] * facts.angle(k, i);
+const jointed = (facts, k, i) => facts.live.joints[i >> 1] * facts.angle(k, i);
 function polar(facts, k, i) {
   const [phi, theta] = [facts.angle(k, i & ~1), facts.angle(k, i | 1)];
   return theta * (i % 2 ? Math.sin(phi) : Math.cos(phi));

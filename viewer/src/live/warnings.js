@@ -141,11 +141,9 @@ function bent(facts) {
   const { live, rows, t } = facts;
   const { MOST_BEND: most, DEGREES } = live.limits;
   return live.kinds.flatMap((kind, m) => {
-    const at = live.firsts[m];
-    const numbersOf = [at, at + (kind !== "hinge")];
     const [bend, k] = largest(rows, (row) => {
-      const [first, second] = numbersOf.map((i) => Math.abs(facts.angle(row, i)));
-      if (kind !== "continuum") return live.joints[at] * Math.max(first, second);
+      const [first, second] = [2 * m, 2 * m + 1].map((i) => Math.abs(facts.angle(row, i)));
+      if (kind === "articulated") return live.joints[m] * Math.max(first, second);
       return live.polar ? second : norm(first, second);
     });
     const remedy = live.words[bend > DEGREES ? "degrees" : "damp"];

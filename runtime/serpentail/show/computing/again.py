@@ -56,6 +56,7 @@ def computed_again(model: Model, motion: Trajectory, most: int) -> dict[str, Any
     unfit = model.manifest["real"] != "double" or model.manifest["scene"]["baked"]
     reasons = {
         'the model needs real = "double" and baked = false': unfit,
+        "it has chains besides the tail": len(model.layout.chains) > 1,
         f"{method} is a method of Python: take one in C, such as tsit5": method in SCIPY,
         "it ends at an event: leave out stop_at": again.ground.stop_at,
         f"it has {rows} samples: a longer output_step gives {most} or fewer": rows > most,
@@ -99,8 +100,7 @@ def _data(model: Model, again: RunAgain, run: CompiledRun) -> dict[str, Any]:
         "nt": model.nu,
         "fixed": model.fixed,
         "groups": model.contacts,
-        "joints": np.repeat(model.joints_each, model.layout.widths).tolist(),
-        "firsts": model.layout.firsts,
+        "joints": model.joints_each.tolist(),
         "kinds": model.kinds,
         "pieces": model.manifest["dimensions"]["total"],
         "polar": model.manifest["scene"]["coordinates"] == "polar",

@@ -73,12 +73,10 @@ def _start(run: CompiledRun, image: Image) -> Iterator[Knob]:
             words = ("start", f"spin {'xyz'[k]}", "rad/s")
             yield _knob(words, spin, [place], turns, slider=(-most, most))
     polar = model.manifest["scene"]["coordinates"] == "polar"
-    each = np.repeat(model.joints_each, model.layout.widths)
-    for k, joints in enumerate([] if polar else each):
+    for k, joints in enumerate([] if polar else np.repeat(model.joints_each, 2)):
         at = model.layout.tail_q.start + k
         bend = model.state, {"bend": wrong[k, : model.nu].tolist()}
-        label = f"bend {k // 2 + 1} {('pitch', 'yaw')[k % 2]}"
-        words = ("start", model.names.tail[k] if model.layout.hinges else label, "deg")
+        words = ("start", f"bend {k // 2 + 1} {('pitch', 'yaw')[k % 2]}", "deg")
         value, places = np.degrees(joints * q0[at]).round(TIDY), [q + REAL * at]
         yield _knob(words, value, places, bend, scale=np.radians(1) / joints, slider=TURN)
 
