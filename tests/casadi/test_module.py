@@ -32,6 +32,7 @@ SHAPES = {
     "tail_point_jacobians": (["q"], {"J": "rows nv"}),
     "mass_matrix_world": (["q"], {"H": "nv nv"}),
     "bias_force_world": (["q", "v"], {"force": "nv 1"}),
+    "mount_wrench": (["q", "v", "v_dot"], {"mount_force": "3 1", "mount_moment": "3 1"}),
     "pfl": (["q", "v", "accelerations"], {"tau": "nt 1"}),
     "tracked_dynamics": (["q", "v", "accelerations"], {"tau": "nt 1", "v_dot": "nv 1"}),
 }

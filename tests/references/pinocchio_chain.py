@@ -39,6 +39,12 @@ class PinocchioChain:
         full_v_dot[:3] -= np.cross(v[3:6], full_v[:3])
         return transform.T @ pin.rnea(self.model, self.data, full_q, full_v, full_v_dot)
 
+    def mount_wrench(self, q, v, v_dot):
+        """(force, moment) of the tail on the torso at the mount, torso axes."""
+        self.inverse_dynamics(q, v, v_dot)
+        turn, first = self.data.liMi[2].rotation, self.data.f[2]  # of the torso on the first joint
+        return -turn @ first.linear, -turn @ first.angular
+
     def forward_dynamics(self, q, v, tau):
         """v_dot of H v_dot + C = [0; tau]."""
         force = np.concatenate([np.zeros(6), tau]) - self.bias_force(q, v)

@@ -18,9 +18,9 @@ from .sweeps.chains import prepared
 from .sweeps.inertia import animal_inertia, column_of
 from .sweeps.loads import gather_loads
 from .sweeps.momentum import gather_kinetic, gather_momentum
-from .sweeps.pieces import IDENTITY, attitude
+from .sweeps.pieces import IDENTITY, attitude, mechanism
 from .sweeps.segments import forward_dynamics
-from .sweeps.wrenches import inertial_forces
+from .sweeps.wrenches import forward_wrenches, gather_wrenches, inertial_forces
 from .tails.mechanism import Segments
 
 # ---- H and C -------------------------------------------------------------------------------------
@@ -75,12 +75,7 @@ def assemble_inverse_dynamics(draft: Draft, arrays: dict[str, Array], world: boo
     unmoved = draft.fixed("still", [0, 0, 0])
     R = attitude(draft, state)
     segments = prepared(draft, state)
-
-    # gravity is an acceleration of the torso
-    p_ddot = draft.of_torso(v_dot, VELOCITY) if v_dot else unmoved
-    a = draft.store(torso.torso_acceleration, {"R": R, "p_ddot": p_ddot}, a=3)["a"]
-    motion = Motion(state.omega, draft.of_torso(v_dot, OMEGA) if v_dot else unmoved, a)
-    inertial_forces(draft, segments, motion, v_dot, force)
+    inertial_forces(draft, segments, _torso_motion(draft, state, R, v_dot, unmoved), v_dot, force)
     add_passive_forces(draft, state, lambda i: draft.tail.segment_v(force, i))
 
     # forces on p_dot act in world axes
@@ -89,6 +84,25 @@ def assemble_inverse_dynamics(draft: Draft, arrays: dict[str, Array], world: boo
     for part in (VELOCITY, OMEGA) if world else (VELOCITY,):
         vector = block(force, part)
         draft.step(rotations.world_vector, {"R": R, "vector": vector}, vector=vector)
+
+
+def _torso_motion(draft: Draft, state: State, R: Ref, v_dot: Array | None, unmoved: Ref) -> Motion:
+    """Return the torso's motion in its own axes; gravity is an acceleration of it."""
+    p_ddot = draft.of_torso(v_dot, VELOCITY) if v_dot else unmoved
+    a = draft.store(torso.torso_acceleration, {"R": R, "p_ddot": p_ddot}, a=3)["a"]
+    return Motion(state.omega, draft.of_torso(v_dot, OMEGA) if v_dot else unmoved, a)
+
+
+def assemble_mount_wrench(draft: Draft, arrays: dict[str, Array]) -> None:
+    """Minus the wrench that the tail's motion needs at its mount (A1 to A12)."""
+    state, v_dot = draft.state(arrays["q"], arrays["v"]), arrays["v_dot"]
+    R = attitude(draft, state)
+    motion = _torso_motion(draft, state, R, v_dot, draft.zero(3))
+    with draft.on(draft.tail.chains[0]):
+        segments = mechanism(draft).prepare(draft, state.on(draft.tail), False)
+        total = gather_wrenches(draft, segments, forward_wrenches(draft, segments, motion, v_dot))
+    writes = {name: arrays[name][0] for name in ("mount_force", "mount_moment")}
+    draft.step(torso.wrench_on_torso, total, **writes)
 
 
 # ---- forward dynamics ----------------------------------------------------------------------------
@@ -196,5 +210,6 @@ ASSEMBLIES: dict[str, Assembly] = {
     "energy": assemble_energy,
     "momentum": assemble_momentum,
     "mass_matrix_world": partial(assemble_mass_matrix, world=True),
+    "mount_wrench": assemble_mount_wrench,
     "bias_force_world": partial(assemble_inverse_dynamics, world=True),
 }

@@ -76,6 +76,11 @@ def torso_wrench(
     return {"force": force + torso_mass[0] * a, "moment": moment + tail_mount.cross(force) + euler}
 
 
+def wrench_on_torso(let, F_next: V6) -> dict:
+    """What the tail exerts on the torso at its mount."""
+    return {"mount_force": -F_next[0:3, :], "mount_moment": -F_next[3:6, :]}
+
+
 def torso_momentum(
     let, tail_mount: V3, torso_mass: V1, torso_inertia: V3, w: V3, u_torso: V3, F_next: V6
 ) -> dict:

@@ -32,7 +32,7 @@ FIXED = (
     *("energy", "momentum", "tail_points", "center_of_mass"),
     *("inverse_dynamics_derivatives", "forward_dynamics_derivatives"),
     *("inverse_dynamics_parameter_derivatives", "forward_dynamics_parameter_derivatives"),
-    *("pfl", "implicit", "rollout"),
+    *("pfl", "implicit", "rollout", "mount_wrench"),
 )
 # of several chains
 OF_TREES = (
@@ -41,7 +41,7 @@ OF_TREES = (
     *("inverse_dynamics_derivatives", "forward_dynamics_derivatives", "energy_derivatives"),
     *("momentum_derivatives", "inverse_dynamics_vjp", "forward_dynamics_vjp"),
     *("inverse_dynamics_parameter_derivatives", "forward_dynamics_parameter_derivatives"),
-    *("forward_dynamics_jvp", "pfl", "implicit", "rollout"),
+    *("forward_dynamics_jvp", "pfl", "implicit", "rollout", "mount_wrench"),
 )
 AIRBORNE = in_group(PLANNING)
 NEEDS = {name: signature.needs for name, signature in SIGNATURES.items() if signature.needs}

@@ -60,4 +60,11 @@ SIGNATURES = (
     Signature("bias_force_world",
         "bias force C for the velocity (p_dot, omega in world axes, q_t_dot)",
         (Q, V), (FORCE,), VALUE),
+    Signature("mount_wrench",
+        "force and moment of the tail on the torso at the tail's mount; the ground's forces on the "
+        "tail are left out",
+        (Q, V, V_DOT),
+        (Argument("mount_force", (3,), "force on the torso (N, torso axes)"),
+         Argument("mount_moment", (3,), "moment on the torso about the mount (N m, torso axes)")),
+        VALUE),
 )

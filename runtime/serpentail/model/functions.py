@@ -186,6 +186,27 @@ class ModelFunctions:
         """
         return self.kernels["bias_force_world"](q, v, out=out)
 
+    def mount_wrench(
+        self, q: ArrayLike, v: ArrayLike, v_dot: ArrayLike, *, out: Out = None
+    ) -> tuple[Array, Array]:
+        """Compute the force and moment of the tail on the torso at the tail's mount; the ground's
+        forces on the tail are left out.
+
+        Parameters
+        ----------
+        q, v : array_like, shapes (nq,) and (nv,)
+        v_dot : array_like, shape (nv,)
+            Acceleration: time derivative of v (m/s^2, rad/s^2).
+
+        Returns
+        -------
+        mount_force : ndarray, shape (3,)
+            Force on the torso (N, torso axes).
+        mount_moment : ndarray, shape (3,)
+            Moment on the torso about the mount (N m, torso axes).
+        """
+        return self.kernels["mount_wrench"](q, v, v_dot, out=out)
+
     def inverse_dynamics_derivatives(
         self, q: ArrayLike, v: ArrayLike, v_dot: ArrayLike, *, out: Out = None
     ) -> tuple[Array, Array]:

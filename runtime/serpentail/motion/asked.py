@@ -11,6 +11,7 @@ from ..model.model import Model
 from ..model.names import Names
 from ..model.state import State, named
 from .derived import AGAIN
+from .mount import mount_wrenches
 from .resample import inside, states_between
 from .validation import layout_of, real
 
@@ -24,6 +25,7 @@ class Asked:
     t: Array
     q: Array
     v: Array
+    tau: Array
     contact: Any
     model: Model | None
 
@@ -79,6 +81,18 @@ class Asked:
         again = vars(self).get(AGAIN)
         q, v = again.at(times) if again is not None else states_between(self, times)
         return State(q, v, self.names) if given.ndim else State(q[0], v[0], self.names)
+
+    @property
+    def mount_wrench(self) -> tuple[Array, Array]:
+        """Force (K, 3), N, and moment (K, 3), N m, of the tail on the torso, torso axes.
+
+        They act at the tail's mount, at every sample, and are computed when asked for. The model
+        needs ``mount_wrench``, and on the ground ``forward_dynamics_external``. ValueError is
+        raised if the motion has no model.
+        """
+        if self.model is None:
+            raise ValueError("mount_wrench: this motion has no model: use model.mount_wrench")
+        return mount_wrenches(self.model, self)
 
     def summary(self, errors: bool = False) -> "Summary":
         """Return the numbers of the motion by name, such as apex, landing, forces and work.

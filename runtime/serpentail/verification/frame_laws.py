@@ -77,6 +77,7 @@ def turned_outputs(model: Model, results: dict, X: np.ndarray, shift: np.ndarray
         "velocities": lambda u: u @ Z.T,
         "J": lambda J: Z @ J @ X.T,
         "dparameters": lambda D: X @ D,
+        **dict.fromkeys(("mount_force", "mount_moment"), lambda f: f),  # torso axes
     }
     return {key: turn[key](x) if key in turn else turned_array(x, X) for key, x in results.items()}
 

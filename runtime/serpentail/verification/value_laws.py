@@ -4,7 +4,14 @@ from typing import Any
 
 import numpy as np
 
-from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_V, VELOCITY
+from serpentail_scene.layout import (
+    OMEGA,
+    POSITION,
+    QUATERNION,
+    TAIL_V,
+    TORSO_NV,
+    VELOCITY,
+)
 from serpentail_scene.parameters import PARTS
 
 from ..basics.attitude import rotation_matrix
@@ -57,6 +64,21 @@ def inverse_dynamics_is_mass_times_acceleration_plus_bias(model: Model, s: Case)
     H, C = model.mass_matrix(s.q), model.bias_force(s.q, s.v)
     found, scale = model.inverse_dynamics(s.q, s.v, s.v_dot), abs(H) @ abs(s.v_dot) + abs(C)
     return block_error(found, H @ s.v_dot + C, scale, blocks_of(model))
+
+
+@law("mount_wrench inverse_dynamics", VALUE_LIMIT, only="free")
+def a_tail_that_moves_pushes_its_mount(model: Model, s: Case) -> Errors:
+    """What the motion of the tail alone adds to H v_dot + C at B, its wrench at the mount lacks."""
+    R, added, moving = rotation_matrix(s.q[QUATERNION]), np.zeros(TORSO_NV), np.ones(model.nv)
+    largest, tail = np.zeros(TORSO_NV), model.layout.chains[0].v
+    for sign in (1, -1):
+        v, v_dot = s.v * moving, s.v_dot * moving
+        force, moment = model.mount_wrench(s.q, v, v_dot)
+        arm = np.cross(model.parameters["tail_mount"], force)
+        needed = model.inverse_dynamics(s.q, v, v_dot)[:TORSO_NV]
+        added += sign * (needed + np.r_[R @ force, moment + arm])
+        largest, moving[tail] = np.maximum(largest, abs(needed)), 0
+    return block_error(added, 0 * added, largest, (VELOCITY, OMEGA))
 
 
 @law("mass_matrix inverse_dynamics forward_dynamics", VALUE_LIMIT)

@@ -21,6 +21,7 @@ CALLS = {
     "tail_point_jacobians": ("q", "points*3*v"),
     "mass_matrix_world": ("q", "v*v"),
     "bias_force_world": ("q v", "v"),
+    "mount_wrench": ("q v v_dot", "3 3"),
     "forward_dynamics_derivatives": ("q v tau", "v*v v*v v*tau"),
     "forward_dynamics_parameter_derivatives": ("q v tau", "v*13"),
     "forward_dynamics_jvp": ("q v tau dq dv dtau", "v"),

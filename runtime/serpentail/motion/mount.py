@@ -1,0 +1,38 @@
+"""What the tail exerts on the torso along a motion."""
+
+from typing import Any
+
+import numpy as np
+
+from serpentail_scene.layout import POSITION, QUATERNION, VELOCITY
+
+from ..basics.attitude import Array, pose_of, rotation_matrix
+from ..model.model import Model
+
+
+def mount_wrenches(model: Model, motion: Any) -> tuple[Array, Array]:
+    """Return force (K, 3), N, and moment (K, 3), N m, of the tail at its mount, torso axes."""
+    pose, contact = pose_of(motion.q, model.layout), motion.contact
+    if contact is None:
+        v_dot = model.forward_dynamics(motion.q, motion.v, motion.tau)
+        return model.mount_wrench(motion.q, motion.v, v_dot)
+    R, points = rotation_matrix(pose[:, QUATERNION]), model.tail_points(motion.q)
+
+    # the ground pushes on the torso, by the massless legs too, and on all tail points but the first
+    f_ext = np.zeros((len(pose), 6 + points[0].size))
+    for group in contact.groups:
+        part = contact.of(group)
+        if group == "tail":
+            f_ext[:, 9:] = part.forces.reshape(len(pose), -1)
+            continue
+        arms = part.points - pose[:, None, POSITION]
+        f_ext[:, VELOCITY] += part.forces.sum(axis=1)
+        moment = np.cross(arms, part.forces).sum(axis=1)
+        f_ext[:, 3:6] += np.einsum("kji,kj->ki", R, moment)
+    v_dot = model.forward_dynamics(motion.q, motion.v, motion.tau, f_ext)
+    force, moment = model.mount_wrench(motion.q, motion.v, v_dot)
+
+    # the torso holds what pushes on the tail
+    forces, arms = f_ext[:, 6:].reshape(points.shape), points - points[:, :1]
+    force = force + np.einsum("kji,kpj->ki", R, forces)
+    return force, moment + np.einsum("kji,kpj->ki", R, np.cross(arms, forces))
