@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.basics.errors import ExportError, SimulationError
+from serpentail.basics.errors import ExportError, ModelError, SimulationError, StateError
 from serpentail_codegen.scene.parse import load_scene, parse_scene, scene_to_dict
 from serpentail_codegen.scene.problems import SceneError
 from serpentail_scene.source import tables_of
@@ -123,11 +123,18 @@ def test_what_a_limb_leaves_out_has_defaults():
     ] == pytest.approx(5e-3)
 
 
-def test_passive_coordinates_have_no_torques():
-    chain = {"a": limb(BONE | {"drive": "passive", "stiffness": 0.01}, BONE | {"name": "b"})}
-    assert ("functions", "pfl") in problems(chain=chain, functions=["pfl"])
-    assert "pfl" not in parse_scene(GECKO | {"chain": chain, "functions": "all"}, "x").functions
-    model = st.build("gecko_legs", chain=chain)
+HALF = {"a": limb(BONE | {"drive": "passive", "stiffness": 0.01}, BONE | {"name": "b"})}
+
+
+@pytest.fixture(scope="module")
+def half_driven():
+    return st.build("gecko_legs", chain=HALF, targets=["c"])
+
+
+def test_passive_coordinates_have_no_torques(half_driven):
+    assert ("functions", "pfl") in problems(chain=HALF, functions=["pfl"])
+    assert "pfl" not in parse_scene(GECKO | {"chain": HALF, "functions": "all"}, "x").functions
+    model = half_driven
     assert model.layout.driven == (True, True, False, True)
     assert model.layout["a"].names == ("a_knee", "a_b")
     start = {"t_span": 0.01}
@@ -141,6 +148,15 @@ def test_passive_coordinates_have_no_torques():
             st.simulate(
                 model, model.neutral().q, np.zeros(model.nv), **start, controller=controller
             )
+
+
+def test_passive_coordinates_have_no_actions(half_driven):
+    q, v = half_driven.neutral()
+    with pytest.raises(StateError, match="a_knee"):
+        half_driven.step(q, v, [0, 0, 1, 0], 0.01)
+    half_driven.step(q, v, [1e-4, 0, 0, 0], 0.01)
+    with pytest.raises(ModelError, match="passive"):
+        st.environment(half_driven, "righting")
 
 
 def test_what_trees_lack_is_refused():

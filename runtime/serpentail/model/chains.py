@@ -95,6 +95,15 @@ def refuse_several(model: "Model", field: str, remedy: str, error: type[Exceptio
         raise error(f"{field}: needs a tail alone, and {model.name} has {names}: {remedy}")
 
 
+def refuse_driven(model: "Model", field: str, torques: Any, error: type[Exception]) -> None:
+    """Raise an error if one of torques (..., nt) that is not 0 belongs to a passive coordinate."""
+    passive = ~np.array(model.layout.driven)
+    if passive.any() and (wrong := np.argwhere((np.asarray(torques) != 0) & passive)).size:
+        name = model.names.tail[int(wrong[0][-1])]
+        remedy = 'give it 0, or set drive = "torque" in the scene'
+        raise error(f"{field}: drives {name}, which is passive: {remedy}")
+
+
 def of_all_coordinates(layout: Layout, values: Mapping[str, Any]) -> dict[str, Any]:
     """Return parameters in which those of the passive tail are of the coordinates of all chains,
     (..., nt); a chain without springs, damping or stops has none.

@@ -48,6 +48,7 @@ ANGLES = {
         "phi_i its direction: a bend by -theta_i cos(phi_i) about x, theta_i sin(phi_i) about z.",
     ),
 }
+HINGES = ("A hinge turns its body about x, y or z of the frame before it, by one coordinate.",)
 PIECES = {"articulated": "links", "continuum": "samples", "mixed": "parts"}
 
 
@@ -105,7 +106,7 @@ def model_context(scene: Scene, tail: Tail) -> dict[str, Any]:
         "baked": scene.baked,
         "tail": tail,
         "coordinates": COORDINATES[scene.coordinates],
-        "angles": ANGLES[scene.coordinates],
+        "angles": (*ANGLES[scene.coordinates], *HINGES * (tail.hinges > 0)),
         "polar": tail.polar,
         "groups": ", ".join(f"{count} of the {name}" for name, count in tail.groups.items()),
         "parameters": parameter_views(scene),

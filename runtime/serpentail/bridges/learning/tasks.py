@@ -36,6 +36,9 @@ class LearningTask:
 
     def checked(self, model: Model, given: dict[str, Any]) -> dict[str, Any]:
         """Return all settings; SimulationError or ModelError names what is wrong."""
+        if not all(model.layout.driven):
+            remedy = 'an agent drives all: set drive = "torque" in the scene'
+            raise ModelError(f"{self.name}: {model.name} has passive coordinates: {remedy}")
         missing = [group for group in self.contacts if group not in model.contacts]
         if missing or (model.contacts and not self.contacts):
             needs = ", ".join(map(repr, self.contacts)) or "none, because it is a flight"

@@ -21,6 +21,7 @@ from ...basics.checks import (
 )
 from ...basics.errors import SimulationError, StateError
 from ...compiling.threads import MIN_STATES_PER_THREAD, checked_threads, shared
+from ..chains import refuse_driven
 from ..library import WHY
 from ..memory import writeable
 from ..parameters import RunParameters
@@ -167,6 +168,7 @@ def _states(
             values[name], sizes[name] = value, size
     dtype = model.parameter_vector.dtype
     arrays = {name: _array(name, values[name], sizes[name], dtype) for name in values}
+    refuse_driven(model, "step: tau", arrays["tau"], StateError)
     counts = {name: len(array) for name, array in arrays.items() if array.ndim == 2}
     if len(set(counts.values())) > 1:
         told = ", ".join(f"{name} {count}" for name, count in counts.items())

@@ -7,6 +7,7 @@ import numpy as np
 
 from ...basics.checks import numbers_in, refusal
 from ...basics.errors import SimulationError
+from ...model.chains import refuse_driven
 from ...model.model import Model
 from ..records import CFunction, Records
 from ..start import Start
@@ -105,20 +106,11 @@ class Actuation:
                 f"Pfl: needs a torque for each coordinate, and {self.model.name} has passive ones: "
                 "use another controller"
             )
-        curve = None if parts.torques is None else parts.torques.coefficients
-        for acts in (parts.damping, None if curve is None else (curve != 0).any(axis=(0, 2))):
-            if acts is not None:
-                self._refuse_torques(acts, "")
-
-    def _refuse_torques(self, torques: np.ndarray, where: str) -> None:
-        """SimulationError if one of nt torques that is not 0 belongs to a passive coordinate."""
-        wrong = (torques != 0) & ~np.array(self.model.layout.driven)
-        if wrong.any():
-            name = self.model.names.tail[int(wrong.argmax())]
-            raise SimulationError(
-                f"the controller drives {name}{where}, which is passive: give it 0, or set "
-                'drive = "torque" in the scene'
-            )
+        if parts.damping is not None:
+            refuse_driven(self.model, "controller", parts.damping, SimulationError)
+        if parts.torques is not None:
+            powers = parts.torques.coefficients.swapaxes(1, 2)
+            refuse_driven(self.model, "controller", powers, SimulationError)
 
     def _available(self, parts: Parts) -> Parts:
         """Return the parts for this model: PFL in Python if its C is missing."""
@@ -203,7 +195,7 @@ class Actuation:
             raise SimulationError(
                 f"the controller gave {given!r:.200} at t = {t:.6g} s, not {self.nt} finite torques"
             )
-        self._refuse_torques(torques, f" at t = {t:.6g} s")
+        refuse_driven(self.model, f"controller at t = {t:.6g} s", torques, SimulationError)
         return torques
 
 
