@@ -79,7 +79,8 @@ def test_along_a_motion_the_torso_accelerates_by_it_and_by_the_ground():
         R, on_torso = st.rotation_matrix(q[3:7]), np.ones(len(forces), bool)
         on_torso[6:-1] = False  # the tail's points
         total, pushes = forces[on_torso].sum(axis=0), forces[on_torso]
-        needed = R.T @ (p["torso_mass"] * (v_dot[:3] + [0, 0, p["gravity"]]) - total)
+        upward = np.array([0, 0, p["gravity"]])
+        needed = R.T @ (p["torso_mass"] * (v_dot[:3] + upward) - total)
         turning = np.cross(contact.points[k][on_torso] - q[:3], pushes).sum(axis=0)
         euler = inertia @ v_dot[3:6] + np.cross(v[3:6], inertia @ v[3:6]) - R.T @ turning
         with row(k):
