@@ -72,7 +72,8 @@ def tail_of(scene: Scene) -> Tail:
         return tail
     chains = [tail]
     for described in scene.chains:
-        shape = replace(described.scene.shape, weightless=scene.weightless)
+        sloped = scene.shape.sloped
+        shape = replace(described.scene.shape, weightless=scene.weightless, sloped=sloped)
         one = replace(_chain_of(described.scene), shape=shape, owner=described.name)
         for name in described.names:
             last = chains[-1]
@@ -96,13 +97,14 @@ def _tree(tail: Tail, chains: tuple[Tail, ...]) -> Tail:
     own = [replace(s, kind=s.kind if s.kind in KINDS else "hinge") for s in each]
     kinds, counts = (tuple(getattr(s, name) for s in own) for name in ("kind", "points"))
     mixed = len(set(kinds)) > 1
+    fall = Shape(weightless=tail.shape.weightless, sloped=tail.shape.sloped)
     return replace(
         tail,
         segments=len(each),
         links=max(counts),
         kind="mixed" if mixed else kinds[0],
         bend_range=max(chain.bend_range for chain in chains),
-        shape=Shape(counts=counts, kinds=kinds * mixed, weightless=tail.shape.weightless),
+        shape=replace(fall, counts=counts, kinds=kinds * mixed),
         passive=tuple(part for part in PARTS if any(part in chain.passive for chain in chains)),
         branches=chains,
     )

@@ -112,6 +112,7 @@ KEYS = {
     "body": SceneKey(None, ANY),  # the size of the animal
     "base": SceneKey("free", one_of(["free", "fixed"])),
     "weightless": SceneKey(False, FLAG),
+    "slope": SceneKey(None, ANY),  # of the ground
     "chain": SceneKey({}, table("chain.NAME")),  # besides the tail
 }
 
@@ -243,5 +244,9 @@ DENSITY = {"density": Key("kg/m^3", within(1e-3, 1e5))}
 TORSOS = {
     "ellipsoid": {"semi_axes": Key("m", POSITIVE, 3), **DENSITY},
     "box": {"sides": Key("m", POSITIVE, 3), **DENSITY},
+}
+SLOPE = {
+    "angle": Key("rad", NumberRule("", "from 0 to 180 deg", least=0, most=math.pi)),
+    "toward": one_word("x", "y", "-x", "-y"),
 }
 TAPER = {name: SEGMENT[name] for name in ("length", "radii", "density", "mass")}

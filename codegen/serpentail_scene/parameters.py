@@ -20,7 +20,7 @@ class Parameter:
     tail; empty: every scene has the parameter.  ``tail`` says which tails have it: "equal", tails
     of equal pieces; "link" or "arc", tails whose pieces have their own values, ``size`` numbers
     each; "geared", limbs with rotors; "tilted", tails on turned axes; "free", tails of a torso that
-    moves; "weight", all but weightless ones; empty: all.
+    moves; "weight", all but weightless ones and those of "sloped" scenes; empty: all.
     """
 
     name: str
@@ -40,7 +40,7 @@ class Parameter:
     @property
     def of_chain(self) -> bool:
         """Tell if each chain of a tree has this parameter, as the tail does."""
-        return self.needs in ("", *PARTS) and self.tail not in ("free", "weight")
+        return self.needs in ("", *PARTS) and self.tail not in ("free", "weight", "sloped")
 
     def owned(self, chain: str) -> "Parameter":
         """Return this parameter of another chain; without a name that of the tail."""
@@ -69,6 +69,11 @@ PARAMETERS = (
         ("gravity", 1, 9.8, "m/s^2", NOT_NEGATIVE,
          "gravitational acceleration, along -z of the world"),
         tail="weight",
+    ),
+    *_rows(
+        ("gravity_vector", 3, None, "m/s^2", FINITE,
+         "gravitational acceleration, axes of the world; it replaces gravity"),
+        tail="sloped",
     ),
     *_rows(
         ("torso_mass", 1, 0.10572, "kg", POSITIVE, "mass of the torso"),

@@ -13,6 +13,7 @@ from .keys import (
     KINDS,
     ONLY,
     SEGMENT,
+    SLOPE,
     TAPER,
     TORSOS,
     Key,
@@ -43,6 +44,7 @@ def scene_schema(verbs: Mapping[str, Key]) -> Schema:
     of_segment |= {name: key_schema(key) for name, key in SEGMENT.items()}
     tables = {"type": "array", "items": _table(of_segment), "minItems": 1}
     keys["segments"] = {"anyOf": [COUNT.schema, tables]}
+    keys["slope"] = key_schema(Key(keys=SLOPE, needs=tuple(SLOPE)))
     keys["taper"] = key_schema(Key(keys=TAPER, needs=("radii",)))
     torsos = {
         shape: Key(keys={"shape": one_word(shape), **lengths}, needs=("shape", *lengths))

@@ -101,7 +101,8 @@ class PinocchioChain:
 def _build(parameters, count):
     """Pinocchio's model of the torso and `count` links, and the frame ids of the tail points."""
     model, still = pin.Model(), pin.SE3.Identity()
-    model.gravity.linear = np.array([0.0, 0.0, -parameters["gravity"]])
+    level = (0.0, 0.0, -parameters["gravity"])
+    model.gravity.linear = np.array(parameters.get("gravity_vector", level))
     joint = model.addJoint(0, pin.JointModelFreeFlyer(), still, "torso")
     torso = np.diag(parameters["torso_inertia"])  # about B, its COM
     model.appendBodyToJoint(joint, pin.Inertia(parameters["torso_mass"], np.zeros(3), torso), still)

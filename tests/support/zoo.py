@@ -189,6 +189,8 @@ ZOO: dict[str, dict[str, Any]] = {
     # several chains
     "tree": _own("articulated", OWN_LINKS[:2], chain=CHAINS),
     "limbs": _own("articulated", OWN_LINKS[1:2], chain=LIMBS),
+    # other gravity
+    "slope": _links(1, 3, slope={"angle": "25 deg", "toward": "-x"}, contacts=["torso"]),
     # other numbers
     "weightless": _links(1, 3, weightless=True),
     "single": _links(2, 2, real="float"),

@@ -15,6 +15,7 @@ from ..ir.builder import Builder, narrowed
 from ..ir.program import Array, Index, Program, Ref
 from ..ir.step import Step, specialised
 from ..ir.tape import Number
+from ..mechanics import rotations, torso, translation
 from ..mechanics.lower import declared_shapes, derive, derived
 from ..scene.variant import Stretch
 from .layout import block
@@ -23,6 +24,12 @@ from .tail import Tail
 
 AT_REST = ("identity", "still", "zero_1", "zero_3")  # constants that have one value by each name
 OF_CHAINS = tuple(p.name for p in (*PARAMETERS, *PASSIVE) if p.of_chain)
+SLOPED = {  # where gravity has any direction
+    rotations.world_acceleration: rotations.world_acceleration_sloped,
+    torso.potential_energy: torso.potential_energy_sloped,
+    torso.torso_acceleration: torso.torso_acceleration_sloped,
+    translation.base_acceleration: translation.base_acceleration_sloped,
+}
 Reads = Scope | Mapping[str, Ref]
 
 
@@ -50,6 +57,11 @@ class Draft(Builder):
         if self.tail.fixed:  # a base without mass, so that the steps of the torso serve it, too
             refs |= {"torso_mass": self.zero(1), "torso_inertia": self.zero(3)}
         self.parameters = MappingProxyType(refs)
+
+    @property
+    def gravity(self) -> tuple[str, int]:
+        """Name and size of the parameter that says where things fall."""
+        return ("gravity_vector", 3) if self.tail.shape.sloped else ("gravity", 1)
 
     def on(self, chain: Tail) -> AbstractContextManager[None]:
         """Stand on one chain: with its sizes, and its parameters under the names of the tail's; its
@@ -93,6 +105,8 @@ class Draft(Builder):
         Parameters are found by their names, all other inputs are passed. From a scope the step
         takes the vectors that it declares; from a plain dictionary it must read all.
         """
+        if self.tail.shape.sloped and not isinstance(function, Step):
+            function = SLOPED.get(function, function)
         step = derived(function)
         if step.name in SIGNATURES:  # the CasADi module defines both, and would keep only one
             raise ValueError(

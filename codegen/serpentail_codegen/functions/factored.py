@@ -168,7 +168,7 @@ class FactoredDynamics:
             draft.step(translation.column_acceleration, reads, tail_force_=tail_force)
         reads = {"net": net, "tail_force": tail_force, "w_dot": w_dot}
         given = None if tail.shape.weightless else loads.gravity
-        gravity = Instead({"gravity": given} if given else {})
+        gravity = Instead({draft.gravity[0]: given} if given else {})
         step, p_ddot = translation.base_acceleration, block(x, VELOCITY)
         draft.step(step, self.body, reads, gravity, p_ddot=p_ddot)
 

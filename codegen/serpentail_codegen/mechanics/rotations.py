@@ -42,6 +42,11 @@ def world_acceleration(let, R: M33, gravity: V1, a: V3) -> dict:
     return {"p_ddot": R * a - gravity[0] * Z}
 
 
+def world_acceleration_sloped(let, R: M33, gravity_vector: V3, a: V3) -> dict:
+    """The same where gravity has any direction: R_b a + g."""
+    return {"p_ddot": R * a + gravity_vector}
+
+
 def rotation_x(c, s) -> Matrix:
     """R_x of Eq. 11 from cosine and sine."""
     return Matrix([[1, 0, 0], [0, c, -s], [0, s, c]])

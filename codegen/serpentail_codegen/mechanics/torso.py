@@ -102,6 +102,11 @@ def potential_energy(let, gravity: V1, R: M33, p: V3, mass: V1, h: V3) -> dict:
     return {"potential": [gravity[0] * (mass[0] * p[2] + R.row(2).dot(h))]}
 
 
+def potential_energy_sloped(let, gravity_vector: V3, R: M33, p: V3, mass: V1, h: V3) -> dict:
+    """-g . (M p_b + R_b h)."""
+    return {"potential": [-gravity_vector.dot(mass[0] * p + R * h)]}
+
+
 def momentum_at_com(let, R: M33, p_dot: V3, mass: V1, h: V3, force: V3, moment: V3) -> dict:
     """Momentum, and angular momentum about the COM, world axes; ``force, moment`` taken at rest of
     B.
@@ -170,3 +175,8 @@ def mount_acceleration(let, w: V3, w_dot: V3, a: V3, tail_mount: V3) -> dict:
 def torso_acceleration(let, R: M33, p_ddot: V3, gravity: V1) -> dict:
     """a = R_b^T (p_b_ddot + g z): all that gravity and translation do in flight (Eqs. 3, 17)."""
     return {"a": R.T * (p_ddot + gravity[0] * Z)}
+
+
+def torso_acceleration_sloped(let, R: M33, p_ddot: V3, gravity_vector: V3) -> dict:
+    """a = R_b^T (p_b_ddot - g)."""
+    return {"a": R.T * (p_ddot - gravity_vector)}

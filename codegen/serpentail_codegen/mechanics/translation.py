@@ -6,7 +6,7 @@ its moment n_k about B.
 
 from sympy import Matrix, eye
 
-from .rotations import X, Y, Z, symmetric, world_acceleration
+from .rotations import X, Y, Z, symmetric, world_acceleration, world_acceleration_sloped
 from .shapes import M33, V1, V3, V6
 
 
@@ -57,6 +57,14 @@ def base_acceleration(
     """p_b_ddot = R_b (net - omega_dot x h - sum f_k q_ddot_k) / M - g z."""
     a = let("a", inverse_mass[0] * (net - w_dot.cross(h) - tail_force))
     return world_acceleration(let, R, gravity, a)
+
+
+def base_acceleration_sloped(
+    let, R: M33, gravity_vector: V3, inverse_mass: V1, h: V3, net: V3, w_dot: V3, tail_force: V3
+) -> dict:
+    """p_b_ddot = R_b (net - omega_dot x h - sum f_k q_ddot_k) / M + g."""
+    a = let("a", inverse_mass[0] * (net - w_dot.cross(h) - tail_force))
+    return world_acceleration_sloped(let, R, gravity_vector, a)
 
 
 def free_acceleration(let, inverse_mass: V1, com: V3, net: V3, w_dot: V3) -> dict:

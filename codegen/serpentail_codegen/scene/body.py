@@ -38,7 +38,7 @@ class Size:
 
     def of(self, name: str, unit: str, value: Any) -> Any:
         """Return the scaled numbers of a parameter; gravity is not scaled."""
-        if name == "gravity" or self == SAME:
+        if name in ("gravity", "gravity_vector") or self == SAME:
             return value
         length = self.leg if name.startswith(LEG_BONES) else self.length
         powers = zip((self.mass, length, self.time), dimensions(unit), strict=True)

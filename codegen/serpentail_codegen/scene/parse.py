@@ -35,6 +35,7 @@ from .problems import Problem, SceneError
 from .resolve import resolve_parameters
 from .scene import Scene
 from .segments import are_tables, have_values
+from .slope import with_slope
 from .tail_tables import tail_description
 from .variant import EQUAL
 
@@ -61,6 +62,7 @@ def scene_for(tail: str, segments: int, links: int | None = None, **overrides: o
 
 def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
     """Return the Scene of a table, called `name` unless it has a name; raises SceneError."""
+    table, problems = with_slope(table)
     kind = _kind(table)
     rules = ONLY[kind]
     values = _with_defaults(table, name, rules)
@@ -70,7 +72,7 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
         values["bend_range"] = in_unit(values["bend_range"], "rad")
 
     # everything that is wrong with keys and functions
-    problems = unknown_keys(table, "", KEYS)
+    problems += unknown_keys(table, "", KEYS)
     chains = chains_of(values, parse_scene)
     problems += chains.problems
     values |= {"chains": chains.chains, "parameters": chains.parameters}

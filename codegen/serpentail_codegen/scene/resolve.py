@@ -28,7 +28,8 @@ from .variant import EQUAL, Shape
 HAS_NOT = {  # why a tail or a base has no such parameters
     "equal": "each piece of this tail has a value of its own",
     "free": "a fixed base does not move",
-    "weight": "this scene is weightless",
+    "weight": "gravity_vector or weightless = true replaces it",
+    "sloped": "this scene is weightless",
 }
 MEANINGS = {  # in a mixed tail
     "arc_masses": "mass of each arc",

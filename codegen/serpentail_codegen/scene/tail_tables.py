@@ -79,4 +79,5 @@ def _shape(
         links=links if mixed or "link" in pieces else 0,
         arcs=arcs if mixed or "arc" in pieces else 0,
         tilted="mount_angles" in parameters,
+        sloped="gravity_vector" in parameters and not shape.weightless,
     )

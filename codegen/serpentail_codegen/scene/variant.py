@@ -15,6 +15,7 @@ class Shape:
     tilted: the tail begins in axes of its own, not in those of the torso.
     fixed: the torso never moves.
     weightless: there is no gravity.
+    sloped: gravity has a direction of its own.
     """
 
     counts: tuple[int, ...] = ()
@@ -25,6 +26,7 @@ class Shape:
     tilted: bool = False
     fixed: bool = False
     weightless: bool = False
+    sloped: bool = False
 
     @property
     def own(self) -> bool:
@@ -37,7 +39,8 @@ class Shape:
         """
         present = {"equal": not self.own, "link": self.links, "arc": self.arcs}
         present |= {"": 1, "tilted": self.tilted, "geared": self.rotors}
-        present |= {"free": not self.fixed, "weight": not self.weightless}
+        weight = not (self.weightless or self.sloped)
+        present |= {"free": not self.fixed, "weight": weight, "sloped": self.sloped}
         return int(present[tail])
 
 

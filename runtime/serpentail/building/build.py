@@ -155,7 +155,7 @@ def _shapes(name: str, scene: Mapping[str, Any], own: Mapping[str, Any]) -> bool
         if name.startswith(f"{chain}_") and name not in NAMES and isinstance(table, Mapping):
             full = {name_in(chain, n): n for n in NAMES}.get(name, name)
             return _shapes(full, table, {f"tail_{key}": key for key in table} | dict(table))
-    if name == "mount_angles" or name in PASSIVE:
+    if name in ("mount_angles", "gravity_vector") or name in PASSIVE:
         return name not in own
     if name not in PIECES or name in own:
         return False

@@ -15,6 +15,7 @@ class ParameterOptions(TypedDict, total=False):
     """
 
     gravity: Quantity
+    gravity_vector: Quantities
     torso_mass: Quantity
     torso_inertia: Quantities
     tail_mount: Quantities
@@ -72,6 +73,7 @@ class SceneKeys(TypedDict, total=False):
     baked: bool
     base: str
     weightless: bool
+    slope: Mapping[str, Any]
     targets: Sequence[str]
     chain: Mapping[str, Mapping[str, Any]]
     name: str

@@ -94,6 +94,18 @@ def total_mass(values: Values) -> Any:
     return values.get("torso_mass", 0.0) + values["tail_mass"] + others
 
 
+def fall(values: Values) -> np.ndarray:
+    """Return the acceleration of gravity (3,), m/s^2, world, or (k, 3) of k runs."""
+    if "gravity_vector" in values:
+        return np.asarray(values["gravity_vector"], float)
+    return np.asarray(values["gravity"], float)[..., None] * [0.0, 0.0, -1.0]
+
+
+def weight_of(values: Values) -> Any:
+    """Return the weight (N) of torso and chains, or one of each run; 0 without gravity."""
+    return total_mass(values) * np.linalg.norm(fall(values), axis=-1)
+
+
 def merged(values: Values, changes: Values) -> dict[str, Any]:
     """Return values with changes; link_radius and link_inertia of a chain replace each other."""
     replaced = set()
@@ -136,7 +148,7 @@ def completed(manifest: dict, values: Values) -> dict[str, Any]:
         masses = [np.asarray(values[name_in(owner_of(e), "tail_mass")]) for e in chains[1:]]
         values[OTHER_CHAINS] = sum(masses)
     with np.errstate(over="ignore"):
-        weight = np.asarray(total_mass(values)) * values["gravity"]
+        weight = weight_of(values)
     if not np.isfinite(weight).all():
         raise ModelError(
             "parameters: torso_mass, tail_mass and gravity give no finite weight: use kg and m/s^2"

@@ -4,12 +4,12 @@ import numpy as np
 
 from ..basics.attitude import Array
 from ..model.model import Model
-from ..model.parameters import total_mass
+from ..model.parameters import weight_of
 
 
 def weight(model: Model) -> float:
     """Return the weight (N) of torso and tail, of the tail on a fixed base; 0 without gravity."""
-    return float(total_mass(model.parameters) * model.parameters["gravity"])
+    return float(weight_of(model.parameters))
 
 
 def semi_axes(model: Model) -> Array:

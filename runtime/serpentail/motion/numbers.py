@@ -56,7 +56,7 @@ class Number(NamedTuple):
 
 
 def com_rise(model: Model, motion: Trajectory) -> float | None:
-    """Highest rise (m) of the centre of mass, by the potential energy M g z; None without g."""
+    """Highest rise (m) of the centre of mass against gravity, by M g h; None without g."""
     whole = weight(model)
     lifted = motion.potential - stored_energy(model.passive_values, motion.tail)
     return float((lifted.max() - lifted[0]) / whole) if whole else None
@@ -102,7 +102,7 @@ NUMBERS = (
         lambda run: run.landing.flight[0]),
     Number("apex_m", "m", "largest height of B, the torso's centre of mass",
         _of_torso(lambda motion: float(motion.q[:, 2].max()))),
-    Number("com_rise_m", "m", "largest height of the centre of mass, above its start",
+    Number("com_rise_m", "m", "largest rise of the centre of mass against gravity",
         lambda run: com_rise(run.model, run.motion)),
     Number("recontact_s", "s", "landing: end of the flight about the apex",
         lambda run: run.landing.flight[1]),

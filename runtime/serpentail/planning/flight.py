@@ -9,7 +9,7 @@ from serpentail_scene.layout import POSITION, VELOCITY
 
 from ..basics.errors import SimulationError
 from ..model.model import Model
-from ..model.parameters import total_mass
+from ..model.parameters import fall, total_mass
 from ..motion.trajectory import Trajectory
 from ..simulation.controllers.controller import Controller
 from ..simulation.controllers.schedules import Legs
@@ -62,8 +62,9 @@ def _lift(model: Model, start: State, duration: float) -> float:
     if not model.contacts:
         return 0.0
     p, speed = model.parameters, float(np.abs(start[1][VELOCITY]).max())
+    falls = float(np.linalg.norm(fall(p))) * duration**2
     size = 10 * (p["tail_length"] + float(np.abs(p["tail_mount"]).max()))
-    return size + speed * duration + p["gravity"] * duration**2 + float(np.abs(start[0][UP]))
+    return size + speed * duration + falls + float(np.abs(start[0][UP]))
 
 
 def _moved(q: np.ndarray, lift: float) -> np.ndarray:
@@ -75,6 +76,6 @@ def _lowered(model: Model, motion: Trajectory, lift: float) -> Trajectory:
     """Return a motion lower by a lift (m), as one that has no ground."""
     if lift == 0:
         return motion
-    weight = total_mass(model.parameters) * model.parameters["gravity"]
+    weight = -total_mass(model.parameters) * fall(model.parameters)[2]
     q = motion.q - lift * np.eye(motion.q.shape[1])[UP]
     return replace(motion, q=q, potential=motion.potential - weight * lift, contact=None)

@@ -12,7 +12,7 @@ from ..basics.checks import number, numbers, shown
 from ..basics.errors import PlanningError, UnusualSize
 from ..basics.plausible_values import warn_of_unusual
 from ..model.model import Model
-from ..model.parameters import total_mass
+from ..model.parameters import fall, total_mass
 from .goal import HALF_TURN, Bounds
 
 HUGE = 1e100  # beyond it squares overflow
@@ -37,7 +37,8 @@ def checked_duration(model: Model, duration: Any) -> tuple[float, float]:
     least, most = (number("duration", value, PlanningError, unit="s", above=0) for value in pair)
     if most < least:
         raise PlanningError(f"duration: value {shown(duration)}: needs least <= most, in s")
-    height = model.parameters["gravity"] * most * most / 2  # which may overflow
+    # which may overflow
+    height = float(np.linalg.norm(fall(model.parameters))) * most * most / 2
     told = f"duration: value {most:.6g} s: a body falls {height:.2g} m in this time: did you mean "
     told += f'"{most:.6g} ms"?'
     if height > HIGHEST:

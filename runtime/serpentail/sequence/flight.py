@@ -11,6 +11,7 @@ from serpentail_scene.layout import QUATERNION, TAIL_Q
 
 from ..basics.errors import SimulationError
 from ..model.model import Model
+from ..model.parameters import fall
 from ..mpc.mpc import Mpc
 from ..planning.goal import Goal
 from ..planning.planner import plan
@@ -107,12 +108,13 @@ def landing_time(model: Model, state: State, goal: Goal, angles: np.ndarray) -> 
     reaches that height.
     """
     (_, _, z), (_, _, rise) = com_at_start(model, state)
-    drop, g = z - _height(model, goal, angles), model.parameters["gravity"]
+    drop, g = z - _height(model, goal, angles), -float(fall(model.parameters)[2])
     inside = rise**2 + 2 * g * drop
-    if g == 0 or inside < 0:
+    if g <= 0 or inside < 0:
         raise SimulationError(
             f"landing: the centre of mass is {-drop:.3g} m too low for the goal's posture, and "
-            f"rises by {max(rise, 0) ** 2 / (2 * g) if g else 0:.3g} m: give the plan a duration"
+            f"rises by {max(rise, 0) ** 2 / (2 * g) if g > 0 else 0:.3g} m: give the plan a "
+            "duration"
         )
     time = (rise + math.sqrt(inside)) / g
     if time <= 0:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..basics.short_repr import brief
 from ..model.model import Model
-from ..model.parameters import total_mass
+from ..model.parameters import fall, total_mass, weight_of
 
 # An imbalance relative to what was moved is reported if it exceeds the smaller of the first two,
 # with steps of a fixed length the second, and the third. docs/contact.md has measured ones.
@@ -95,10 +95,9 @@ def audited(
     """
     work, impulses = named(model, ledger)
     kinetic, potential, momentum = (ends[name] for name in BALANCED)
-    weight = np.asarray(total_mass(values)) * values["gravity"]
+    weight = weight_of(values)
     energy = np.diff(kinetic + potential)[..., 0] - sum(work.values())
-    pull = np.zeros((*energy.shape, 3))
-    pull[..., 2] = -weight * span
+    pull = fall(values) * (np.asarray(total_mass(values)) * span)[..., None]
     moved = momentum[..., 1, :] - momentum[..., 0, :] - pull - sum(impulses.values())
     moved = 0 * moved if model.fixed else moved  # its base gives a tail any momentum
 

@@ -11,7 +11,7 @@ from ..basics.checks import finite_array, refusal
 from ..basics.errors import SimulationError
 from ..model.kernel import RunKernel
 from ..model.model import Model
-from ..model.parameters import RunParameters, total_mass
+from ..model.parameters import RunParameters, weight_of
 from ..motion.contact import Contact
 from .controllers.schedules import Legs
 from .start import Start
@@ -87,7 +87,7 @@ class GroundSettings:
     def refuse_deep(self, model: Model, start: Start, parameters: RunParameters) -> None:
         """SimulationError if a point begins deeper than a static force could press it."""
         heights, p = self._heights(model, start, parameters), parameters.values
-        weight = total_mass(p) * p["gravity"]
+        weight = weight_of(p)
         limits = np.broadcast_to((MAX_STATIC_LOAD * weight / p["K_n"]) ** (2 / 3), start.runs)
         wrong = np.flatnonzero(-heights.min(axis=1) > limits)
         if len(wrong):

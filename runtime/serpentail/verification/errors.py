@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from serpentail_scene.layout import OMEGA, TAIL_V, VELOCITY
+from serpentail_scene.layout import OMEGA, POSITION, TAIL_V, VELOCITY
 
 from ..basics.attitude import pose_of
 from ..model.model import Model
-from ..model.parameters import total_mass
+from ..model.parameters import fall, total_mass, weight_of
 from .states import Case, outputs
 
 BLOCKS = (VELOCITY, OMEGA, TAIL_V)  # of forces and accelerations: B's translation, rotation, tail
@@ -55,7 +55,8 @@ def cancelling_size(model: Model, output: str, state: Case) -> float:
     if model.fixed:
         return 0.0
     speed, weights = (float(np.linalg.norm(x[VELOCITY])) for x in (state.v, state.multiplier))
-    load = float(np.linalg.norm(state.v_dot[VELOCITY])) + model.parameters["gravity"]
+    g = np.linalg.norm(fall(model.parameters))
+    load = float(np.linalg.norm(state.v_dot[VELOCITY]) + g)
     sizes = {"kinetic_dq": speed**2, "qq": load * weights, "aq": weights}
     return total_mass(model.parameters) * sizes.get(output, 0.0)
 
@@ -144,10 +145,9 @@ def difference(
         return block_error(x, reference, blocks=blocks_of(model)) / sensitivity(model, q)
     if output == "potential":
         mount = np.linalg.norm(model.parameters["tail_mount"])
-        height = abs(pose_of(q, model.layout)[2]) + model.parameters["tail_length"] + mount
-        return relative(
-            x, reference, total_mass(model.parameters) * model.parameters["gravity"] * height
-        )
+        reach, p = model.parameters["tail_length"] + mount, model.parameters
+        lifted = total_mass(p) * abs(pose_of(q, model.layout)[POSITION] @ fall(p))
+        return relative(x, reference, lifted + weight_of(p) * reach)
     return relative(x, reference)
 
 

@@ -12,7 +12,7 @@ from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TORSO_N
 from ..basics.attitude import pose_of, product, rotation_matrix
 from ..model.chains import values_of
 from ..model.model import Model
-from ..model.parameters import total_mass
+from ..model.parameters import fall, total_mass
 from .errors import (
     block_error,
     difference,
@@ -60,23 +60,32 @@ def pose_in_the_world_turns_all_alike(model: Model, s: Case) -> Errors:
     turned = replace(
         turned, **{name: X @ getattr(s, name) for name in ("v", "v_dot", "dq", "dv", "multiplier")}
     )
-    errors = {}
+    errors, other = {}, model
+    if "gravity_vector" in model.parameters:  # it turns with the world
+        other = model.with_parameters(gravity_vector=Z @ fall(model.parameters))
     for name in state_functions(model):
         axes = changed_axes(Z, Z if name in WORLD else np.eye(3), model.nv)
         expected = turned_outputs(model, outputs(model, name, s), axes, shift)
-        errors[name] = differences(model, name, turned, expected.values())
+        errors[name] = differences(other, name, turned, expected.values())
     return errors
 
 
 def turned_outputs(model: Model, results: dict, X: np.ndarray, shift: np.ndarray) -> dict:
     """Return the outputs transformed to a world rotated by X's first block and shifted."""
-    Z, weight = X[VELOCITY, VELOCITY], total_mass(model.parameters) * model.parameters["gravity"]
+    Z = X[VELOCITY, VELOCITY]
+    pull = Z @ fall(model.parameters) * total_mass(model.parameters)
+
+    def turned_columns(D: np.ndarray) -> np.ndarray:
+        """Derivatives by a vector in the world are those by the turned one."""
+        several = "gravity_vector" in model.parameters
+        return np.hstack([D[:, :3] @ Z.T, D[:, 3:]]) if several else D
+
     turn = {
-        "potential": lambda V: V + weight * shift[2],
+        "potential": lambda V: V - pull @ shift,
         **dict.fromkeys(("points", "positions", "position"), lambda p: p @ Z.T + shift),
         "velocities": lambda u: u @ Z.T,
         "J": lambda J: Z @ J @ X.T,
-        "dparameters": lambda D: X @ D,
+        "dparameters": lambda D: X @ turned_columns(D),
         **dict.fromkeys(("mount_force", "mount_moment"), lambda f: f),  # torso axes
     }
     return {key: turn[key](x) if key in turn else turned_array(x, X) for key, x in results.items()}

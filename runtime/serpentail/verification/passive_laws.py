@@ -7,7 +7,7 @@ import numpy as np
 from serpentail_scene.parameters import PARTS
 
 from ..model.model import Model
-from ..model.parameters import total_mass
+from ..model.parameters import fall, total_mass
 from ..model.passive import passive_force, stored_energy
 from .contact_laws import implicit_step
 from .errors import relative, rounding, sensitivity
@@ -85,8 +85,8 @@ def passive_tails_change_energy_by_their_damping_alone(model: Model, s: Case) ->
     error = {"energy": relative(energy, motion.energy[0], size)}
     if model.fixed:
         return error
-    weight = total_mass(values) * values["gravity"]
-    linear = motion.linear_momentum[0] - np.outer(motion.t, [0, 0, weight])
+    pull = total_mass(values) * fall(values)
+    linear = motion.linear_momentum[0] + np.outer(motion.t, pull)
     return error | {
         "linear": relative(motion.linear_momentum, linear),
         "angular": relative(motion.angular_momentum, motion.angular_momentum[0]),

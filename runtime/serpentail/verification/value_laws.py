@@ -16,7 +16,7 @@ from serpentail_scene.parameters import PARTS
 
 from ..basics.attitude import rotation_matrix
 from ..model.model import Model
-from ..model.parameters import total_mass
+from ..model.parameters import fall, total_mass
 from ..motion.trajectory import Trajectory
 from ..simulation.controllers.schedules import Legs
 from ..simulation.simulate import simulate
@@ -239,8 +239,8 @@ def energy_is_constant_in_flight(model: Model, s: Case) -> Errors:
 def momentum_is_constant_in_flight(model: Model, s: Case) -> Errors:
     """In flight angular momentum about the COM is constant, and momentum changes by - M g t."""
     motion = flight(model, s)
-    weight = total_mass(model.parameters) * model.parameters["gravity"]
-    linear = motion.linear_momentum[0] - np.outer(motion.t, [0, 0, weight])
+    pull = total_mass(model.parameters) * fall(model.parameters)
+    linear = motion.linear_momentum[0] + np.outer(motion.t, pull)
     angular = motion.angular_momentum
     return {
         "linear": relative(motion.linear_momentum, linear),
@@ -253,5 +253,5 @@ def center_of_mass_flies_a_parabola(model: Model, s: Case) -> Errors:
     """In flight the COM is at c + c_dot t - g t^2 / 2."""
     motion = flight(model, s)
     t, centers = motion.t[:, None], center_of_mass(model, motion.q)
-    speed, g = motion.linear_momentum[0] / total_mass(model.parameters), model.parameters["gravity"]
-    return relative(centers, centers[0] + t * speed - t**2 / 2 * [0, 0, g])
+    speed = motion.linear_momentum[0] / total_mass(model.parameters)
+    return relative(centers, centers[0] + t * speed + t**2 / 2 * fall(model.parameters))

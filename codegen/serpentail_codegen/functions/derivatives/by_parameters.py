@@ -27,11 +27,11 @@ def assemble_forward_dynamics_parameter_derivatives(draft: Draft, arrays: dict[s
     rows = parameter_tangents(draft, inner, arguments)
     x = draft.wide("x", draft.tail.nv, count)
     gravity = None
-    if "gravity" in draft.parameters and not draft.tail.fixed:
-        gravity = draft.wide("d_gravity_z", 1, count)[0]
-        draft.unit(
-            gravity, 0
-        )  # gravity is the first parameter: p_b_ddot decreases by the same amount
+    name, size = draft.gravity
+    if name in draft.parameters and not draft.tail.fixed:
+        # it is the first parameter: p_b_ddot changes by the same amount
+        gravity = draft.wide("d_gravity_z", size, count)[0]
+        draft.unit(gravity, 0)
     factored.solve(minus(draft, rows, gravity=gravity), x)
     spread_parameters(draft, x, arrays["dparameters"])
 

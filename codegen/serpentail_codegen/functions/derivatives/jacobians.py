@@ -92,7 +92,7 @@ def loads_at_torso(draft: Draft, **loads: Ref) -> Vectors:
 
 def weightless(draft: Draft, tau: Callable[[Index], Ref] | None, **loads: Ref) -> Loads:
     """Return loads of a system H x = loads without gravity; those that are not given are zero."""
-    return Loads(loads_at_torso(draft, **loads), tau=tau, gravity=draft.zero(1))
+    return Loads(loads_at_torso(draft, **loads), tau=tau, gravity=draft.zero(draft.gravity[1]))
 
 
 def minus(
@@ -103,7 +103,7 @@ def minus(
 ) -> Loads:
     """Return loads of H x = tau - rows, where rows are a change of H v_dot + C in torso axes."""
     change = {"force": draft.of_torso(rows, VELOCITY), "moment": draft.of_torso(rows, OMEGA)}
-    at_torso, none = loads_at_torso(draft, **change), draft.zero(1)
+    at_torso, none = loads_at_torso(draft, **change), draft.zero(draft.gravity[1])
     return Loads(at_torso, lambda k: draft.tail.coordinate_v(rows, k), tau, gravity or none)
 
 

@@ -10,6 +10,7 @@ from xml.etree import ElementTree as Xml
 from ...basics.checks import shown
 from ...basics.errors import ExportError
 from ...model.model import Model
+from ...model.parameters import fall
 from .chain import AXES, Capsule, Chain, Link, along, chain_of, origin, text, torso_capsule
 from .export import xml_file
 
@@ -41,7 +42,7 @@ def mjcf(model: Model) -> bytes:
     root = Xml.Element("mujoco", model=model.name)
     root.append(Xml.Comment(origin(model, STOPS)))
     Xml.SubElement(root, "compiler", angle="radian", inertiafromgeom="false", autolimits="true")
-    Xml.SubElement(root, "option", gravity=text((0.0, 0.0, -p.get("gravity", 0.0))))
+    Xml.SubElement(root, "option", gravity=text(fall(p)))
     # it touches a floor that a user adds, but not itself
     default = Xml.SubElement(root, "default")
     Xml.SubElement(default, "geom", contype="0", conaffinity="1")

@@ -32,9 +32,11 @@ class BodyFunctions:
         return self.model.casadi.symbolic(name)(*arguments, self.vector)
 
     def gravity(self) -> Any:
-        """Gravitational acceleration (3,), world, upward."""
+        """Gravitational acceleration (3,), world, its opposite: upward on level ground."""
         import casadi as ca
 
+        if "gravity_vector" in self.parameters:
+            return -_column(self.parameters["gravity_vector"])
         return ca.vertcat(0, 0, self.parameters["gravity"])
 
 

@@ -10,6 +10,7 @@ from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V,
 
 from ...basics.attitude import rotation_matrix
 from ...model.model import Model
+from ...model.parameters import fall
 from ..program.coordinates import COM_ENTRIES, IDENTITY_POSE
 
 State = tuple[np.ndarray, np.ndarray]  # q, v
@@ -79,10 +80,10 @@ def _falling(
     drift = -np.einsum("kij,kjl,kl->ki", R, H[:, VELOCITY, OMEGA.start :], rates)
 
     # the COM in the world
-    t, fall = np.asarray(times)[:, None], np.array([0, 0, -model.parameters["gravity"]])
+    t, g = np.asarray(times)[:, None], fall(model.parameters)
     com, v_com = com_at_start(model, start)
-    position = com + v_com * t + fall * t**2 / 2 - offset
-    return position, v_com + fall * t + drift / mass
+    position = com + v_com * t + g * t**2 / 2 - offset
+    return position, v_com + g * t + drift / mass
 
 
 def start_carrying(
