@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping
 from typing import Any
 
 from .drives import drives_of
-from .parameters import parts_of
+from .parameters import PARTS, parts_of
 from .signatures.table import AIRBORNE, ALL, DERIVATIVES, EXACT_DERIVATIVES, FIXED, NEEDS, OF_TREES
 
 MOTION = ("forward_dynamics", "energy", "momentum", "tail_points", "center_of_mass")
@@ -101,7 +101,9 @@ def needed_for(tables: Mapping[str, Any], purposes: Collection[str]) -> list[str
 def _passive(tables: Mapping[str, Any]) -> bool:
     """Tell if the tail or another chain has springs, damping or stops."""
     chains = [{f"tail_{key}" for key in _keys(t)} for t in _keys(tables.get("chain")).values()]
-    return any(parts_of(names) for names in (_keys(tables.get("parameters")), *chains))
+    return any(
+        {*parts_of(names)} & {*PARTS} for names in (_keys(tables.get("parameters")), *chains)
+    )
 
 
 def _entries(value: Any) -> list[Any]:

@@ -31,6 +31,7 @@ MEASURES: dict[str, tuple[str, dict[str, Fraction]]] = {
         },
     ),
     "N m": ("a torque", {"N m": ONE, "N cm": CENTI, "mN m": MILLI, "N mm": MILLI}),
+    "W": ("a power", {"W": ONE, "mW": MILLI}),
     "N m/s": ("a torque per time", {"N m/s": ONE, "mN m/s": MILLI, "N mm/s": MILLI}),
     "N m s": (
         "a damping of joints",
@@ -48,7 +49,8 @@ MEASURES: dict[str, tuple[str, dict[str, Fraction]]] = {
     "1/s": ("a gain per time or a rate", {"1/s": ONE, "Hz": ONE, "kHz": KILO}),
     "1/s2": ("a gain per time squared", {"1/s2": ONE}),
 }
-BASE = {"kg": (1, 0, 0), "m": (0, 1, 0), "s": (0, 0, 1), "N": (1, 1, -2)}  # angles have none
+# angles have none
+BASE = {"kg": (1, 0, 0), "m": (0, 1, 0), "s": (0, 0, 1), "N": (1, 1, -2), "W": (1, 2, -3)}
 DEEPEST = 4  # arrays in arrays that are looked into
 NUMBER = r"[+-]?(?:[0-9]{1,40}(?:\.[0-9]{0,40})?|\.[0-9]{1,40})(?:[eE][+-]?[0-9]{1,3})?"
 TEXT = re.compile(rf"\s*({NUMBER}(?:\s*,\s*{NUMBER})*)(?:\s*([^\W\d_].*)|\s+(1/.*))", re.DOTALL)

@@ -125,6 +125,35 @@ def test_no_ordinary_plan_is_better():
         assert slope == pytest.approx((high - low) / (2 * h), rel=1e-3)
 
 
+def test_a_total_is_kept_and_no_other_choice_is_better():
+    """Of the mount, y + z + x; each plan with other numbers of the same sum costs more."""
+    mount = np.array(rat().parameters["tail_mount"])
+    given = {"design": {"tail_mount": (mount - 0.01, mount + 0.01)}}
+    for total, solver in ((mount.sum(), "fatrop"), (f"{1e3 * mount.sum() - 5:.17g} mm", "ipopt")):
+        plan = again(design_totals={"tail_mount": total}, solver=solver, **given)
+        found = np.array(plan.design["tail_mount"])
+        kept = mount.sum() - 0.005 * (solver == "ipopt")
+        assert plan.report["converged"] and found.sum() == pytest.approx(kept, abs=1e-8)
+        best = plan.report["objective"]
+        assert ordinary(plan, tail_mount=found) == pytest.approx(best, rel=1e-6)
+        for way in np.array([[1, -1, 0], [0, 1, -1], [-1, 0, 1]]) * 1e-3:
+            others = (found + sign * way for sign in (-1, 1))
+            inside = [o for o in others if (np.abs(o - mount) <= 0.01 + 1e-9).all()]
+            assert all(ordinary(plan, tail_mount=o) > best * (1 - 1e-6) for o in inside)
+
+
+def test_totals_that_cannot_be_are_refused():
+    pair = {"design": {"tail_mount": ((-0.01,) * 3, (0.01,) * 3), "tail_length": RANGE}}
+    for name, value, field in (
+        *(("tail_mount", x, "tail_mount: value") for x in (0.031, -0.04, "3 kg", "a", None)),
+        *((name, 0.1, name) for name in ("tail_length", "torso_inertia", "tail")),
+    ):
+        with row(name, value), pytest.raises(st.PlanningError, match=f"design_totals.{field}"):
+            again(design_totals={name: value}, **pair)
+    with pytest.raises(st.PlanningError, match=r"design_totals: value 0\.1"):
+        again(design_totals=0.1, **pair)
+
+
 def test_attitude_torso_rate_and_position_may_be_free():
     """Upright at the end is easier from a start that is nearly upright."""
     free = {"attitude": ((0.2, 0, 0), (0.9, 0, 0)), "torso_rate": (-1, 1)}

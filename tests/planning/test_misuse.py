@@ -52,6 +52,8 @@ PROBLEM = {
     "goal.tail: entry 0 is 0.9": {"goal": Goal(tail=(0.9, None)), "bounds": Bounds(angle=0.8)},
     "goal.tail_rate: entry 1 is -9": {"goal": Goal(tail_rate=(0, -9)), "bounds": Bounds(rate=8.0)},
     "bounds.torque: value '20 mm'": {"bounds": Bounds(torque="20 mm")},
+    "bounds.speed: value 5: .* torque": {"bounds": Bounds(torque=None, speed=5)},
+    "bounds.power: value '3 N m'": {"bounds": Bounds(power="3 N m")},
     "bounds.angle: .*beta_1 .* 0.001": {"bounds": Bounds(angle=1e-3)},
     "bounds.rate: .*alpha_1_dot = 5 rad/s, beyond 1": {
         "start": (start(rat())[0], 5 * np.eye(8)[6]),

@@ -23,6 +23,8 @@ NEEDED = {
     "spring": "tail_stiffness = 0.01\n",
     "damping": "tail_damping = 1e-4\n",
     "stops": "tail_stop_lower = -1\ntail_stop_upper = 1\ntail_stop_stiffness = 0.1\n",
+    "motor": "motor_torque = 0.02\nmotor_speed = 80\n",
+    "power": "motor_power = 1\n",
 }
 
 
@@ -211,6 +213,19 @@ def test_what_a_passive_tail_lacks_or_excludes_is_told(refuse, refuse_rows):
     polar = {"kind": "continuum", "segments": 1, "coordinates": "polar"}
     damped = polar | {"parameters": {"tail_damping": 1e-3}}
     refuse_rows([(damped, "parameters.tail_damping", "")])
+
+
+def test_motors_that_cannot_be_are_refused(read, refuse_rows):
+    motor = "motor_torque = 0.02", 'motor_speed = "600 rpm"'
+    found = read(given(*motor)).parameters
+    assert found["motor_torque"] == (0.02,) * 4 and found["motor_speed"] == (20 * pi,) * 4
+    rows = [(given(motor[0]), "parameters.motor_speed", "motor_torque")]
+    rows += [(given(motor[1]), "parameters.motor_torque", "motor_speed")]
+    rows += [(given(motor[0], "motor_speed = 0"), "parameters.motor_speed", "above 0")]
+    rows += [wrong("motor_power", value, "W") for value in ("0", "-1", '"1 N m"', "[1, 2]")]
+    polar = {"kind": "continuum", "segments": 1, "coordinates": "polar"}
+    rows += [(polar | {"parameters": {"motor_power": 1}}, "parameters.motor_power", "motors")]
+    refuse_rows(rows)
 
 
 # The table `body`

@@ -29,6 +29,7 @@ SHIFTS = [
     *(("mN m/s", "N m/s", -3), ("kN/m", "N/m", 3), ("N/mm", "N/m", 3), ("kN/m^1.5", "N/m^1.5", 3)),
     *(("1/s", "1/s", 0), ("1/s2", "1/s^2", 0), ("deg", "deg", 0), ("rad", "rad", 0)),
     *(("rad/s", "rad/s", 0), ("kg cm2", "kg m^2", -4), ("N cm", "N m", -2)),
+    *(("W", "W", 0), ("mW", "W", -3)),
     *(("N cm/rad", "N m/rad", -2), ("mNm", "N m", -3), ("Hz", "1/s", 0), ("kHz", "1/s", 3)),
 ]
 ODD = [  # a unit, that of the field, a number of them, and what they are

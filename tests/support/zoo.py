@@ -32,6 +32,7 @@ ELASTIC = {
     "tail_stop_upper": [0.6, 0.5, 0.4, 0.55],
     "tail_stop_stiffness": [0.05, 0.04, 0.06, 0.03],
 }
+MOTORS = {"motor_torque": "3 mN m", "motor_speed": [14, 10], "motor_power": "4 mW"}
 TORSO = {"torso_mass": 0.11, "torso_inertia": [7e-5, 4e-5, 7.5e-5]}
 MOUNTED = {"tail_mount": [0.002, -0.04, 0], "mount_angles": [0.3, -0.6, 0.9]}
 OWN_LINKS = [
@@ -172,6 +173,8 @@ ZOO: dict[str, dict[str, Any]] = {
     "elastic": _links(2, 2, parameters=ELASTIC),
     "elastic_arcs": _arcs(2, parameters=ELASTIC),
     "elastic_ground": _links(2, 2, parameters=ELASTIC, **GROUND),
+    # motors that a run meets the limits of
+    "motors": _links(1, 3, parameters=MOTORS),
     # on the ground
     "ground_m1_n1": _links(1, 1, **GROUND),
     "ground": _links(1, 3, **GROUND),

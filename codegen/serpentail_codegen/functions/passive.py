@@ -14,6 +14,7 @@ from ..mechanics.lower import declared_shapes
 from .draft import Draft
 from .scope import Instead, State, Vectors
 from .sweeps.chains import each_chain
+from .tail import Tail
 from .tails.mechanism import StepFunction
 
 FORCES: dict[str, StepFunction] = {
@@ -43,10 +44,14 @@ def each_passive_force(draft: Draft, state: State) -> Iterator[tuple[Index, Ref]
         yield i, force
 
 
+def _forces(tail: Tail) -> list[StepFunction]:
+    """Return the steps of what acts on a tail by itself."""
+    return [FORCES[name] for name in tail.passive if name in FORCES]
+
+
 def _add_forces(draft: Draft, state: State, i: Index, force: Ref) -> None:
     reads = Vectors({"angles": state.angles(i), "rates": state.rates(i)})
-    for name in draft.tail.passive:
-        step = FORCES[name]
+    for step in _forces(draft.tail):
         own = passive_parameters(draft, step, partial(draft.tail.of_chain, i=i))
         draft.step(draft.of_segment(step), reads, own, passive_=force)
 
@@ -54,7 +59,7 @@ def _add_forces(draft: Draft, state: State, i: Index, force: Ref) -> None:
 def add_passive_forces(draft: Draft, state: State, force: Callable[[Index], Ref]) -> None:
     """Add the forces of the passive parts to the force on each segment."""
     for chain in each_chain(draft):
-        if chain.passive:
+        if _forces(chain):
             with draft.loop("i", chain.segments) as i:
                 _add_forces(draft, state.on(chain), i, force(i))
 
@@ -62,7 +67,7 @@ def add_passive_forces(draft: Draft, state: State, force: Callable[[Index], Ref]
 def add_passive_power(draft: Draft, state: State, multiplier: Array, power: Ref) -> None:
     """Add the power of the passive parts, when the tail moves with a multiplier."""
     for chain in each_chain(draft):
-        if chain.passive:
+        if _forces(chain):
             with each_passive_force(draft, state.on(chain)) as (i, passive_force):
                 rates = {"virtual_rates": chain.segment_v(multiplier, i)}
                 reads = {"passive": passive_force} | rates
@@ -71,7 +76,7 @@ def add_passive_power(draft: Draft, state: State, multiplier: Array, power: Ref)
 
 def net_torques(draft: Draft, state: State, tau: Array) -> Array:
     """Return the torques minus those of the passive parts: what is left for the dynamics."""
-    if not draft.tail.passive:
+    if not _forces(draft.tail):
         return tau
     net = draft.array("net_torques", draft.tail.nt)
     for chain in each_chain(draft):

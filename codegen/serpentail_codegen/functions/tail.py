@@ -32,7 +32,7 @@ class Tail(Sizes):
     contacts: tuple[str, ...] = ()  # groups of points that can touch the ground
     friction: str = "cone"
     shape: Shape = EQUAL
-    passive: tuple[str, ...] = ()  # springs, damping, stops
+    passive: tuple[str, ...] = ()  # springs, damping, stops; and what limits controllers
     # a tree has chains, the tail first; its segments and its shape are those of all
     branches: tuple["Tail", ...] = ()
     # of a chain besides the tail: its name, how the names of its parameters begin, whether it is

@@ -4,7 +4,15 @@ from collections.abc import Collection, Mapping
 from typing import Any
 
 from serpentail_scene.keys import KEYS, ONLY, foreign_to
-from serpentail_scene.parameters import NAMES, PARAMETERS, PARTS, PASSIVE_NAMES, Parameter, Value
+from serpentail_scene.parameters import (
+    DRIVES,
+    NAMES,
+    PARAMETERS,
+    PARTS,
+    PASSIVE_NAMES,
+    Parameter,
+    Value,
+)
 from serpentail_scene.purposes import ADDED
 from serpentail_scene.rules import COUNT
 from serpentail_scene.signatures.table import AIRBORNE, ALL, DERIVATIVES, FIXED, NEEDS
@@ -39,7 +47,7 @@ def number_problem(parameter: Parameter, value: object) -> Problem:
     )
     default = "computed" if parameter.default is None else plain(parameter.default)
     hint = f"(default: {default})"
-    if parameter.needs in PARTS:
+    if parameter.needs in (*PARTS, *DRIVES):
         shape, hint = f"{shape} or one for all", "(one for each tail coordinate)"
     words = f", {parameter.rule.words}" if parameter.rule.words else ""
     remedy = f"needs {shape}{words}, in {parameter.unit} {hint}"
@@ -102,7 +110,7 @@ def polar_problems(
     if derivatives and "polar" in ONLY[kind].coordinates:
         remedy = f'has no derivatives, such as {derivatives[0]}: use "bend", which has'
         problems.append(Problem("coordinates", "polar", remedy))
-    remedy = 'polar coordinates have no springs, damping or stops: use "bend"'
+    remedy = 'polar coordinates have no springs, damping, stops or motors: use "bend"'
     wrong = [name for name in PASSIVE_NAMES if name in parameters]
     problems += [Problem(f"parameters.{name}", parameters[name], remedy) for name in wrong]
     if contacts:

@@ -109,7 +109,7 @@ def of_all_coordinates(layout: Layout, values: Mapping[str, Any]) -> dict[str, A
     (..., nt); a chain without springs, damping or stops has none.
     """
     found = dict(values)
-    for p in PASSIVE:
+    for p in [p for p in PASSIVE if p.of_chain]:
         own = [values.get(name_in(chain.owner, p.name)) for chain in layout.chains]
         if len(own) == 1 or all(value is None for value in own):
             continue

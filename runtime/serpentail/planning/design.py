@@ -1,19 +1,20 @@
 """Design parameters of a plan: numbers of the model that the planner chooses, with its motion."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any
 
 import numpy as np
 
-from ..basics.checks import refusal, shown
+from ..basics.checks import number, refusal, shown
 from ..basics.errors import ModelError, PlanningError
 from ..model.model import Model
 from ..model.parameters import checked_value
 
 NEEDS = "a mapping of parameters, such as {'tail_length': (0.08, 0.25)}"
 STOPS = ("tail_stop_lower", "tail_stop_upper", "tail_stop_width")  # they decide what may start
+PAIR = 2
 CORNERS_OF = 3  # numbers of an inertia, whose ranges are checked in all combinations
 
 
@@ -23,12 +24,16 @@ def _none() -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """Parameters that are unknowns: names, how many numbers each has, and ranges (size,), SI."""
+    """Parameters that are unknowns: names, how many numbers each has, and ranges (size,), SI.
+
+    totals: fixed sums of the numbers of some of them, by name.
+    """
 
     names: tuple[str, ...] = ()
     sizes: tuple[int, ...] = ()
     least: np.ndarray = field(default_factory=_none)
     most: np.ndarray = field(default_factory=_none)
+    totals: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def size(self) -> int:
@@ -44,7 +49,7 @@ class Design:
     @property
     def key(self) -> tuple:
         """All that it consists of."""
-        return (*self.names, *self.sizes, *self.least, *self.most)
+        return (*self.names, *self.sizes, *self.least, *self.most, *self.totals.items())
 
     def split(self, values: Any) -> dict[str, Any]:
         """Return numbers (size,) or CasADi symbols by name: one number, or the numbers of one."""
@@ -58,6 +63,26 @@ class Design:
         """Return the numbers (size,) that parameters give, moved into the ranges."""
         parts = [np.atleast_1d(parameters[name]) for name in self.names]
         return np.clip(np.concatenate([_none(), *parts]), self.least, self.most)
+
+
+def with_totals(model: Model, design: Design, totals: Any) -> Design:
+    """Return a checked design with fixed sums; PlanningError names the parameter and the remedy."""
+    if not isinstance(totals, Mapping | None):
+        needs = "a mapping of parameters, such as {'link_lengths': 0.195}"
+        raise refusal("design_totals", totals, needs, PlanningError)
+    units, found = {p["name"]: p["unit"] for p in model.manifest["parameters"]}, {}
+    least, most = design.split(design.least), design.split(design.most)
+    for name, value in (totals or {}).items():
+        field = f"design_totals.{name}"
+        if np.size(least.get(name, 0.0)) < PAIR:
+            needs = "a parameter of the design that has several numbers"
+            raise refusal(field, value, needs, PlanningError)
+        found[name] = number(field, value, PlanningError, unit=units[name])
+        low, high = float(np.sum(least[name])), float(np.sum(most[name]))
+        if not low <= found[name] <= high:
+            needs = f"a sum that the ranges of {name} allow: {low:.6g} to {high:.6g}"
+            raise refusal(field, value, needs, PlanningError)
+    return replace(design, totals=found)
 
 
 def checked_design(model: Model, value: Any) -> Design:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 HALF_TURN = "half turn"  # of each segment, a bound of its angles
+MOTOR = "motor"  # a bound that is the model's own, if its scene describes motors
 
 
 @dataclass(frozen=True)
@@ -65,10 +66,16 @@ class Bounds:
         "half turn" bends a segment by half a turn at most, or as far as start and goal ask for.
     rate : float or array_like, optional
         Their rates (rad/s). Default: no bound.
-    torque : float or array_like, default 0.02
-        Torques (N m).
+    torque : float or array_like, default "motor"
+        Torques (N m). "motor": ``motor_torque`` of the model; 0.02 without motors.
     torque_rate : float or array_like, optional
         Rates of the torques (N m/s). With it, the torques are continuous. Default: no bound.
+    speed : float or array_like, default "motor"
+        Speed (rad/s) of each motor without load: the largest torque falls from ``torque`` at rest
+        to 0 there, and beyond it brakes. "motor": ``motor_speed`` of the model; no bound without.
+    power : float or array_like, default "motor"
+        Mechanical power of each motor (W), torque times rate. "motor": ``motor_power`` of the
+        model; no bound without.
 
     Examples
     --------
@@ -79,5 +86,7 @@ class Bounds:
 
     angle: Any = HALF_TURN
     rate: Any = None
-    torque: Any = 0.02
+    torque: Any = MOTOR
     torque_rate: Any = None
+    speed: Any = MOTOR
+    power: Any = MOTOR

@@ -8,12 +8,12 @@ import numpy as np
 
 from serpentail_scene.layout import PER_SEGMENT
 
-from ..basics.checks import number, numbers, shown
+from ..basics.checks import number, numbers, refusal, shown
 from ..basics.errors import PlanningError, UnusualSize
 from ..basics.plausible_values import warn_of_unusual
 from ..model.model import Model
 from ..model.parameters import fall, total_mass
-from .goal import HALF_TURN, Bounds
+from .goal import HALF_TURN, MOTOR, Bounds
 
 HUGE = 1e100  # beyond it squares overflow
 LONGEST = 5.0  # s: a fall from 120 m
@@ -21,6 +21,8 @@ HIGHEST = 1e4  # m: no plan is of a fall from higher up
 STRONGEST = 30.0  # weights at the tail's length: more torque than any motor of the body has
 DEGREES = 360.0  # of an angle's bound in rad: a larger one is not meant as degrees
 UNITS = {"angle": "rad", "rate": "rad/s", "torque": "N m", "torque_rate": "N m/s"}
+UNITS |= {"speed": "rad/s", "power": "W"}
+USUAL = {"torque": 0.02, "speed": None, "power": None}  # of models without motors
 FRAMES = 6  # from a warning to the call of st.plan
 
 
@@ -57,11 +59,17 @@ def checked_bounds(model: Model, bounds: Any) -> Bounds:
         raise PlanningError(f"bounds: value {shown(bounds)}: needs a serpentail.Bounds")
     if isinstance(bounds.angle, str) and bounds.angle == HALF_TURN:
         bounds = replace(bounds, angle=np.repeat(np.pi / model.joints_each, PER_SEGMENT))
+    own = [n for n in USUAL if isinstance(x := getattr(bounds, n), str) and x == MOTOR]
+    usual = {n: model.parameters.get(f"motor_{n}", USUAL[n]) for n in own}
+    bounds = replace(bounds, **usual)
     found = {
         entry.name: _bound(entry.name, getattr(bounds, entry.name), model.layout.nt)
         for entry in fields(Bounds)
     }
     angle, torque = found["angle"], found["torque"]
+    if found["speed"] is not None and torque is None:
+        needs = "a bound of torque, too: that of a motor at rest"
+        raise refusal("bounds.speed", bounds.speed, needs, PlanningError)
     if angle is not None and angle.max() <= DEGREES:
         warn_of_unusual("bounds.angle", float(angle.max()), "rad", FRAMES)
     p = model.parameters

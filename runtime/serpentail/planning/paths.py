@@ -1,6 +1,7 @@
 """Path constraints of a plan, and its clearance above the ground."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -8,9 +9,35 @@ import numpy as np
 from ..basics.checks import number, numbers_in, refusal, shown
 from ..basics.errors import PlanningError
 from ..model.model import Model
+from .goal import Bounds
 from .program.point import any_legs, body_heights
 
 PathConstraint = tuple[Callable[[Any], Any], float, float]  # function of a point, least, most
+
+
+@dataclass(frozen=True)
+class MotorShare:
+    """What plans use of motors: a share of each one's power, or of torque and speed together."""
+
+    torque: tuple[float, ...]
+    speed: tuple[float, ...] = ()
+    power: tuple[float, ...] = ()
+
+    def __call__(self, point: Any) -> Any:
+        """Return tau q_dot / P, else tau / T + q_dot / w, of all motors (2m,)."""
+        if self.power:
+            return point.torque * point.tail_rate / self.power
+        return point.torque / self.torque + point.tail_rate / self.speed
+
+
+def motor_rows(bounds: Bounds) -> tuple[PathConstraint, ...]:
+    """Return the path constraints of checked bounds of speed and power."""
+    rows: list[PathConstraint] = []
+    if bounds.speed is not None:
+        rows.append((MotorShare(tuple(bounds.torque), speed=tuple(bounds.speed)), -1.0, 1.0))
+    if bounds.power is not None:
+        rows.append((MotorShare((), power=tuple(bounds.power)), -np.inf, 1.0))
+    return tuple(rows)
 
 
 def checked_path(path: Any) -> tuple[PathConstraint, ...]:

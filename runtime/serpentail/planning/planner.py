@@ -37,6 +37,7 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     clearance: Quantity | None = None,
     legs: Legs | None = None,
     design: Mapping[str, Any] | None = None,
+    design_totals: Mapping[str, Quantity] | None = None,
     free_start: Mapping[str, Any] | None = None,
     # the search
     mesh: Mesh | None = None,
@@ -84,6 +85,9 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     design : mapping, optional
         Parameters of the model that the planner chooses: name to (least, most), each one number
         or all numbers of the parameter (SI, or text with a unit).
+    design_totals : mapping, optional
+        Parameters of the design whose numbers keep a sum: name to this sum, such as
+        ``{"link_lengths": "195 mm"}``.
     free_start : mapping, optional
         Parts of the start that the planner chooses: "tail", "tail_rate", "torso_rate",
         "position", "velocity", or "attitude" (pitch, roll, yaw), to (least, most), each one
@@ -152,6 +156,7 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
         "clearance": clearance,
         "legs": legs,
         "design": design,
+        "design_totals": design_totals,
         "free_start": free_start,
     }
     task = (start, goal, duration, Bounds() if bounds is None else bounds)

@@ -16,11 +16,11 @@ from ..model.model import Model
 from ..model.passive import behind_stops
 from ..model.state import State
 from ..simulation.controllers.schedules import Legs
-from .design import Design, checked_design
+from .design import Design, checked_design, with_totals
 from .free_start import Range, checked_free_start, moved_inside, within_bounds
 from .goal import GOALS, Bounds, Goal
 from .magnitudes import HUGE, checked_bounds, checked_duration
-from .paths import PathConstraint, checked_clearance, checked_path, clear_of_ground
+from .paths import PathConstraint, checked_clearance, checked_path, clear_of_ground, motor_rows
 
 OBJECTIVES = ("effort", "energy", "time")
 # N m s: the effort counts a tail's rates as torques, or a plan whirls a light tail at no cost
@@ -52,6 +52,11 @@ class PlanningProblem:
         """Tell if parameters or parts of the start are unknowns."""
         return bool(self.design.size or self.free_start)
 
+    @property
+    def rows(self) -> tuple[PathConstraint, ...]:
+        """The path constraints and what the motors can do."""
+        return (*self.path, *motor_rows(self.bounds))
+
 
 def checked_problem(
     model: Model, task: tuple[Any, Any, Any, Any], settings: dict[str, Any], refused: Refusals
@@ -64,6 +69,9 @@ def checked_problem(
     attempt, tail, settings = refused.attempt, model.layout.nt, dict(settings)
     free = settings.pop("free_start", None)
     design = attempt("design", checked_design, model, settings.pop("design", None))
+    totals = settings.pop("design_totals", None)
+    if design is not None:
+        design = attempt("design_totals", with_totals, model, design, totals)
     free = attempt("free_start", checked_free_start, model, free)
     start = attempt("start", _start, model, task[0])
     if start is not None and free is not None:

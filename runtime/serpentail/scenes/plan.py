@@ -52,6 +52,8 @@ BOUNDS = {
     "rate": _bound("rad/s"),
     "torque": _bound("N m"),
     "torque_rate": _bound("N m/s"),
+    "speed": _bound("rad/s"),
+    "power": _bound("W"),
 }
 FREE_START = {
     "position": Key("m", depth=2),
@@ -78,6 +80,7 @@ PLAN = Key(
         "damping": WORK,
         "clearance": Key("m"),
         "design": Key(form=RANGES),
+        "design_totals": Key(form={"type": "object"}),
         "free_start": Key(keys=FREE_START),
         # of the search
         **{name: _whole(*bounds) for name, bounds in WHOLE_NUMBERS.items()},
@@ -117,12 +120,13 @@ def arguments_for(model: Model, table: Mapping) -> dict[str, Any]:
     """Return the arguments of ``plan`` that a table [plan] has, in the size of the model's body."""
     size = size_of(model)
     arguments = plan_arguments(table, size)
-    design = arguments.get("design")
-    if size and isinstance(design, Mapping):
-        units = {p["name"]: p["unit"] for p in model.manifest["parameters"]}
-        arguments["design"] = {
-            name: _in_size(pair, units.get(name, "1"), size) for name, pair in design.items()
-        }
+    units = {p["name"]: p["unit"] for p in model.manifest["parameters"]}
+    for key in ("design", "design_totals"):
+        design = arguments.get(key)
+        if size and isinstance(design, Mapping):
+            arguments[key] = {
+                name: _in_size(pair, units.get(name, "1"), size) for name, pair in design.items()
+            }
     return arguments
 
 

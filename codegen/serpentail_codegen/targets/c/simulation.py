@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from itertools import accumulate
-from typing import Any
+from typing import Any, cast
 
 from serpentail_scene.parameters import name_in
 
@@ -48,6 +48,13 @@ def own_damping(scene: Scene, tail: Tail) -> str:
     return f"{scene.name}_tail_damping" if scene.baked else "run->parameters->tail_damping"
 
 
+def motors(scene: Scene) -> list[tuple[str, str, tuple[float, ...]]]:
+    """Return what limits the torques of a run's controllers: a name in C, the parameter, values."""
+    names = [(n, f"motor_{n}") for n in ("torque", "speed", "power")]
+    found = [(n, parameter) for n, parameter in names if parameter in scene.parameters]
+    return [(n, p, cast("tuple[float, ...]", scene.parameters[p])) for n, p in found]
+
+
 def damped_chains(tail: Tail) -> list[tuple[str, int, int]]:
     """Return the damping parameter of each chain of a tree, and its coordinates from which to
     which.
@@ -86,6 +93,8 @@ def simulation_context(
         "ledger": ledger,
         "damped": own_damping(scene, tail),
         "damped_chains": damped_chains(tail),
+        "motors": motors(scene),
+        "driven": PER_SEGMENT * scene.segments,
         "looks": LOOKS,
         "resolution": resolution,
         "level": level,

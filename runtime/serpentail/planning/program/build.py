@@ -148,7 +148,7 @@ def _flight_terms(flight: FlightDynamics) -> NodeTerms:
     """Return the terms of the flight's nodes: path constraints and cost."""
     problem, unit = flight.problem, flight.variables.units["torque"]
     legs = None if problem.legs is None else tuple(problem.legs.curve.at(0.0)[0])
-    key = ("flight", *flight.key, problem.objective, problem.smoothing, problem.path, legs)
+    key = ("flight", *flight.key, problem.objective, problem.smoothing, problem.rows, legs)
 
     def make() -> NodeTerms:
         symbols = flight.symbols(SOFTENING)
@@ -177,7 +177,7 @@ def _parts(
     point = symbols.point(problem)
     rows = [
         ca.vec(asked(f"path[{k}]", function, point))
-        for k, (function, _, _) in enumerate(problem.path)
+        for k, (function, _, _) in enumerate(problem.rows)
     ]
     return rows, cost(problem, point, symbols.blocks["softening"], unit)
 
@@ -206,7 +206,7 @@ def _refuse_unused(variables: PlanVariables, symbols: NodeSymbols, parts: "list[
 
 def _path_limits(problem: PlanningProblem, terms: NodeTerms) -> np.ndarray:
     """Return least and most (2, entries) of the entries of path constraints."""
-    limits = np.array([row[1:] for row in problem.path]).reshape(-1, 2).T
+    limits = np.array([row[1:] for row in problem.rows]).reshape(-1, 2).T
     return np.repeat(limits, terms.entries, axis=1)
 
 

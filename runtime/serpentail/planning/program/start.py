@@ -50,11 +50,12 @@ def start_rows(flight: FlightDynamics) -> StartRows | None:
         *flight.key,
         tuple(parts),
         ranged,
-        problem.path,
+        problem.rows,
         "attitude" in problem.free_start,
     )
     made: NodeTerms = memoised(key, lambda: _terms(flight, fixed))
-    units = [np.full(len(least), ROW_UNITS.get(name, 1.0)) for name, (least, _) in given.items()]
+    row_unit = ROW_UNITS | {name: abs(x) or 1.0 for name, x in _totals(problem).items()}
+    units = [np.full(len(least), row_unit.get(name, 1.0)) for name, (least, _) in given.items()]
     equal = np.concatenate([u[fixed[name]] for u, name in zip(units, parts, strict=True)])
     open_units = np.concatenate([u[~fixed[name]] for u, name in zip(units, parts, strict=True)])
     rest = made.rows - equal.size - open_units.size
@@ -75,7 +76,12 @@ def _parts(flight: FlightDynamics) -> list[str]:
         names.append("torso_rate")
     if "com" in dict(flight.variables.constants):
         names += ["position", "velocity"]
-    return names
+    return [*names, *_totals(problem)]
+
+
+def _totals(problem: "PlanningProblem") -> dict[str, float]:
+    """Return the sums that numbers of the design keep, by the names of their rows."""
+    return {f"total of {name}": total for name, total in problem.design.totals.items()}
 
 
 def _given(problem: "PlanningProblem", name: str) -> tuple[np.ndarray, np.ndarray]:
@@ -85,6 +91,8 @@ def _given(problem: "PlanningProblem", name: str) -> tuple[np.ndarray, np.ndarra
             least, most = problem.free_start[name]
             return np.append(1.0, least), np.append(1.0, most)
         return problem.q0[3:7], problem.q0[3:7]
+    if name in (totals := _totals(problem)):
+        return np.array([totals[name]]), np.array([totals[name]])
     value = part_of((problem.q0, problem.v0), name)
     return problem.free_start.get(name, (value, value))
 
@@ -96,9 +104,11 @@ def _terms(flight: FlightDynamics, fixed: dict[str, np.ndarray]) -> NodeTerms:
     symbols = flight.symbols()
     rows = _expressions(flight, symbols)
     point = symbols.point(flight.problem)
-    equal = ca.vertcat(*(rows[name][np.flatnonzero(fixed[name]).tolist()] for name in fixed))
-    ranged = ca.vertcat(*(rows[name][np.flatnonzero(~fixed[name]).tolist()] for name in fixed))
-    paths = [_at_start(symbols, k, path, point) for k, path in enumerate(flight.problem.path)]
+    equal, ranged = (
+        ca.vertcat(*(rows[n][k] for n in fixed for k in np.flatnonzero(fixed[n] == own).tolist()))
+        for own in (True, False)
+    )
+    paths = [_at_start(symbols, k, path, point) for k, path in enumerate(flight.problem.rows)]
     parts = [equal, ranged, *(paths if flight.problem.free_start else [])]
     rates = no_rates(flight.variables, flight.compiled)
     return terms_with(symbols, parts, rates, ca.SX(0))
@@ -115,7 +125,8 @@ def _expressions(flight: FlightDynamics, symbols: "NodeSymbols") -> dict[str, An
     if "com" in dict(flight.variables.constants):
         found["position"] = blocks["com"] - rotated(c, center_of_mass_offset(body, blocks["tail"]))
         found["velocity"] = blocks["com_velocity"] + rotated(c, drift_of(body, blocks))
-    return found
+    numbers = flight.problem.design.split(blocks.get("design"))
+    return found | {f"total of {n}": ca.sum1(numbers[n]) for n in flight.problem.design.totals}
 
 
 def _at_start(symbols: "NodeSymbols", k: int, path: Any, point: Any) -> "ca.SX":
@@ -127,7 +138,7 @@ def _at_start(symbols: "NodeSymbols", k: int, path: Any, point: Any) -> "ca.SX":
 
 
 def _path_limits(problem: "PlanningProblem", entries: tuple[int, ...]) -> np.ndarray:
-    limits = np.array([row[1:] for row in problem.path]).reshape(-1, 2).T
+    limits = np.array([row[1:] for row in problem.rows]).reshape(-1, 2).T
     return np.repeat(limits[:, : len(entries)], entries, axis=1)
 
 

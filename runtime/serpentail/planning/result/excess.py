@@ -21,7 +21,8 @@ def excess(program: PlanProgram, curve: Curve, samples: MeshSamples, start: Stat
     """Return by what part (N,) of a bound each interval exceeds it, by name; 0 or less inside it.
 
     Names: "torque", "torque_rate", "angle", "rate", "path", if they are bounded. For a path
-    constraint it is a part of the larger limit. start: of the motion.
+    constraint, or one of the motors' speed and power, it is a part of the larger limit. start: of
+    the motion.
     """
     bounds, N = program.problem.bounds, program.mesh.intervals
     k, s = np.repeat(np.arange(N), SAMPLES), np.tile(np.linspace(0, 1, SAMPLES), N)
@@ -37,7 +38,7 @@ def excess(program: PlanProgram, curve: Curve, samples: MeshSamples, start: Stat
     }
     if bounds.torque_rate is not None:
         found["torque_rate"] = _beyond(_slopes(curve, k, s) / bounds.torque_rate, N)
-    if program.problem.path:
+    if program.problem.rows:
         times = curve.ends[k] + s * np.diff(curve.ends)[k]
         found["path"] = _path(program, samples, times, blocks, start)
     return found
