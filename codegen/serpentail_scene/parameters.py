@@ -158,7 +158,7 @@ PARAMETERS = (
 # The passive tail: a scene has a part of it if it names one of the part's parameters; those without
 # a default are then required. Size 0: one number for each tail coordinate.
 PARTS = ("spring", "damping", "stops")
-DRIVES = ("motor", "power")  # what the motors of the tail coordinates can do
+EACH = (*PARTS, "rotor", "motor", "power")  # parts with numbers for each tail coordinate
 PASSIVE = (
     *_rows(
         ("tail_stiffness", 0, None, "N m/rad", NOT_NEGATIVE,
@@ -178,6 +178,11 @@ PASSIVE = (
         ("tail_stop_width", 0, 0.1, "rad", POSITIVE,
          "angle beyond a stop over which its stiffness grows from zero to tail_stop_stiffness"),
         needs="stops",
+    ),
+    *_rows(
+        ("tail_rotor", 0, None, "kg m^2", NOT_NEGATIVE,
+         "inertia of each motor's rotor times its gear ratio squared"),
+        needs="rotor",
     ),
     *_rows(
         ("motor_torque", 0, None, "N m", POSITIVE, "largest torque of each motor, at rest"),
@@ -210,7 +215,7 @@ def key_in_chain(name: str) -> str:
 def parts_of(named: Collection[str]) -> tuple[str, ...]:
     """Return the parts of tails and motors of which the scene names at least one parameter."""
     present = {p.needs for p in PASSIVE if p.name in named}
-    return tuple(part for part in (*PARTS, *DRIVES) if part in present)
+    return tuple(part for part in EACH if part in present)
 
 
 def ellipsoid(m: Any, length: Any, r: Any) -> tuple[Any, Any, Any]:

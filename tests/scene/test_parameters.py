@@ -25,6 +25,7 @@ NEEDED = {
     "stops": "tail_stop_lower = -1\ntail_stop_upper = 1\ntail_stop_stiffness = 0.1\n",
     "motor": "motor_torque = 0.02\nmotor_speed = 80\n",
     "power": "motor_power = 1\n",
+    "rotor": "tail_rotor = 1e-6\n",
 }
 
 

@@ -5,8 +5,11 @@ power, allow; plans ask for no more.
 from functools import cache
 
 import numpy as np
+import pytest
 
 import serpentail as st
+from tests.references.metrics import block_error
+from tests.references.parameters import TABLE_1, random_states
 from tests.support import zoo
 from tests.support.posed import posed
 from tests.support.rows import row
@@ -50,6 +53,23 @@ def test_runs_get_what_motors_give_by_every_method():
                 assert run.info["imbalance"]["relative"] < 1e-4
 
 
+def test_rotors_are_armatures():
+    """MuJoCo has them at each of the three joints that a coordinate turns."""
+    pytest.importorskip("mujoco")
+    from tests.references.mujoco_chain import MujocoChain
+
+    peer, rotors = MujocoChain(TABLE_1, 1, 3), np.array(model().parameters["tail_rotor"])
+    peer.model.dof_armature[6:] = np.tile(rotors / 3, 3)
+    for q, v, v_dot, tau in zip(*random_states(1, 2, 20, "random"), strict=True):
+        expected = peer.forward_dynamics(q, v, tau)
+        for found in (model().forward_dynamics, model().casadi.forward_dynamics):
+            assert block_error(np.array(found(q, v, tau)).ravel(), expected) < 1e-10
+        np.testing.assert_allclose(model().mass_matrix(q), peer.mass_matrix(q), atol=1e-15)
+        assert model().energy(q, v)[0] == pytest.approx(peer.energy(q, v)[0], rel=1e-13)
+        force = peer.mass_matrix(q) @ v_dot + peer.bias_force(q, v)
+        assert block_error(model().inverse_dynamics(q, v, v_dot), force) < 1e-11
+
+
 def test_many_runs_get_the_same():
     q, v = starts(model(), 20)
     how = {"t_span": 0.05, "output_step": "5 ms", "method": "tsit5"}
@@ -70,10 +90,11 @@ def test_plans_ask_for_what_motors_give():
     assert plan.success
     np.testing.assert_allclose(torques, within(torques, rates), atol=2e-3 * 3e-3)
     assert (torques * rates).max() > 0.99 * 4e-3
-    free = st.simulate(
-        zoo.model("m1_n3"), *plan.start, 0.4, controller=lambda t, q, v: plan.torque(t)[0]
+    strong = model().with_parameters(motor_torque=1, motor_speed=1e3, motor_power=1e3)
+    free, run = (
+        st.simulate(each, *plan.start, 0.4, controller=lambda t, q, v: plan.torque(t)[0])
+        for each in (strong, model())
     )
-    run = st.simulate(model(), *plan.start, 0.4, controller=lambda t, q, v: plan.torque(t)[0])
     np.testing.assert_allclose(run.q[-1], free.q[-1], atol=1e-3)
 
 

@@ -33,6 +33,7 @@ ELASTIC = {
     "tail_stop_stiffness": [0.05, 0.04, 0.06, 0.03],
 }
 MOTORS = {"motor_torque": "3 mN m", "motor_speed": [14, 10], "motor_power": "4 mW"}
+MOTORS |= {"tail_rotor": "20, 30 g cm2"}
 TORSO = {"torso_mass": 0.11, "torso_inertia": [7e-5, 4e-5, 7.5e-5]}
 MOUNTED = {"tail_mount": [0.002, -0.04, 0], "mount_angles": [0.3, -0.6, 0.9]}
 OWN_LINKS = [

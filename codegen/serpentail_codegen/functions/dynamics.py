@@ -12,7 +12,7 @@ from .draft import Draft
 from .factored import FactoredDynamics, factored_dynamics
 from .function import Assembly, Function, assemble
 from .layout import block
-from .passive import add_elastic_energy, add_passive_forces, net_torques
+from .passive import add_elastic_energy, add_passive_forces, add_rotor_energy, net_torques
 from .scope import Motion, State, Vectors
 from .sweeps.chains import prepared
 from .sweeps.inertia import animal_inertia, column_of
@@ -76,7 +76,7 @@ def assemble_inverse_dynamics(draft: Draft, arrays: dict[str, Array], world: boo
     R = attitude(draft, state)
     segments = prepared(draft, state)
     inertial_forces(draft, segments, _torso_motion(draft, state, R, v_dot, unmoved), v_dot, force)
-    add_passive_forces(draft, state, lambda i: draft.tail.segment_v(force, i))
+    add_passive_forces(draft, state, lambda i: draft.tail.segment_v(force, i), v_dot)
 
     # forces on p_dot act in world axes
     if draft.tail.fixed:
@@ -184,6 +184,7 @@ def assemble_energy(draft: Draft, arrays: dict[str, Array]) -> None:
     state = draft.state(arrays["q"], arrays["v"])
     R = attitude(draft, state)
     moment = gather_kinetic(draft, state, R, arrays["kinetic"][0])
+    add_rotor_energy(draft, state, arrays["kinetic"][0])
     potential = arrays["potential"][0]
     draft.step(torso.potential_energy, state.torso(R), moment, potential=potential)
     add_elastic_energy(draft, state, potential)

@@ -21,6 +21,7 @@ FORCES: dict[str, StepFunction] = {
     "spring": passive.spring_force,
     "damping": passive.damping_force,
     "stops": passive.stop_force,
+    "rotor": passive.rotor_torque,
 }
 ENERGIES: dict[str, StepFunction] = {"spring": passive.spring_energy, "stops": passive.stop_energy}
 SLOPES: dict[str, StepFunction] = {"spring": passive.spring_slope, "stops": passive.stop_slope}
@@ -33,42 +34,52 @@ def passive_parameters(draft: Draft, step: StepFunction, part: Callable[[Array],
 
 
 @contextmanager
-def each_passive_force(draft: Draft, state: State) -> Iterator[tuple[Index, Ref]]:
+def each_passive_force(
+    draft: Draft, state: State, v_dot: Array | None = None
+) -> Iterator[tuple[Index, Ref]]:
     """Open a loop over the segments of a chain; yields the segment and the forces of its passive
-    parts.
+    parts, those of rotors only if there is v_dot.
     """
     force = draft.vector("passive", draft.tail.width)
     with draft.loop("i", draft.tail.segments) as i:
         draft.fill(force, 0)
-        _add_forces(draft, state, i, force)
+        _add_forces(draft, state, i, force, v_dot)
         yield i, force
 
 
-def _forces(tail: Tail) -> list[StepFunction]:
+def _forces(tail: Tail, v_dot: Array | None = None) -> list[StepFunction]:
     """Return the steps of what acts on a tail by itself."""
-    return [FORCES[name] for name in tail.passive if name in FORCES]
+    names = [name for name in tail.passive if name in FORCES and (v_dot or name != "rotor")]
+    return [FORCES[name] for name in names]
 
 
-def _add_forces(draft: Draft, state: State, i: Index, force: Ref) -> None:
-    reads = Vectors({"angles": state.angles(i), "rates": state.rates(i)})
-    for step in _forces(draft.tail):
+def _add_forces(
+    draft: Draft, state: State, i: Index, force: Ref, v_dot: Array | None = None
+) -> None:
+    reads = {"angles": state.angles(i), "rates": state.rates(i)}
+    reads |= {"accelerations": draft.tail.segment_v(v_dot, i)} if v_dot else {}
+    for step in _forces(draft.tail, v_dot):
         own = passive_parameters(draft, step, partial(draft.tail.of_chain, i=i))
-        draft.step(draft.of_segment(step), reads, own, passive_=force)
+        draft.step(draft.of_segment(step), Vectors(reads), own, passive_=force)
 
 
-def add_passive_forces(draft: Draft, state: State, force: Callable[[Index], Ref]) -> None:
+def add_passive_forces(
+    draft: Draft, state: State, force: Callable[[Index], Ref], v_dot: Array | None = None
+) -> None:
     """Add the forces of the passive parts to the force on each segment."""
     for chain in each_chain(draft):
-        if _forces(chain):
+        if _forces(chain, v_dot):
             with draft.loop("i", chain.segments) as i:
-                _add_forces(draft, state.on(chain), i, force(i))
+                _add_forces(draft, state.on(chain), i, force(i), v_dot)
 
 
-def add_passive_power(draft: Draft, state: State, multiplier: Array, power: Ref) -> None:
+def add_passive_power(
+    draft: Draft, state: State, multiplier: Array, v_dot: Array, power: Ref
+) -> None:
     """Add the power of the passive parts, when the tail moves with a multiplier."""
     for chain in each_chain(draft):
-        if _forces(chain):
-            with each_passive_force(draft, state.on(chain)) as (i, passive_force):
+        if _forces(chain, v_dot):
+            with each_passive_force(draft, state.on(chain), v_dot) as (i, passive_force):
                 rates = {"virtual_rates": chain.segment_v(multiplier, i)}
                 reads = {"passive": passive_force} | rates
                 draft.step(draft.of_segment(passive.virtual_power), reads, power_=power)
@@ -99,3 +110,14 @@ def add_elastic_energy(draft: Draft, state: State, potential: Ref) -> None:
                     own,
                     potential_=potential,
                 )
+
+
+def add_rotor_energy(draft: Draft, state: State, kinetic: Ref) -> None:
+    """Add the kinetic energy of rotors."""
+    for chain in each_chain(draft):
+        if "rotor" in chain.passive:
+            with draft.loop("i", chain.segments) as i:
+                place = partial(chain.of_chain, i=i)
+                own = passive_parameters(draft, passive.rotor_energy, place)
+                rates = {"rates": state.on(chain).rates(i)}
+                draft.step(draft.of_segment(passive.rotor_energy), rates, own, kinetic_=kinetic)

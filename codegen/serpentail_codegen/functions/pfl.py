@@ -37,7 +37,7 @@ def assemble_pfl(draft: Draft, arrays: dict[str, Array]) -> None:
         draft.copy(tail.coordinate_v(v_dot, k), arrays["accelerations"].part(k, 1))
     wrench = tail_alone(draft, segments, v_dot, tau)
     motion = free_torso(draft, composite, wrench)
-    add_passive_forces(draft, state, lambda i: draft.tail.segment_tau(tau, i))
+    add_passive_forces(draft, state, lambda i: draft.tail.segment_tau(tau, i), v_dot)
     with draft.loop("k", tail.nt) as k:
         column = {"column": column_of(columns, k)}
         draft.step(translation.coupling_torque, motion, column, torque_=tau.part(k, 1))
@@ -51,7 +51,7 @@ def hold_base(draft: Draft, state: State, arrays: dict[str, Array]) -> None:
     """Torques H v_dot + C: on a fixed base they give exactly the wanted accelerations."""
     segments, v_dot = prepared(draft, state), arrays["accelerations"]
     tail_alone(draft, segments, v_dot, arrays["tau"])
-    add_passive_forces(draft, state, lambda i: draft.tail.segment_tau(arrays["tau"], i))
+    add_passive_forces(draft, state, lambda i: draft.tail.segment_tau(arrays["tau"], i), v_dot)
     if "v_dot" in arrays:
         draft.copy(draft.tail.all_v(arrays["v_dot"]), draft.tail.all_v(v_dot))
 

@@ -22,6 +22,21 @@ def damping_force(let, tail_damping: V2, rates: V2) -> dict:
     return {"passive": tail_damping.multiply_elementwise(rates)}
 
 
+def rotor_torque(let, tail_rotor: V2, accelerations: V2) -> dict:
+    """J q_ddot; J is that of a rotor times the gear ratio squared, its own momentum is left out."""
+    return {"passive": tail_rotor.multiply_elementwise(accelerations)}
+
+
+def rotor_inertia(let, tail_rotor: V1) -> dict:
+    """J."""
+    return {"inertia": tail_rotor}
+
+
+def rotor_energy(let, tail_rotor: V2, rates: V2) -> dict:
+    """J q_dot^2 / 2, of both coordinates."""
+    return {"kinetic": [tail_rotor.dot(rates.multiply_elementwise(rates)) / 2]}
+
+
 @dataclass(frozen=True)
 class Stops:
     """The stops of both coordinates of a segment."""

@@ -4,15 +4,7 @@ from collections.abc import Collection, Mapping
 from typing import Any
 
 from serpentail_scene.keys import KEYS, ONLY, foreign_to
-from serpentail_scene.parameters import (
-    DRIVES,
-    NAMES,
-    PARAMETERS,
-    PARTS,
-    PASSIVE_NAMES,
-    Parameter,
-    Value,
-)
+from serpentail_scene.parameters import EACH, NAMES, PARAMETERS, PASSIVE_NAMES, Parameter, Value
 from serpentail_scene.purposes import ADDED
 from serpentail_scene.rules import COUNT
 from serpentail_scene.signatures.table import AIRBORNE, ALL, DERIVATIVES, FIXED, NEEDS
@@ -47,7 +39,7 @@ def number_problem(parameter: Parameter, value: object) -> Problem:
     )
     default = "computed" if parameter.default is None else plain(parameter.default)
     hint = f"(default: {default})"
-    if parameter.needs in (*PARTS, *DRIVES):
+    if parameter.needs in EACH:
         shape, hint = f"{shape} or one for all", "(one for each tail coordinate)"
     words = f", {parameter.rule.words}" if parameter.rule.words else ""
     remedy = f"needs {shape}{words}, in {parameter.unit} {hint}"

@@ -27,7 +27,7 @@ PIECES = {
 PASSIVE = {"tail_stiffness", "tail_rest", "tail_damping"} | {
     f"tail_stop_{name}" for name in ("lower", "upper", "stiffness", "width")
 }
-PASSIVE |= {f"motor_{name}" for name in ("torque", "speed", "power")}
+PASSIVE |= {"tail_rotor"} | {f"motor_{name}" for name in ("torque", "speed", "power")}
 # keys on which no generated code depends
 LEFT_OUT = ("plan", "simulate", "identify", "phase", "sweep", "description")
 ANY = "contacts"  # any group of points that touch the ground

@@ -50,6 +50,7 @@ class ParameterOptions(TypedDict, total=False):
     tail_stop_upper: Quantities
     tail_stop_stiffness: Quantities
     tail_stop_width: Quantities
+    tail_rotor: Quantities
     motor_torque: Quantities
     motor_speed: Quantities
     motor_power: Quantities

@@ -113,8 +113,7 @@ def landing_time(model: Model, state: State, goal: Goal, angles: np.ndarray) -> 
     if g <= 0 or inside < 0:
         raise SimulationError(
             f"landing: the centre of mass is {-drop:.3g} m too low for the goal's posture, and "
-            f"rises by {max(rise, 0) ** 2 / (2 * g) if g > 0 else 0:.3g} m: give the plan a "
-            "duration"
+            f"rises {max(rise, 0) ** 2 / (2 * g) if g > 0 else 0:.3g} m: give the plan a duration"
         )
     time = (rise + math.sqrt(inside)) / g
     if time <= 0:

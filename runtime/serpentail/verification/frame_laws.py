@@ -74,18 +74,13 @@ def turned_outputs(model: Model, results: dict, X: np.ndarray, shift: np.ndarray
     """Return the outputs transformed to a world rotated by X's first block and shifted."""
     Z = X[VELOCITY, VELOCITY]
     pull = Z @ fall(model.parameters) * total_mass(model.parameters)
-
-    def turned_columns(D: np.ndarray) -> np.ndarray:
-        """Derivatives by a vector in the world are those by the turned one."""
-        several = "gravity_vector" in model.parameters
-        return np.hstack([D[:, :3] @ Z.T, D[:, 3:]]) if several else D
-
+    world = 3 * ("gravity_vector" in model.parameters)  # first columns, of a vector of the world
     turn = {
         "potential": lambda V: V - pull @ shift,
         **dict.fromkeys(("points", "positions", "position"), lambda p: p @ Z.T + shift),
         "velocities": lambda u: u @ Z.T,
         "J": lambda J: Z @ J @ X.T,
-        "dparameters": lambda D: X @ turned_columns(D),
+        "dparameters": lambda D: X @ np.hstack([D[:, :world] @ Z.T[:world, :world], D[:, world:]]),
         **dict.fromkeys(("mount_force", "mount_moment"), lambda f: f),  # torso axes
     }
     return {key: turn[key](x) if key in turn else turned_array(x, X) for key, x in results.items()}

@@ -6,13 +6,13 @@ In torso axes nothing depends on attitude or gravity: R^T (p_b_ddot + g z) stand
 from serpentail_scene.layout import OMEGA
 from serpentail_scene.signatures.arguments import FORCE, MULTIPLIER, V_DOT, Argument, Q, V
 
-from ...ir.program import Array, Ref
+from ...ir.program import Array
 from .. import dynamics, kinematics
 from ..draft import Draft
 from ..function import Function, signed
 from ..layout import block
 from ..passive import add_passive_forces, add_passive_power
-from ..scope import Motion, State, Vectors
+from ..scope import Motion, Vectors
 from ..sweeps.chains import prepared
 from ..sweeps.momentum import gather_moment
 from ..sweeps.wrenches import inertial_forces, virtual_power
@@ -26,21 +26,11 @@ FIRST_MOMENT = Argument("moment", (3,), "first moment about B, torso axes (kg m)
 def assemble_core(draft: Draft, arrays: dict[str, Array]) -> None:
     """H v_dot + C with all vectors in torso axes: it depends on no attitude and no gravity."""
     state = draft.state(arrays["q"], arrays["v"])
-    core_forces(draft, state, state.omega, arrays)
-    add_passive_forces(draft, state, lambda i: draft.tail.segment_v(arrays["force"], i))
-
-
-def assemble_inertia(draft: Draft, arrays: dict[str, Array]) -> None:
-    """The core at rest: H v_dot in torso axes."""
-    core_forces(draft, draft.state(arrays["q"]), draft.zero(3), arrays)
-
-
-def core_forces(draft: Draft, state: State, omega: Ref, arrays: dict[str, Array]) -> None:
-    """Store H v_dot + C in torso axes."""
-    v_dot = arrays["v_dot"]
+    force, v_dot = arrays["force"], arrays["v_dot"]
     segments = prepared(draft, state)
-    motion = Motion(omega, draft.of_torso(v_dot, OMEGA), arrays["a"][0])
-    inertial_forces(draft, segments, motion, v_dot, arrays["force"])
+    motion = Motion(state.omega, draft.of_torso(v_dot, OMEGA), arrays["a"][0])
+    inertial_forces(draft, segments, motion, v_dot, force)
+    add_passive_forces(draft, state, lambda i: draft.tail.segment_v(force, i), v_dot)
 
 
 def assemble_first_moment(draft: Draft, arrays: dict[str, Array]) -> None:
@@ -59,11 +49,10 @@ def assemble_virtual_power(draft: Draft, arrays: dict[str, Array]) -> None:
     motion = {"w": state.omega, "w_dot": block(v_dot, OMEGA), "a": arrays["a"][0]}
     virtual = {"w_virtual": block(multiplier, OMEGA), "u_virtual": arrays["u"][0]}
     virtual_power(draft, segments, Vectors(motion | virtual), multiplier, v_dot, arrays["power"][0])
-    add_passive_power(draft, state, multiplier, arrays["power"][0])
+    add_passive_power(draft, state, multiplier, v_dot, arrays["power"][0])
 
 
 CORE = Function("core", "H v_dot + C in torso axes", (Q, V, V_DOT, A), (FORCE,), assemble_core)
-INERTIA = Function("inertia", "H v_dot in torso axes", (Q, V_DOT, A), (FORCE,), assemble_inertia)
 MOMENT = Function(
     "first_moment", "first moment of the animal", (Q,), (FIRST_MOMENT,), assemble_first_moment
 )

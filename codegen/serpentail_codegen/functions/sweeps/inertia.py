@@ -5,9 +5,9 @@ consists of.
 from collections.abc import Callable
 
 from ...ir.program import Array, Index, Ref, as_index
-from ...mechanics import branch, hinge, mount, torso
+from ...mechanics import branch, hinge, mount, passive, torso
 from ..draft import Draft
-from ..scope import Pose, State, Vectors
+from ..scope import Instead, Pose, State, Vectors
 from ..tail import Tail
 from ..tails.mechanism import Segments
 from .chains import add, each_chain, on_each, prepared, sided
@@ -121,6 +121,11 @@ def animal_inertia(
     for chain in each_chain(draft):
         segments, total = tail_inertia(draft, state.on(chain), H_tail, columns, total, R)
         found.append(segments)
+        if "rotor" in chain.passive:
+            with draft.loop("k", chain.nt) as k:
+                own = Instead({"tail_rotor": draft.entry("tail_rotor", k, 1)})
+                at = k + chain.coordinates_before
+                draft.step(passive.rotor_inertia, own, inertia_=H_tail(at, at))
     return found, total
 
 

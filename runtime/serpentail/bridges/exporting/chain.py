@@ -106,6 +106,8 @@ def _refuse_other(model: Model, kind: str) -> None:
             remedy += ', or export an "fmu"'
     elif model.fixed:
         needs, remedy = "a torso that moves", 'generate the scene with base = "free"'
+    elif "tail_rotor" in model.parameters:
+        needs, remedy = "a tail without rotors", 'leave out tail_rotor, or export an "fmu"'
     else:
         return
     raise ExportError(f"kind: value {kind!r}: needs {needs} ({model.name}): {remedy}")
