@@ -30,7 +30,7 @@ def generate(scene: Scene, output: Path, tell: Tell | None = None) -> list[str]:
     tell: called when each function is begun for each target.
     """
     tail = tail_of(scene)
-    functions = [function_of(name, tail) for name in needed(scene.functions, bool(scene.contacts))]
+    functions = [function_of(name, tail) for name in needed(scene)]
     emissions = []
     for k, name in enumerate(scene.targets):
         one_by_one = reported(functions, tell, (k, len(scene.targets)))
@@ -124,13 +124,16 @@ def _chain_of(scene: Scene) -> Tail:
         friction=scene.friction,
         shape=scene.shape,
         passive=scene.passive,
+        widths=scene.widths,
     )
 
 
-def needed(names: Collection[str], contacts: bool = False) -> list[str]:
+def needed(scene: Scene) -> list[str]:
     """Return the functions to derive: those asked for, and those that rollouts and solves call."""
+    names = scene.functions
     flight = ("forward_dynamics", "tracked_dynamics") if "pfl" in names else ("forward_dynamics",)
-    called = ("contact_points", "contact_rates") if contacts else flight
+    called = ("contact_points", "contact_rates") if scene.contacts else flight
+    called += ("air_force",) if scene.widths else ()
     parts = {"rollout": called, "implicit": ("implicit_factor", "implicit_solve")}
     wanted = {*names, *(part for name in names for part in parts.get(name, ()))}
     return [name for name in CATALOGUE if name in wanted]

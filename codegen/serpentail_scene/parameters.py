@@ -16,8 +16,8 @@ class Parameter:
     """One physical parameter: `size` numbers in `unit`; without a default it is computed from the
     others.
 
-    ``needs`` is a group of contact points, "contacts" for any of them, or a part of the passive
-    tail; empty: every scene has the parameter.  ``tail`` says which tails have it: "equal", tails
+    ``needs`` is a group of contact points, "contacts" for any of them, a part of the passive tail,
+    or "air"; empty: every scene has the parameter.  ``tail`` says which tails have it: "equal", tails
     of equal pieces; "link" or "arc", tails whose pieces have their own values, ``size`` numbers
     each; "geared", limbs with rotors; "tilted", tails on turned axes; "free", tails of a torso that
     moves; "weight", all but weightless ones and those of "sloped" scenes; empty: all.
@@ -41,6 +41,11 @@ class Parameter:
     def of_chain(self) -> bool:
         """Tell if each chain of a tree has this parameter, as the tail does."""
         return self.needs in ("", *PARTS) and self.tail not in ("free", "weight", "sloped")
+
+    @property
+    def spread(self) -> bool:
+        """Tell if one number may stand for all tail coordinates, or for all pieces."""
+        return self.needs in EACH or self.name == WIDTHS
 
     def owned(self, chain: str) -> "Parameter":
         """Return this parameter of another chain; without a name that of the tail."""
@@ -155,6 +160,32 @@ PARAMETERS = (
         needs="torso",
     ),
 )
+# Air around the animal: a scene has it if it names one of these. Size 0: one number at the root and
+# one at the end of each link or arc.
+WIDTHS = "tail_widths"
+AIR = (
+    *_rows(
+        ("air_density", 1, None, "kg/m^3", NOT_NEGATIVE, "density of the air; 0: none acts"),
+        ("wind", 3, (0.0, 0.0, 0.0), "m/s", FINITE, "velocity of the air, world axes, everywhere"),
+        (WIDTHS, 0, None, "m", NOT_NEGATIVE,
+         "widths of the tail in the air, at the root and at the end of each link or arc, linear "
+         "between"),
+        ("tail_drag", 2, (1.1, 0.02), "1", NOT_NEGATIVE,
+         "drag coefficients of the tail on its width, across and along it"),
+        ("tail_drag_speed", 1, 0.01, "m/s", POSITIVE,
+         "speed e below which drag is linear: |u| is sqrt(u^2 + e^2); of turns the same in rad/s"),
+        needs="air",
+    ),
+    *_rows(
+        ("torso_drag", 3, (0.0, 0.0, 0.0), "m^2", NOT_NEGATIVE,
+         "drag coefficient times area of the torso, along x, y, z of B"),
+        ("torso_drag_turning", 3, (0.0, 0.0, 0.0), "m^5", NOT_NEGATIVE,
+         "moment of the air on the torso about x, y, z of B, over density omega^2 / 2"),
+        ("torso_air_damping", 3, (0.0, 0.0, 0.0), "N m s", NOT_NEGATIVE,
+         "moment of the air on the torso about x, y, z of B, over omega"),
+        needs="air", tail="free",
+    ),
+)
 # The passive tail: a scene has a part of it if it names one of the part's parameters; those without
 # a default are then required. Size 0: one number for each tail coordinate.
 PARTS = ("spring", "damping", "stops")
@@ -196,8 +227,10 @@ PASSIVE = (
 )
 # fmt: on
 OUT_OF_REACH = 1e6  # rad, which no coordinate reaches: stops there have no effect
+AIR_NAMES = tuple(p.name for p in AIR)
 PASSIVE_NAMES = tuple(p.name for p in PASSIVE)
-NAMES = (*(p.name for p in PARAMETERS), *PASSIVE_NAMES)
+NAMED = (*PARAMETERS, *AIR, *PASSIVE)  # all that a scene may name
+NAMES = tuple(p.name for p in NAMED)
 
 
 def name_in(chain: str, name: str) -> str:

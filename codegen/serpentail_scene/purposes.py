@@ -4,11 +4,11 @@ from collections.abc import Collection, Mapping
 from typing import Any
 
 from .drives import drives_of
-from .parameters import PARTS, parts_of
+from .parameters import AIR_NAMES, PARTS, parts_of
 from .signatures.table import AIRBORNE, ALL, DERIVATIVES, EXACT_DERIVATIVES, FIXED, NEEDS, OF_TREES
 
 MOTION = ("forward_dynamics", "energy", "momentum", "tail_points", "center_of_mass")
-RUNS = (*MOTION, "rollout", "implicit", "contact_points", "leg_points")
+RUNS = (*MOTION, "rollout", "implicit", "contact_points", "leg_points", "air_force")
 PURPOSES: dict[str, tuple[str, ...]] = {
     "simulate": RUNS,
     "plan": (*RUNS, "mass_matrix", "pfl", *AIRBORNE),
@@ -21,6 +21,7 @@ PURPOSES: dict[str, tuple[str, ...]] = {
     "evaluate": (
         *(*MOTION, "mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics_external"),
         *("tail_point_jacobians", "contact_points", "leg_points", "contact_dynamics", "pfl"),
+        "air_force",
     ),
     # what CasADi, JAX and PyTorch differentiate compiled functions by
     "derivatives": (
@@ -66,7 +67,8 @@ def possible(tables: Mapping[str, Any], names: Collection[str], polar: bool = Tr
     polar: whether those that polar coordinates lack are left out.
     """
     contacts = _entries(tables.get("contacts"))
-    without = {name for name, group in NEEDS.items() if group not in contacts}
+    present = [*contacts, *["air"] * bool({*AIR_NAMES} & {*_keys(tables.get("parameters"))})]
+    without = {name for name, group in NEEDS.items() if group not in present}
     without -= {name for name, group in NEEDS.items() if group == "contacts" and contacts}
     if polar and tables.get("coordinates") == "polar":
         without |= {*DERIVATIVES, *AIRBORNE}

@@ -20,7 +20,7 @@ from .keys import (
     foreign_to,
     one_word,
 )
-from .parameters import PARAMETERS, PASSIVE, Parameter, key_in_chain
+from .parameters import NAMED, Parameter, key_in_chain
 from .purposes import ADDED
 from .rules import COUNT, FLAG
 from .signatures.table import ALL
@@ -39,7 +39,7 @@ def scene_schema(verbs: Mapping[str, Key]) -> Schema:
     arrays = [listed | {"items": {"enum": names}} for names in sorts]
     keys["functions"] = {"anyOf": [{"const": "all"}, *arrays]}
     keys["coordinates"] = {"enum": [name for kind in KINDS for name in ONLY[kind].coordinates]}
-    keys["parameters"] = _table({p.name: _parameter(p) for p in (*PARAMETERS, *PASSIVE)})
+    keys["parameters"] = _table({p.name: _parameter(p) for p in NAMED})
     of_segment: Schema = {"kind": {"enum": ["articulated", "continuum"]}, "links": COUNT.schema}
     of_segment |= {name: key_schema(key) for name, key in SEGMENT.items()}
     tables = {"type": "array", "items": _table(of_segment), "minItems": 1}
@@ -53,7 +53,7 @@ def scene_schema(verbs: Mapping[str, Key]) -> Schema:
     keys["body"] = key_schema(Key(keys={**BODY, "torso": Key(kinds=torsos)}))
     of_chain: Schema = {name: keys[name] for name in CHAIN if name in keys}
     of_chain |= {"on": {"const": "torso"}, "pair": dict(FLAG.schema)}
-    of_chain |= {key_in_chain(p.name): _parameter(p) for p in (*PARAMETERS, *PASSIVE) if p.of_chain}
+    of_chain |= {key_in_chain(p.name): _parameter(p) for p in NAMED if p.of_chain}
     of_chain["kind"] = {"enum": [*KINDS, "limb"]}
     joint = Key(keys=JOINT | JOINT_WORDS | {"name": Key(form=KEYS["name"].rule.schema)})
     of_chain |= {"joints": key_schema(Key(each=joint)), "drive": DRIVE.schema}
@@ -132,7 +132,7 @@ def _texts(units: Sequence[str], size: int | None) -> list[Schema]:
 def _parameter(parameter: Parameter) -> Schema:
     """Return the schema of a parameter, with its meaning and its default."""
     limits, units = parameter.rule.schema, [parameter.unit]
-    if parameter in PASSIVE:  # one number for all tail coordinates, or one for each
+    if not parameter.size:  # one number for all tail coordinates or pieces, or one for each
         one = _number(limits, units)
         each = {"type": "array", "items": one, "minItems": 2}
         forms = [one, each, *_texts(units, None)]
@@ -141,7 +141,7 @@ def _parameter(parameter: Parameter) -> Schema:
         forms = _numbers(key)
     default = parameter.default
     meaning: Schema = {"description": f"{parameter.meaning} ({parameter.unit})"}
-    if default is not None and parameter not in PASSIVE:
+    if default is not None and parameter.size:
         meaning["default"] = list(default) if isinstance(default, tuple) else default
     return _any_of(forms) | meaning
 

@@ -46,6 +46,8 @@ MEASURES: dict[str, tuple[str, dict[str, Fraction]]] = {
     ),
     "N/m": ("a stiffness", {"N/m": ONE, "kN/m": KILO, "N/mm": KILO}),
     "N/m1.5": ("a stiffness of contact", {"N/m1.5": ONE, "kN/m1.5": KILO}),
+    "m2": ("an area", {"m2": ONE, "cm2": CENTI**2, "mm2": MICRO}),
+    "m5": ("a drag of turning", {"m5": ONE, "cm5": CENTI**5, "mm5": MILLI**5}),
     "1/s": ("a gain per time or a rate", {"1/s": ONE, "Hz": ONE, "kHz": KILO}),
     "1/s2": ("a gain per time squared", {"1/s2": ONE}),
 }

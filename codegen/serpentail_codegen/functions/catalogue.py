@@ -4,7 +4,7 @@ table.
 
 from serpentail_scene.signatures.table import SIGNATURES
 
-from . import contact, pfl
+from . import air, contact, pfl
 from .airborne import curvature as airborne
 from .derivatives import by_parameters, hessian, jacobians
 from .derivatives.differentiated import FUNCTIONS
@@ -16,6 +16,7 @@ _FOUND = FUNCTIONS | signed(
     jacobians.ASSEMBLIES
     | by_parameters.ASSEMBLIES
     | hessian.ASSEMBLIES
+    | air.ASSEMBLIES
     | contact.ASSEMBLIES
     | pfl.ASSEMBLIES
     | {"implicit_factor": factor.assemble_factor, "implicit_solve": solve.assemble_solve}

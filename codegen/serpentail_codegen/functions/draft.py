@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
-from serpentail_scene.parameters import PARAMETERS, PASSIVE, Parameter, name_in
+from serpentail_scene.parameters import NAMED, Parameter, name_in
 from serpentail_scene.signatures.table import SIGNATURES
 
 from ..ir import dataflow
@@ -23,7 +23,7 @@ from .scope import Instead, Scope, State, Vectors
 from .tail import Tail
 
 AT_REST = ("identity", "still", "zero_1", "zero_3")  # constants that have one value by each name
-OF_CHAINS = tuple(p.name for p in (*PARAMETERS, *PASSIVE) if p.of_chain)
+OF_CHAINS = tuple(p.name for p in NAMED if p.of_chain)
 SLOPED = {  # where gravity has any direction
     rotations.world_acceleration: rotations.world_acceleration_sloped,
     torso.potential_energy: torso.potential_energy_sloped,

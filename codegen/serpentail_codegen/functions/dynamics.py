@@ -8,6 +8,7 @@ from serpentail_scene.signatures.arguments import TAU, V_DOT, Argument, Q, V
 
 from ..ir.program import Array, Index, Ref
 from ..mechanics import rotations, torso
+from .air import airspeed
 from .draft import Draft
 from .factored import FactoredDynamics, factored_dynamics
 from .function import Assembly, Function, assemble
@@ -75,7 +76,8 @@ def assemble_inverse_dynamics(draft: Draft, arrays: dict[str, Array], world: boo
     unmoved = draft.fixed("still", [0, 0, 0])
     R = attitude(draft, state)
     segments = prepared(draft, state)
-    inertial_forces(draft, segments, _torso_motion(draft, state, R, v_dot, unmoved), v_dot, force)
+    motion = _torso_motion(draft, state, R, v_dot, unmoved)
+    inertial_forces(draft, segments, motion, v_dot, force)
     add_passive_forces(draft, state, lambda i: draft.tail.segment_v(force, i), v_dot)
 
     # forces on p_dot act in world axes
@@ -90,7 +92,8 @@ def _torso_motion(draft: Draft, state: State, R: Ref, v_dot: Array | None, unmov
     """Return the torso's motion in its own axes; gravity is an acceleration of it."""
     p_ddot = draft.of_torso(v_dot, VELOCITY) if v_dot else unmoved
     a = draft.store(torso.torso_acceleration, {"R": R, "p_ddot": p_ddot}, a=3)["a"]
-    return Motion(state.omega, draft.of_torso(v_dot, OMEGA) if v_dot else unmoved, a)
+    w_dot = draft.of_torso(v_dot, OMEGA) if v_dot else unmoved
+    return Motion(state.omega, w_dot, a, airspeed(draft, state, R))
 
 
 def assemble_mount_wrench(draft: Draft, arrays: dict[str, Array]) -> None:

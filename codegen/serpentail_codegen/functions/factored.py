@@ -8,6 +8,7 @@ from serpentail_scene.signatures.arguments import Argument, Q, V
 
 from ..ir.program import Array, Index, Ref
 from ..mechanics import rotations, translation
+from .air import airspeed
 from .draft import Draft
 from .function import Function, assemble
 from .layout import block
@@ -43,12 +44,14 @@ def assemble_factored_dynamics(draft: Draft, arrays: dict[str, Array]) -> None:
         return
     columns = arrays["columns"]
     segments, composite = animal_inertia(draft, state, A_tail, columns)
+    R = draft.fixed("identity", IDENTITY) if tail.fixed else arrays["R"].part(0, 9)
+    u = airspeed(draft, state, R)
     if tail.fixed:
-        core_bias(draft, segments, bias)
+        core_bias(draft, segments, bias, u)
         draft.factor(A, size)
         return
     draft.copy(arrays["first_moment"].part(0, 3), composite["h"])
-    core_bias(draft, segments, bias)
+    core_bias(draft, segments, bias, u)
 
     names = ("inverse_mass", "com")
     center = Vectors({name: arrays[name].part(0, arrays[name].length) for name in names})

@@ -66,11 +66,18 @@ class Pose(Fields):
 
 @dataclass(frozen=True)
 class Motion(Fields):
-    """Angular velocity of a frame, its rate, and the acceleration of the frame's origin."""
+    """Angular velocity of a frame, its rate, and the acceleration of the frame's origin; in air, its
+    velocity ``u`` against the air.
+    """
 
     w: Ref
     w_dot: Ref
     a: Ref
+    u: Ref | None = None
+
+    def vectors(self) -> Mapping[str, Ref]:
+        """Return the vectors by their names."""
+        return {name: ref for name, ref in vars(self).items() if ref}
 
 
 @dataclass(frozen=True)

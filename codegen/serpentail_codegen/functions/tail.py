@@ -33,6 +33,7 @@ class Tail(Sizes):
     friction: str = "cone"
     shape: Shape = EQUAL
     passive: tuple[str, ...] = ()  # springs, damping, stops; and what limits controllers
+    widths: int = 0  # of the tail in the air: of the root and of each piece; 0: no air acts
     # a tree has chains, the tail first; its segments and its shape are those of all
     branches: tuple["Tail", ...] = ()
     # of a chain besides the tail: its name, how the names of its parameters begin, whether it is

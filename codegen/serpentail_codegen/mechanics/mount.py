@@ -33,6 +33,11 @@ def velocity_at_root(let, mount: M33, w: V3, u: V3) -> dict:
     return {"w": mount.T * w, "u": mount.T * u}
 
 
+def flow_at_root(let, mount: M33, u: V3) -> dict:
+    """A velocity in the tail's root axes."""
+    return {"u": mount.T * u}
+
+
 def virtual_velocity_at_root(let, mount: M33, w_virtual: V3, u_virtual: V3) -> dict:
     """Virtual velocities in the tail's root axes."""
     return {"w_virtual": mount.T * w_virtual, "u_virtual": mount.T * u_virtual}

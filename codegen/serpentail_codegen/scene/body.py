@@ -10,7 +10,7 @@ from math import pi, prod
 from typing import Any
 
 from serpentail_scene.keys import BODY, TORSOS
-from serpentail_scene.parameters import PARAMETERS, PASSIVE, Value, name_in
+from serpentail_scene.parameters import NAMED, Value, name_in
 from serpentail_scene.units import dimensions
 
 from .problems import Problem, suggest
@@ -151,7 +151,7 @@ def scaled_parameters(
     if size == SAME:
         return {}
     owners = ("", *(chain.name for chain in chains))
-    units = {name_in(o, p.name): p.unit for o in owners for p in (*PARAMETERS, *PASSIVE)}
+    units = {name_in(o, p.name): p.unit for o in owners for p in NAMED}
     entries = tuple((name, size.of(name, units[name], x)) for name, x in parameters.entries)
     return {
         "parameters": Parameters(entries),

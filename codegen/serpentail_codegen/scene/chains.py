@@ -6,7 +6,7 @@ from typing import Any
 
 from serpentail_scene.drives import DRIVE, DRIVES, drives_of
 from serpentail_scene.keys import CHAIN, NAME, OF_LIMB
-from serpentail_scene.parameters import NAMES, PARAMETERS, PASSIVE, key_in_chain, name_in
+from serpentail_scene.parameters import AIR_NAMES, NAMED, NAMES, key_in_chain, name_in
 from serpentail_scene.signatures.table import ALL, OF_TREES
 
 from .checks import MOST_SEGMENTS, MOST_STRAIGHT, segments_in
@@ -15,7 +15,7 @@ from .problems import Problem, SceneError, suggest
 from .scene import Chain, Parameters, Scene
 
 Parse = Callable[[Mapping[str, Any], str], Scene]
-FOUND = [p for p in (*PARAMETERS, *PASSIVE) if p.of_chain]
+FOUND = [p for p in NAMED if p.of_chain]
 OF_CHAINS = {key_in_chain(p.name): p for p in FOUND}
 # keys of a scene with several chains that do not work yet: which values, and what to do
 REFUSED: dict[str, tuple[Callable[[Any], bool], str]] = {
@@ -160,6 +160,12 @@ def tree_problems(values: Mapping[str, Any], chains: Collection[Chain]) -> list[
     if passive and "pfl" in listed:
         remedy = f"needs a torque for each coordinate, and chain.{passive[0]} has passive ones"
         problems.append(Problem("functions", "pfl", f"{remedy}: leave it out"))
+    named = values["parameters"] if isinstance(values["parameters"], Mapping) else {}
+    problems += [
+        Problem(f"parameters.{name}", named[name], f"{this}remove it")
+        for name in AIR_NAMES
+        if name in named
+    ]
     segments = values["segments"]
     total = len(segments) if isinstance(segments, list | tuple) else segments_in(values)
     total += sum(chain.scene.segments * len(chain.names) for chain in chains)

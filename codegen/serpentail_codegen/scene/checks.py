@@ -4,7 +4,15 @@ from collections.abc import Collection, Mapping
 from typing import Any
 
 from serpentail_scene.keys import KEYS, ONLY, foreign_to
-from serpentail_scene.parameters import EACH, NAMES, PARAMETERS, PASSIVE_NAMES, Parameter, Value
+from serpentail_scene.parameters import (
+    AIR_NAMES,
+    NAMES,
+    PARAMETERS,
+    PASSIVE_NAMES,
+    WIDTHS,
+    Parameter,
+    Value,
+)
 from serpentail_scene.purposes import ADDED
 from serpentail_scene.rules import COUNT
 from serpentail_scene.signatures.table import AIRBORNE, ALL, DERIVATIVES, FIXED, NEEDS
@@ -39,8 +47,11 @@ def number_problem(parameter: Parameter, value: object) -> Problem:
     )
     default = "computed" if parameter.default is None else plain(parameter.default)
     hint = f"(default: {default})"
-    if parameter.needs in EACH:
-        shape, hint = f"{shape} or one for all", "(one for each tail coordinate)"
+    if parameter.spread:
+        of = "tail coordinate"
+        if parameter.name == WIDTHS:
+            of = f"end of the {parameter.size - 1} links or arcs, the root's first"
+        shape, hint = f"{shape} or one for all", f"(one for each {of})"
     words = f", {parameter.rule.words}" if parameter.rule.words else ""
     remedy = f"needs {shape}{words}, in {parameter.unit} {hint}"
     return Problem(f"parameters.{parameter.name}", value, remedy)
@@ -102,8 +113,8 @@ def polar_problems(
     if derivatives and "polar" in ONLY[kind].coordinates:
         remedy = f'has no derivatives, such as {derivatives[0]}: use "bend", which has'
         problems.append(Problem("coordinates", "polar", remedy))
-    remedy = 'polar coordinates have no springs, damping, stops or motors: use "bend"'
-    wrong = [name for name in PASSIVE_NAMES if name in parameters]
+    remedy = 'polar coordinates have no springs, damping, stops, motors or air: use "bend"'
+    wrong = [name for name in (*PASSIVE_NAMES, *AIR_NAMES) if name in parameters]
     problems += [Problem(f"parameters.{name}", parameters[name], remedy) for name in wrong]
     if contacts:
         remedy = 'polar coordinates have no contacts: use "bend"'
@@ -137,10 +148,26 @@ def contact_problems(
     if "friction" in table and not contacts:
         problems.append(Problem("friction", table["friction"], remedy))
     wanted = values["functions"] if isinstance(values["functions"], list | tuple) else ()
+    wanted = [name for name in wanted if NEEDS.get(str(name)) != "air"]
     lacks = {name: lacking(needs, contacts) for name, needs in NEEDS.items() if name in wanted}
     for name, group in [(name, group) for name, group in lacks.items() if group]:
         other = f'needs {group}: add "{group}" to `contacts`'
         problems.append(Problem("functions", name, other if contacts else remedy))
+    return problems
+
+
+def air_problems(table: Mapping[str, Any], values: Mapping[str, Any]) -> list[Problem]:
+    """Return a problem for each function of the air in a scene that has none, and for arcs in
+    air.
+    """
+    wanted = values["functions"] if isinstance(values["functions"], list | tuple) else ()
+    named = [name for name in AIR_NAMES if name in parameters_in(table)]
+    remedy = "needs air: give parameters.air_density"
+    problems = [
+        Problem("functions", name, remedy)
+        for name, needs in NEEDS.items()
+        if needs == "air" and name in wanted and not named
+    ]
     return problems
 
 

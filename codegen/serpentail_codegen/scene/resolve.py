@@ -7,9 +7,11 @@ from typing import Any
 
 from serpentail_scene.keys import LIMBS, foreign_to
 from serpentail_scene.parameters import (
+    AIR,
     NAMES,
     PARAMETERS,
     PASSIVE,
+    WIDTHS,
     Parameter,
     Value,
     ellipsoid,
@@ -23,7 +25,7 @@ from .problems import Problem, SceneError
 from .scene import Parameters
 from .segment_tables import flattened
 from .segments import RADIUS
-from .variant import EQUAL, Shape
+from .variant import EQUAL, Shape, stretches_of
 
 HAS_NOT = {  # why a tail or a base has no such parameters
     "equal": "each piece of this tail has a value of its own",
@@ -44,8 +46,10 @@ def parameters_of(
     shape: Shape = EQUAL,
     passive: Collection[str] = (),
     segments: int = 1,
+    widths: int = 0,
 ) -> tuple[Parameter, ...]:
-    """Return the parameters of a kind of tail, with those of its contacts and of its passive parts.
+    """Return the parameters of a kind of tail, with those of its contacts and of its passive parts,
+    and of the air if there are widths.
 
     Parameters of single links or arcs have numbers for all links or arcs together.
     """
@@ -56,7 +60,11 @@ def parameters_of(
     parameters = tuple(replace(p, size=p.size * count) for p, count in counted if count)
     if kind == "mixed":
         parameters = tuple(replace(p, meaning=MEANINGS.get(p.name, p.meaning)) for p in parameters)
-    return parameters + passive_parameters(passive, segments * (1 if kind in LIMBS else 2))
+    air = tuple(
+        replace(p, size=p.size or widths) for p in AIR if widths and shape.numbers_of(p.tail)
+    )
+    coordinates = segments * (1 if kind in LIMBS else 2)
+    return parameters + air + passive_parameters(passive, coordinates)
 
 
 def each_parameter(model: Any) -> Iterator[tuple[Any, Parameter]]:
@@ -64,7 +72,8 @@ def each_parameter(model: Any) -> Iterator[tuple[Any, Parameter]]:
     the torso and the tail, or another chain.
     """
     for owner, part in model.parts.items():
-        for p in parameters_of(part.kind, part.contacts, part.shape, part.passive, part.segments):
+        sizes = part.passive, part.segments, part.widths
+        for p in parameters_of(part.kind, part.contacts, part.shape, *sizes):
             if p.of_chain or not owner:
                 yield part, p.owned(owner)
 
@@ -87,8 +96,11 @@ def resolve_parameters(
         problems.append(Problem("parameters.link_inertia", named["link_inertia"], remedy))
     numbers: dict[str, Any] = {}
     passive = parts_of(named)
-    problems += missing_passive(named, passive)
-    parameters = parameters_of(kind, contacts, shape, passive, segments)
+    widths = 0
+    if any(p.name in named for p in AIR):
+        widths = widths_of(segments, tail_links // segments, kind, shape)
+    problems += missing(named, ("air", *passive))
+    parameters = parameters_of(kind, contacts, shape, passive, segments, widths)
     sized = {p.name: p for p in (*PARAMETERS, *parameters)}
     for p in [p for p in sized.values() if p.name in named]:
         try:
@@ -96,11 +108,14 @@ def resolve_parameters(
         except ValueError as error:
             problems.append(Problem(f"parameters.{p.name}", named[p.name], str(error)))
             continue
-        if p.needs in passive:
+        if p.spread:
             numbers[p.name] = for_all(p, numbers[p.name])
         if not fits(p, numbers[p.name]):
             problems.append(number_problem(p, named[p.name]))
     problems += [] if problems else piece_problems(numbers, shape, foreign_to(kind)[1])
+    if not problems and widths and WIDTHS not in named and not has_radius(named, shape, kind):
+        remedy = "has no default, because this tail has no link_radius: give it in m"
+        problems.append(Problem(f"parameters.{WIDTHS}", None, remedy))
     if not problems and "stops" in passive:
         problems += stop_problems(numbers)
     if problems:
@@ -111,6 +126,8 @@ def resolve_parameters(
     values = {p.name: p.default for p in parameters if p.name != unused}
     own = shape.links and kind not in LIMBS
     values |= with_link_defaults(numbers, shape.links) if own else numbers
+    if widths and WIDTHS not in numbers:
+        values[WIDTHS] = (2 * values["link_radius"],) * widths
     floats = {name: _floats(value) for name, value in values.items()}
     if "link_radius" in floats:
         floats["link_inertia"] = _ellipsoid_inertia(floats, tail_links)
@@ -144,7 +161,7 @@ def piece_problems(
     this tail or base does not have; ``foreign``: those of other kinds.
     """
     problems = []
-    for p in PARAMETERS:
+    for p in (*PARAMETERS, *AIR):
         required = p.default is None and p.tail and p.name not in (*OPTIONAL, *foreign)
         if p.tail in HAS_NOT and not shape.numbers_of(p.tail) and p.name in numbers:
             remedy = f"{HAS_NOT[p.tail]}; remove it"
@@ -172,7 +189,7 @@ def _floats(value: Any) -> Value:
     return float(value) + 0.0
 
 
-# ---- the passive tail ---------------------------------------------------------------------------
+# ---- the air, and the passive tail ---------------------------------------------------------------------------
 
 
 def passive_parameters(passive: Collection[str], size: int) -> tuple[Parameter, ...]:
@@ -190,12 +207,24 @@ def for_all(parameter: Parameter, value: Any) -> Any:
     return [value] * parameter.size if alone else value
 
 
-def missing_passive(named: Mapping[str, Any], passive: Collection[str]) -> list[Problem]:
+def widths_of(segments: int, links: int, kind: str, shape: Shape) -> int:
+    """Return the number of widths of a tail in the air: one at its root, one for each piece."""
+    return stretches_of(segments, links, kind, shape)[-1].pieces_before(segments) + 1
+
+
+def has_radius(named: Mapping[str, Any], shape: Shape, kind: str) -> bool:
+    """Tell if a tail has a link_radius, which gives its widths in the air."""
+    return kind == "articulated" and not shape.own and "link_inertia" not in named
+
+
+def missing(named: Mapping[str, Any], parts: Collection[str]) -> list[Problem]:
     """Return a problem for each parameter that a part needs and the scene does not name."""
     problems = []
-    for p in PASSIVE:
-        if p.needs in passive and p.default is None and p.name not in named:
-            first = next(q.name for q in PASSIVE if q.needs == p.needs and q.name in named)
+    for p in (*AIR, *PASSIVE):
+        others = [q.name for q in (*AIR, *PASSIVE) if q.needs == p.needs and q.name in named]
+        needed = p.needs in parts and p.default is None and p.name != WIDTHS
+        if needed and others and p.name not in named:
+            first = others[0]
             remedy = f"has no default, and {first} needs it: give it in {p.unit}, or remove {first}"
             problems.append(Problem(f"parameters.{p.name}", None, remedy))
     return problems

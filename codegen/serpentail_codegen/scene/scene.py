@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from serpentail_scene.keys import KEYS
-from serpentail_scene.parameters import Value, parts_of
+from serpentail_scene.parameters import WIDTHS, Value, parts_of
 
 from .variant import EQUAL, Shape
 
@@ -89,6 +89,12 @@ class Scene:
     def passive(self) -> tuple[str, ...]:
         """Parts of the passive tail that the scene has."""
         return parts_of(self.parameters)
+
+    @property
+    def widths(self) -> int:
+        """Number of widths of the tail in the air; 0 without air."""
+        value = self.parameters.get(WIDTHS, ())
+        return len(value) if isinstance(value, tuple) else 1
 
     @property
     def parts(self) -> dict[str, "Scene"]:

@@ -7,7 +7,7 @@ others, such as the workspace of C functions.
 from collections.abc import Sequence
 from typing import Any
 
-from serpentail_scene.parameters import EACH, Parameter
+from serpentail_scene.parameters import WIDTHS, Parameter
 from serpentail_scene.signatures.arguments import Argument
 from serpentail_scene.signatures.table import EXACT_DERIVATIVES, SIGNATURES
 
@@ -86,7 +86,8 @@ def parameter_entry(values: Parameters, shape: Shape, parameter: Parameter) -> d
         "in_struct": not parameter.name.endswith("link_radius"),
     }
     # one number may stand for all of them
-    return entry | ({"per": "coordinate"} if parameter.needs in EACH else {})
+    per = "width" if parameter.name == WIDTHS else "coordinate"
+    return entry | ({"per": per} if parameter.spread else {})
 
 
 def function_entry(function: Function, tail: Tail, emissions: Sequence[Emission]) -> dict[str, Any]:

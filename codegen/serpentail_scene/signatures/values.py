@@ -40,6 +40,8 @@ SIGNATURES = (
     Signature("forward_dynamics_external",
         "acceleration v_dot under joint torques and external loads, Eq. 1",
         (Q, V, TAU, F_EXT), (V_DOT,), VALUE),
+    Signature("air_force", "generalised force of the air, of the law in mechanics/air.py",
+        (Q, V), (FORCE,), VALUE, needs="air"),
     Signature("energy", "kinetic and potential energy of torso and tail",
         (Q, V), (KINETIC, POTENTIAL), VALUE),
     Signature("momentum", "linear and angular momentum of torso and tail",

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import Any, Unpack
 
-from serpentail_scene.parameters import NAMES, name_in
+from serpentail_scene.parameters import AIR_NAMES, NAMES, PASSIVE_NAMES, name_in
 from serpentail_scene.purposes import functions_of
 
 from ..basics.errors import ModelError
@@ -23,11 +23,6 @@ PIECES = {
     *("link_masses", "link_lengths", "link_centers", "link_inertias"),
     *("arc_masses", "arc_lengths"),
 }
-# parameters of springs, damping and stops
-PASSIVE = {"tail_stiffness", "tail_rest", "tail_damping"} | {
-    f"tail_stop_{name}" for name in ("lower", "upper", "stiffness", "width")
-}
-PASSIVE |= {"tail_rotor"} | {f"motor_{name}" for name in ("torque", "speed", "power")}
 # keys on which no generated code depends
 LEFT_OUT = ("plan", "simulate", "identify", "phase", "sweep", "description")
 ANY = "contacts"  # any group of points that touch the ground
@@ -156,7 +151,7 @@ def _shapes(name: str, scene: Mapping[str, Any], own: Mapping[str, Any]) -> bool
         if name.startswith(f"{chain}_") and name not in NAMES and isinstance(table, Mapping):
             full = {name_in(chain, n): n for n in NAMES}.get(name, name)
             return _shapes(full, table, {f"tail_{key}": key for key in table} | dict(table))
-    if name in ("mount_angles", "gravity_vector") or name in PASSIVE:
+    if name in ("mount_angles", "gravity_vector") or name in (*PASSIVE_NAMES, *AIR_NAMES):
         return name not in own
     if name not in PIECES or name in own:
         return False

@@ -43,6 +43,14 @@ class ParameterOptions(TypedDict, total=False):
     delta_m: Quantity
     hip: Quantities
     torso_semi_axes: Quantities
+    air_density: Quantity
+    wind: Quantities
+    tail_widths: Quantities
+    tail_drag: Quantities
+    tail_drag_speed: Quantity
+    torso_drag: Quantities
+    torso_drag_turning: Quantities
+    torso_air_damping: Quantities
     tail_stiffness: Quantities
     tail_rest: Quantities
     tail_damping: Quantities

@@ -8,6 +8,7 @@ from serpentail_scene.signatures.arguments import FORCE, MULTIPLIER, V_DOT, Argu
 
 from ...ir.program import Array
 from .. import dynamics, kinematics
+from ..air import core_airspeed
 from ..draft import Draft
 from ..function import Function, signed
 from ..layout import block
@@ -24,13 +25,23 @@ FIRST_MOMENT = Argument("moment", (3,), "first moment about B, torso axes (kg m)
 
 
 def assemble_core(draft: Draft, arrays: dict[str, Array]) -> None:
-    """H v_dot + C with all vectors in torso axes: it depends on no attitude and no gravity."""
+    """H v_dot + C with all vectors in torso axes: it depends on no attitude and no gravity; in air,
+    v begins with the velocity of B against it.
+    """
     state = draft.state(arrays["q"], arrays["v"])
+    core_forces(draft, state, state.omega, arrays, core_airspeed(draft, state))
     force, v_dot = arrays["force"], arrays["v_dot"]
-    segments = prepared(draft, state)
-    motion = Motion(state.omega, draft.of_torso(v_dot, OMEGA), arrays["a"][0])
-    inertial_forces(draft, segments, motion, v_dot, force)
     add_passive_forces(draft, state, lambda i: draft.tail.segment_v(force, i), v_dot)
+
+
+def core_forces(
+    draft: Draft, state: State, omega: Ref, arrays: dict[str, Array], u: Ref | None = None
+) -> None:
+    """Store H v_dot + C in torso axes; u: the velocity of B against the air."""
+    v_dot = arrays["v_dot"]
+    segments = prepared(draft, state)
+    motion = Motion(omega, draft.of_torso(v_dot, OMEGA), arrays["a"][0], u)
+    inertial_forces(draft, segments, motion, v_dot, arrays["force"])
 
 
 def assemble_first_moment(draft: Draft, arrays: dict[str, Array]) -> None:
@@ -48,6 +59,8 @@ def assemble_virtual_power(draft: Draft, arrays: dict[str, Array]) -> None:
     # the torso moves by v and v_dot, and virtually by the multiplier
     motion = {"w": state.omega, "w_dot": block(v_dot, OMEGA), "a": arrays["a"][0]}
     virtual = {"w_virtual": block(multiplier, OMEGA), "u_virtual": arrays["u"][0]}
+    if u := core_airspeed(draft, state):
+        motion["u"] = u
     virtual_power(draft, segments, Vectors(motion | virtual), multiplier, v_dot, arrays["power"][0])
     add_passive_power(draft, state, multiplier, v_dot, arrays["power"][0])
 

@@ -1,6 +1,6 @@
 """Exact first derivatives: Jacobians, and products with them.
 
-No result depends on the position or the velocity of B.
+No result depends on the position of B, and without air none on its velocity.
 """
 
 from collections.abc import Callable
@@ -12,6 +12,7 @@ from ...autodiff.reverse import adjoint_program
 from ...ir.program import Array, Index, Ref
 from ...mechanics import rotation_derivatives as turns
 from ...mechanics import rotations, torso, translation
+from ..air import in_air, move_in_air
 from ..draft import Draft
 from ..dynamics import assemble_forward_dynamics
 from ..factored import FactoredDynamics, Loads
@@ -19,6 +20,7 @@ from ..function import assemble
 from ..layout import block
 from ..scope import Vectors
 from ..sweeps.pieces import attitude
+from ..tail import Tail
 from .by_segments import derivatives_by_segments
 from .differentiated import CORE, FUNCTIONS, VIRTUAL_POWER
 from .directions import Directions
@@ -48,15 +50,17 @@ def assemble_inverse_dynamics_derivatives(draft: Draft, arrays: dict[str, Array]
         rows = core_rows(draft, directions, {"q": arrays["q"], "v": arrays["v"]} | motion)
         directions.spread(draft, rows, arrays["dq"], arrays["dv"])
         return
-    directions = Directions(tail, ("turn", "omega"))
+    directions = Directions(tail, ("turn", *drift(tail), "omega"))
     lanes, active = directions.count, ("q", "v", "a")
     a, turn = acceleration_at(draft, R, arrays["v_dot"]), directions.turn(draft)
+    v = in_air(draft, arrays["q"], arrays["v"], R)
     inner = tangent_program(
         assemble(CORE, tail), active, lanes, directions.outward, kept=("force",)
     )
     force, rows = draft.array("force", tail.nv), draft.wide("rows", tail.nv, lanes)
-    arguments = {name: arrays[name] for name in ("q", "v", "v_dot")} | {"a": a, "force": force}
+    arguments = {"q": arrays["q"], "v": v, "v_dot": arrays["v_dot"], "a": a, "force": force}
     tangents = directions.tangents(draft) | {"d_a": turned_back(draft, a, turn)}
+    move_in_air(draft, v, tangents["d_v"], R, turn)
     draft.call(inner, **arguments, **tangents, d_force=rows)
 
     # the force in world axes rotates with the torso
@@ -66,12 +70,23 @@ def assemble_inverse_dynamics_derivatives(draft: Draft, arrays: dict[str, Array]
     directions.spread(draft, rows, arrays["dq"], arrays["dv"])
 
 
-def core_rows(draft: Draft, directions: Directions, arguments: dict[str, Array]) -> Array:
-    """Return tangents of H v_dot + C in torso axes at fixed accelerations, as wide rows."""
-    lanes = directions.count
+def drift(tail: Tail) -> tuple[str, ...]:
+    """Return the direction of the velocity of B if forces depend on it."""
+    return ("p_dot",) if tail.widths else ()
+
+
+def core_rows(
+    draft: Draft, directions: Directions, arguments: dict[str, Array], R: Ref | None = None
+) -> Array:
+    """Return tangents of H v_dot + C in torso axes at fixed accelerations, as wide rows; R is the
+    attitude of a torso that can turn.
+    """
+    lanes, tangents = directions.count, directions.tangents(draft)
+    if R and "turn" in directions.torso:
+        move_in_air(draft, arguments["v"], tangents["d_v"], R, directions.turn(draft))
     inner = tangent_program(assemble(CORE, draft.tail), ("q", "v"), lanes, directions.outward)
     rows = draft.wide("rows", draft.tail.nv, lanes)
-    draft.call(inner, d_force=rows, **arguments, **directions.tangents(draft))
+    draft.call(inner, d_force=rows, **arguments, **tangents)
     return rows
 
 
@@ -116,15 +131,18 @@ def assemble_forward_dynamics_derivatives(draft: Draft, arrays: dict[str, Array]
         return
     tail, nv = draft.tail, draft.tail.nv
     factored, motion = forward_dynamics_first(draft, arrays)
-    directions = Directions(tail, () if tail.fixed else ("omega",))
+    turning = ("turn", "p_dot") if tail.widths else ()
+    directions = Directions(tail, () if tail.fixed else (*turning, "omega"))
     x = draft.wide("x", nv, directions.count)
-    rows = core_rows(draft, directions, {"q": arrays["q"], "v": arrays["v"]} | motion)
+    v = in_air(draft, arrays["q"], arrays["v"], factored.R)
+    rows = core_rows(draft, directions, {"q": arrays["q"], "v": v} | motion, factored.R)
     factored.solve(minus(draft, rows), x)
     directions.spread(draft, x, arrays["dq"], arrays["dv"])
 
     # how p_b_ddot moves with a rotation of the torso
     if not tail.fixed:
-        turned = {f"row_{r}": arrays["dq"].part(nv * r + OMEGA.start, 3) for r in range(3)}
+        adds = "_" if turning else ""
+        turned = {f"row_{r}{adds}": arrays["dq"].part(nv * r + OMEGA.start, 3) for r in range(3)}
         reads = {"R": factored.R, "a": motion["a"][0]}
         draft.step(translation.turned_acceleration, reads, **turned)
     torque_columns(draft, factored, arrays["dtau"])
@@ -150,8 +168,13 @@ def assemble_forward_dynamics_jvp(draft: Draft, arrays: dict[str, Array]) -> Non
     d_q, rows, x = draft.array("d_q", tail.nq), draft.array("rows", tail.nv), arrays["dv_dot"]
     draft.copy(tail.all_q(d_q), tail.all_v(arrays["dq"]))
     inner = tangent_program(assemble(CORE, tail), ("q", "v"))
-    arguments = {name: arrays[name] for name in ("q", "v")} | motion
-    draft.call(inner, **arguments, d_q=d_q, d_v=arrays["dv"], d_force=rows)
+    v, d_v = in_air(draft, arrays["q"], arrays["v"], factored.R), arrays["dv"]
+    if tail.widths:
+        d_v = draft.array("d_v", tail.nv)
+        draft.copy(d_v.whole(), arrays["dv"].whole())
+        move_in_air(draft, v, d_v, factored.R, block(arrays["dq"], OMEGA))
+    arguments = {"q": arrays["q"], "v": v} | motion
+    draft.call(inner, **arguments, d_q=d_q, d_v=d_v, d_force=rows)
     factored.solve(minus(draft, rows, lambda k: arrays["dtau"].part(k, 1)), x)
 
     # how p_b_ddot moves with a rotation of the torso
@@ -163,7 +186,8 @@ def assemble_forward_dynamics_jvp(draft: Draft, arrays: dict[str, Array]) -> Non
 def assemble_inverse_dynamics_vjp(draft: Draft, arrays: dict[str, Array]) -> None:
     """Gradient of lambda^T (H v_dot + C), by one sweep outward along the tail and one back."""
     axes = torso_axes(draft, arrays["q"], arrays["v_dot"], arrays["multiplier"])
-    arguments = {name: arrays[name] for name in ("q", "v", "v_dot", "multiplier")}
+    arguments = {name: arrays[name] for name in ("q", "v_dot", "multiplier")}
+    arguments["v"] = in_air(draft, arrays["q"], arrays["v"], axes.R)
     wanted = {"b_v": arrays["dv"], "b_v_dot": arrays["dv_dot"]}
     force = power_gradient(draft, axes, arguments, 1, arrays["dq"], wanted)
     vector = {"R": axes.R, "vector": force}
@@ -191,6 +215,11 @@ def power_gradient(
     draft.fill(block(dq, POSITION), 0)
     turned = {name: array[0] for name, array in by.items()}
     draft.step(turns.power_by_turn, axes.vectors(), turned, turn=block(dq, OMEGA))
+    if tail.widths:
+        by_u = block(others["b_v"], VELOCITY)
+        reads = {"gradient": by_u, "vector": block(arguments["v"], VELOCITY)}
+        draft.step(turns.term_by_turn, reads, turn_=block(dq, OMEGA))
+        draft.step(rotations.world_vector, {"R": axes.R, "vector": by_u}, vector=by_u)
     draft.copy(tail.all_v(dq), tail.all_q(gradient))
     return by["b_a"][0]
 
@@ -211,7 +240,8 @@ def assemble_forward_dynamics_vjp(draft: Draft, arrays: dict[str, Array]) -> Non
 
     # minus the gradient of mu^T (H v_dot + C)
     axes = torso_axes(draft, arrays["q"], v_dot, mu, factored.R)
-    arguments = {name: arrays[name] for name in ("q", "v")} | {"v_dot": v_dot, "multiplier": mu}
+    v = in_air(draft, arrays["q"], arrays["v"], axes.R)
+    arguments = {"q": arrays["q"], "v": v, "v_dot": v_dot, "multiplier": mu}
     power_gradient(draft, axes, arguments, -1, arrays["dq"], {"b_v": arrays["dv"]})
     draft.copy(arrays["dtau"].part(0, tail.nt), tail.all_v(mu))
 

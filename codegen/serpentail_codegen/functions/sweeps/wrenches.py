@@ -6,7 +6,7 @@ from dataclasses import replace
 from serpentail_scene.layout import OMEGA, VELOCITY
 
 from ...ir.program import Array, Index, Ref
-from ...mechanics import branch, mount, torso
+from ...mechanics import air, branch, mount, torso
 from ..draft import Draft
 from ..layout import block
 from ..scope import Motion, State, Vectors
@@ -21,18 +21,28 @@ def forward_wrenches(
     """Velocities and accelerations to the tip, and the inertial wrench of every piece (Eqs. A1 to
     A12, 17, 19).
 
-    ``start`` is the torso's motion; ``v_dot`` None means that the tail does not accelerate.
+    ``start`` is the torso's motion; ``v_dot`` None means that the tail does not accelerate. Of a
+    torso that moves against the air, the wrenches are less those of the air.
     """
     wrench = draft.array("wrench", 6, draft.tail.pieces)
     motion = Motion(*(draft.vector(f"{name}_here", 3) for name in ("w", "w_dot", "a")))
     draft.copy(motion.w, start.w)
     draft.copy(motion.w_dot, start.w_dot)
     draft.step(torso.mount_acceleration, start, a_mount=motion.a)
+    u = against_air(draft, start) if start.u else None
     across(draft, mount.motion_at_root, motion.vectors())
     wrenches = Wrenches(wrench, mechanism(draft).declare_torques(draft))
     for i, g in each_piece(draft):
-        mechanism(draft).move(draft, segments, (i, g), motion, v_dot, wrenches.at(i, g))
+        mechanism(draft).move(draft, segments, (i, g), motion, v_dot, wrenches.at(i, g), u)
     return wrenches
+
+
+def against_air(draft: Draft, start: Motion | Vectors) -> Ref:
+    """Carry the velocity ``u`` of B against the air to the mount, into the axes at the root."""
+    u, at_torso = draft.vector("u_here", 3), {"w": start["w"], "u": start["u"]}
+    draft.step(torso.mount_velocity, at_torso, u=u)
+    across(draft, mount.flow_at_root, u=u)
+    return u
 
 
 def gather_wrenches(
@@ -74,13 +84,21 @@ def inertial_forces(
             add(draft, branch.chain_wrench, total, sums)
         elif not draft.tail.fixed:
             draft.step(torso.torso_wrench, motion, total, **sums)
+            add_torso_drag(draft, motion, sums)
 
 
-def core_bias(draft: Draft, segments: list[Segments], bias: Array) -> None:
+def add_torso_drag(draft: Draft, motion: Motion, sums: Vectors) -> None:
+    """Add minus ``force, moment`` of the air on a torso that moves against it."""
+    if motion.u:
+        writes = {f"{name}_": ref for name, ref in sums.named.items()}
+        draft.step(air.torso_drag, motion, **writes)
+
+
+def core_bias(draft: Draft, segments: list[Segments], bias: Array, u: Ref | None = None) -> None:
     """C without gravity and translation: force and moment at B in torso axes, then the tail's
-    forces; on a fixed base those alone, with gravity.
+    forces; on a fixed base those alone, with gravity. ``u``: velocity of B against the air.
     """
-    motion = torso_without_acceleration(draft, segments[0].state)
+    motion = replace(torso_without_acceleration(draft, segments[0].state), u=u)
     inertial_forces(draft, segments, motion, None, bias)
 
 
@@ -105,17 +123,25 @@ def virtual_power(
     power: Ref,
 ) -> None:
     """Sum the power of all inertial wrenches when the animal moves with the velocity
-    ``multiplier``; ``segments`` are those of each chain.
+    ``multiplier``, less that of the air; ``segments`` are those of each chain.
 
     ``start``: ``w``, ``w_dot``, ``a`` of the torso and ``w_virtual``, ``u_virtual``, its virtual
-    velocities.
+    velocities; in air also ``u``, its velocity against it.
     """
     draft.step(torso.torso_power, start, power=power)
+    flow = {}
+    if draft.tail.widths:
+        flow["u"] = against_air(draft, start)
+        draft.step(air.torso_drag_power, start, power_=power)
     for own in on_each(draft, segments):
         carried = _virtual_at_root(draft, seen_virtually(draft, start))
 
         # from the mount to the tip
         for i, g in each_piece(draft):
+            if flow:
+                both = Vectors({**carried, **flow})
+                virtual = draft.tail.segment_v(multiplier, i)
+                mechanism(draft).drag_power(draft, own, (i, g), virtual, both, power)
             rates = (
                 own.motion(i, v_dot),
                 {"virtual_rates": draft.tail.segment_v(multiplier, i)},

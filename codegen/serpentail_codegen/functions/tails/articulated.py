@@ -4,11 +4,11 @@ from collections.abc import Callable, Mapping
 from fractions import Fraction
 
 from ...ir.program import Array, Ref
-from ...mechanics import link
+from ...mechanics import air, link
 from ...scene.variant import SegmentRun
 from ..draft import Draft
 from ..scope import Instead, Motion, State, Vectors
-from .mechanism import Mechanism, Place, Segments, in_turn, simplified
+from .mechanism import Mechanism, Place, Segments, in_turn, simplified, widths
 
 JOINT = {"joint": 4, "twice": 10}
 SIZES = {"link_inertias": 3}  # parameters with more than one number for each link
@@ -73,8 +73,9 @@ def move_link(
     motion: Motion,
     v_dot: Array | None,
     wrench: Vectors,
+    u: Ref | None = None,
 ) -> None:
-    """Carry ``w, w_dot, a`` over one link and store its inertial wrench."""
+    """Carry ``w, w_dot, a`` over one link and store its inertial wrench, less that of the air."""
     joint = draft.scratch(a_joint=3, swing=3)
     piece = segments.at(*place)
     draft.step(
@@ -87,6 +88,36 @@ def move_link(
     )
     inertial = simplified(link.link_wrench, segments.state)
     draft.step(inertial, piece, motion, joint, F=wrench["F"])
+    if u:
+        add_drag(draft, segments, place, Vectors({"w": motion.w, "u": u}), wrench)
+
+
+def add_drag(
+    draft: Draft, segments: Segments, place: Place, velocity: Vectors, wrench: Vectors
+) -> None:
+    """Carry u over one link, which turns with w, and add minus the wrench of the air."""
+    piece, joint = segments.at(*place), draft.scratch(u_joint=3)
+    draft.step(link.link_linear_velocity, piece, velocity, u=velocity["u"], **joint)
+    draft.step(air.link_drag, piece, velocity, joint, widths(draft, place[1]), F_=wrench["F"])
+
+
+def fly_link(
+    draft: Draft, segments: Segments, place: Place, velocity: Vectors, wrench: Vectors
+) -> None:
+    """Carry ``w, u`` over one link and store minus the wrench of the air."""
+    piece, rates = segments.at(*place), segments.motion(place[0])
+    draft.step(link.link_angular_velocity, piece, rates, velocity, w=velocity["w"])
+    draft.fill(wrench["F"], 0)
+    add_drag(draft, segments, place, velocity, wrench)
+
+
+def link_drag_power(
+    draft: Draft, segments: Segments, place: Place, virtual_rates: Ref, flow: Vectors, power: Ref
+) -> None:
+    """Carry ``u`` over one link and add the power of minus the wrench of the air."""
+    reads = segments.at(*place), segments.motion(place[0]), {"virtual_rates": virtual_rates}
+    own = widths(draft, place[1])
+    draft.step(air.link_drag_power, *reads, flow, own, power_=power, u=flow["u"])
 
 
 def link_momentum(
@@ -108,6 +139,8 @@ ARTICULATED = Mechanism(
     prepare_samples=prepare_link_samples,
     declare_torques=no_torques,
     move=move_link,
+    fly=fly_link,
+    drag_power=link_drag_power,
     momentum=link_momentum,
     pose=link.link_pose,
     twist=link.joint_twist,

@@ -1,18 +1,27 @@
 """The continuum tail: arc by arc, in the frames of the arcs' roots."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from fractions import Fraction
-from math import ceil, log2
+from math import ceil, log2, sqrt
 
 from ...ir.program import Array, Index, Ref
 from ...ir.step import Step
-from ...mechanics import arc, arc_inertia, arc_shape, arc_wrench
+from ...mechanics import air, arc, arc_inertia, arc_shape, arc_wrench
 from ...mechanics.lower import derive
 from ..draft import Draft
 from ..scope import Instead, Motion, State, Vectors
-from .mechanism import Mechanism, Place, Segments, in_turn, simplified
+from .mechanism import Mechanism, Place, Segments, in_turn, simplified, widths
 
 ARC = {"tip": 8, "shape": 16, "E": 9, "r": 3, "bend": 12}
+# places and weights of Gauss's rule of four points on [0, 1]
+PLACES = [sqrt(3 / 7 + side * 2 / 7 * sqrt(6 / 5)) for side in (-1, 1)]
+WEIGHTS = [(18 + side * sqrt(30)) / 72 for side in (1, -1)]
+SLICES = [
+    number
+    for place, weight in zip(PLACES, WEIGHTS, strict=True)
+    for side in (-1, 1)
+    for number in ((1 + side * place) / 2, weight)
+]
 OWN = {"h_own": 3, "I_own": 6, "pitch_own": 6, "yaw_own": 6, "H_own": 3}
 
 
@@ -123,14 +132,68 @@ def move_arc(
     motion: Motion,
     v_dot: Array | None,
     wrench: Vectors,
+    u: Ref | None = None,
 ) -> None:
-    """Store the inertial wrench of one arc and its generalised forces, then carry ``w, w_dot, a``
-    to its tip.
+    """Store the inertial wrench of one arc and its generalised forces, less those of the air, then
+    carry ``w, w_dot, a`` to its tip.
     """
     reads = segments.at(*place), segments.motion(place[0], v_dot), motion
     forced = v_dot is not None
     draft.step(simplified(arc_wrench.segment_wrench, segments.state, forced), *reads, **wrench)
+    if u:
+        add_drag(draft, segments, place, Vectors({"w": motion.w, "u": u}), wrench)
     draft.step(simplified(arc.segment_motion, segments.state, forced), *reads, **motion)
+
+
+def each_slice(draft: Draft, piece: Vectors) -> Iterator[Vectors]:
+    """Open a loop over the slices of an arc at which the air acts; yields what is known of each."""
+    numbers = draft.constant(draft.own("slices"), SLICES)
+    part = draft.scratch(angles_part=2, section_part=2, tip_part=8)
+    found = draft.scratch(E_slice=9, r_slice=3, bend_slice=12)
+    angles, section, tip = (part[name] for name in part.named)
+    with draft.loop("l", len(SLICES) // 2) as k:
+        own = {"slice": numbers.part(2 * k, 2)}
+        draft.step(air.part_of_arc, piece, own, angles=angles, section=section)
+        draft.step(shape_step(draft.tail.bend_range), {"angles": angles}, tip=tip)
+        bent = {"angles": angles, "section": section, "tip": tip}
+        at = {name.removesuffix("_slice"): ref for name, ref in found.named.items()}
+        draft.step(arc.segment_tip, bent, **at)
+        yield Vectors(own | at | {"section": piece["section"]})
+
+
+def add_drag(
+    draft: Draft, segments: Segments, place: Place, velocity: Vectors, wrench: Vectors
+) -> None:
+    """Add minus the wrench of the air on one arc and its generalised forces, then carry u to its
+    tip; w is that of the root.
+    """
+    piece, rates, own = segments.at(*place), segments.motion(place[0]), widths(draft, place[1])
+    adds = {f"{name}_": ref for name, ref in wrench.named.items()}
+    for at in each_slice(draft, piece):
+        draft.step(air.arc_drag, at, rates, velocity, own, **adds)
+    draft.step(arc.segment_velocity, piece, rates, velocity, u=velocity["u"])
+
+
+def fly_arc(
+    draft: Draft, segments: Segments, place: Place, velocity: Vectors, wrench: Vectors
+) -> None:
+    """Store minus the wrench of the air on one arc, then carry ``w, u`` to its tip."""
+    for ref in wrench.named.values():
+        draft.fill(ref, 0)
+    add_drag(draft, segments, place, velocity, wrench)
+    reads = segments.at(*place), segments.motion(place[0])
+    draft.step(arc.segment_velocity, *reads, velocity, w=velocity["w"])
+
+
+def arc_drag_power(
+    draft: Draft, segments: Segments, place: Place, virtual_rates: Ref, flow: Vectors, power: Ref
+) -> None:
+    """Add the power of minus the wrench of the air on one arc, and carry ``u`` to its tip."""
+    piece, rates, own = segments.at(*place), segments.motion(place[0]), widths(draft, place[1])
+    virtual = {"virtual_rates": virtual_rates}
+    for at in each_slice(draft, piece):
+        draft.step(air.arc_drag_power, at, rates, virtual, flow, own, power_=power)
+    draft.step(arc.segment_velocity, piece, rates, flow, u=flow["u"])
 
 
 def arc_momentum(
@@ -150,6 +213,8 @@ CONTINUUM = Mechanism(
     prepare_samples=prepare_arc_samples,
     declare_torques=bending_torques,
     move=move_arc,
+    fly=fly_arc,
+    drag_power=arc_drag_power,
     momentum=arc_momentum,
     pose=arc.segment_pose,
     twist=arc.segment_twist,

@@ -11,7 +11,7 @@ from ...ir.program import Array, Index, Ref
 from ...ir.step import Step, specialised
 from ...mechanics.lower import derived
 from ..draft import Draft
-from ..scope import Motion, State, Vectors
+from ..scope import Instead, Motion, State, Vectors
 
 StepFunction = Callable[..., dict]  # a function of mechanics, from which a step is derived
 Place = tuple[Index, Index]  # a segment, and a piece
@@ -85,8 +85,11 @@ class Mechanism:
     ``prepare_samples`` stores the data of what lies between two tail points; it is given the data
     of the pieces if they exist.
     ``declare_torques`` declares the array in which ``move`` stores the generalised forces of bends.
-    ``move(draft, segments, place, motion, v_dot, wrench)`` carries the motion over a piece and
-    stores its inertial wrench.
+    ``move(draft, segments, place, motion, v_dot, wrench, u)`` carries the motion over a piece and
+    stores its inertial wrench, less that of the air if ``u``, a velocity against it, is given.
+    ``fly(draft, segments, place, velocity, wrench)`` carries ``w, u`` over a piece and stores minus
+    the wrench of the air; ``drag_power(draft, segments, place, virtual_rates, flow, power)``
+    carries ``u`` of a flow and adds the power of that wrench under a virtual motion.
     ``momentum(draft, segments, place, velocity, writes)`` carries angular and linear velocity ``w,
     u`` over a piece and gives momentum or kinetic energy.
     A place is a segment and one of its pieces. The other fields are steps.
@@ -98,7 +101,9 @@ class Mechanism:
     describe: Callable[[Draft, Vectors], None]
     prepare_samples: Callable[[Draft, State, Segments | None], Segments]
     declare_torques: Callable[[Draft], Array | None]
-    move: Callable[[Draft, Segments, Place, Motion, Array | None, Vectors], None]
+    move: Callable[[Draft, Segments, Place, Motion, Array | None, Vectors, Ref | None], None]
+    fly: Callable[[Draft, Segments, Place, Vectors, Vectors], None]
+    drag_power: Callable[[Draft, Segments, Place, Ref, Vectors, Ref], None]
     momentum: Callable[[Draft, Segments, Place, Vectors, Mapping[str, Ref]], None]
     pose: StepFunction | Step
     twist: StepFunction | Step
@@ -116,3 +121,8 @@ def simplified(function: StepFunction | Step, state: State, forced: bool = True)
     if not forced:
         step = specialised(step, f"{step.name}_unforced", accelerations=none)
     return step
+
+
+def widths(draft: Draft, g: Index) -> Instead:
+    """Return the widths at both ends of piece g."""
+    return Instead({"tail_widths": draft.parameters["tail_widths"].array.part(g, 2)})
