@@ -23,8 +23,8 @@ from tests.support.rows import row
 
 from .compared import ROUNDING, called, limit, marked, model_of
 
-PASSIVE = ["elastic", "elastic_arcs"]
-FIXED = ["fixed", "fixed_arcs", "fixed_mixed"]
+PASSIVE = ["elastic", "elastic_arcs", "air", "air_mixed"]
+FIXED = ["air_fixed", "fixed", "fixed_arcs", "fixed_mixed"]
 every_model = pytest.mark.parametrize(
     "name", marked([*PASSIVE, *FIXED], quick=["mixed", "elastic", "fixed_mixed"])
 )

@@ -34,6 +34,17 @@ ELASTIC = {
 }
 MOTORS = {"motor_torque": "3 mN m", "motor_speed": [14, 10], "motor_power": "4 mW"}
 MOTORS |= {"tail_rotor": "20, 30 g cm2"}
+# faster than e, and across a wind; widths by the number of links and arcs
+AIR = {
+    "air_density": 1.2,
+    "wind": [1.0, 2.0, -0.5],
+    "tail_drag": [1.1, 0.05],
+    "torso_drag": "11, 6, 13 cm2",
+    "torso_drag_turning": [3e-8, 1e-8, 2e-8],
+    "torso_air_damping": [1e-6, 2e-6, 3e-6],
+}
+TAIL_IN_AIR = {n: AIR[n] for n in ("air_density", "wind", "tail_drag")}
+WIDTHS = [6, 10, 20, 8, 4, 7, 9, 12]  # mm
 TORSO = {"torso_mass": 0.11, "torso_inertia": [7e-5, 4e-5, 7.5e-5]}
 MOUNTED = {"tail_mount": [0.002, -0.04, 0], "mount_angles": [0.3, -0.6, 0.9]}
 OWN_LINKS = [
@@ -143,6 +154,11 @@ def _arcs(segments: int, **keys: Any) -> dict[str, Any]:
     return {"kind": "continuum", "segments": segments, **keys}
 
 
+def widths(pieces: int) -> dict[str, str]:
+    """Return widths of a tail of so many links and arcs."""
+    return {"tail_widths": f"{', '.join(map(str, WIDTHS[: pieces + 1]))} mm"}
+
+
 def _own(kind: str, segments: list, **keys: Any) -> dict[str, Any]:
     """Return the scene of a tail whose segments differ, on a tilted mount."""
     samples = {} if kind == "articulated" else {"samples": 3}
@@ -176,6 +192,11 @@ ZOO: dict[str, dict[str, Any]] = {
     "elastic_ground": _links(2, 2, parameters=ELASTIC, **GROUND),
     # motors that a run meets the limits of
     "motors": _links(1, 3, parameters=MOTORS),
+    # in air
+    "air": _links(2, 2, parameters=AIR | widths(4)),
+    "air_mixed": _own("mixed", MIXED, parameters=TORSO | MOUNTED | AIR | widths(7)),
+    "air_fixed": _links(2, 2, base="fixed", parameters=TAIL_IN_AIR),
+    "air_ground": _links(1, 3, parameters=AIR, **GROUND),
     # on the ground
     "ground_m1_n1": _links(1, 1, **GROUND),
     "ground": _links(1, 3, **GROUND),

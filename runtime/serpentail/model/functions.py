@@ -77,6 +77,21 @@ class ModelFunctions:
         """
         return self.kernels["inverse_dynamics"](q, v, v_dot, out=out)
 
+    def air_force(self, q: ArrayLike, v: ArrayLike, *, out: Out = None) -> Array:
+        """Compute the generalised force of the air, of the law in mechanics/air.py.
+
+        Parameters
+        ----------
+        q, v : array_like, shapes (nq,) and (nv,)
+
+        Returns
+        -------
+        force : ndarray, shape (nv,)
+            Generalised force: at B (N, world), moment (N m, body), torques of the tail coordinates
+            (N m).
+        """
+        return self.kernels["air_force"](q, v, out=out)
+
     def energy(self, q: ArrayLike, v: ArrayLike, *, out: Out = None) -> tuple[Array, Array]:
         """Compute the kinetic and potential energy of torso and tail.
 

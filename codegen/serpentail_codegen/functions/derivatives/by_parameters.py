@@ -1,9 +1,14 @@
 """Exact first derivatives with respect to the parameters."""
 
 from ...autodiff.forward import tangent_program
-from ...ir.program import Array
+from serpentail_scene.layout import VELOCITY
+
+from ...ir.program import Array, Ref
+from ...mechanics import air
+from ..air import in_air
 from ..draft import Draft
 from ..function import Function, assemble
+from ..layout import block
 from ..tail import struct_parameters
 from .differentiated import CORE, FUNCTIONS
 from .jacobians import forward_dynamics_first, minus
@@ -20,11 +25,12 @@ def assemble_forward_dynamics_parameter_derivatives(draft: Draft, arrays: dict[s
     """-H^-1 times the tangents of H v_dot + C with respect to every parameter, at fixed v_dot."""
     count = draft.tail.parameter_numbers
     factored, motion = forward_dynamics_first(draft, arrays)
-    arguments = {name: arrays[name] for name in ("q", "v")} | motion
+    v = in_air(draft, arrays["q"], arrays["v"], factored.R)
+    arguments = {"q": arrays["q"], "v": v} | motion
     # in torso axes gravity acts as an acceleration of a torso that moves
     inner = FUNCTIONS["inverse_dynamics"] if draft.tail.fixed else CORE
     arguments = {a.name: arguments[a.name] for a in inner.inputs}
-    rows = parameter_tangents(draft, inner, arguments)
+    rows = parameter_tangents(draft, inner, arguments, factored.R)
     x = draft.wide("x", draft.tail.nv, count)
     gravity = None
     name, size = draft.gravity
@@ -36,17 +42,27 @@ def assemble_forward_dynamics_parameter_derivatives(draft: Draft, arrays: dict[s
     spread_parameters(draft, x, arrays["dparameters"])
 
 
-def parameter_tangents(draft: Draft, function: Function, arguments: dict[str, Array]) -> Array:
+def parameter_tangents(
+    draft: Draft, function: Function, arguments: dict[str, Array], R: Ref | None = None
+) -> Array:
     """Return the tangents of a force with respect to every parameter: one lane for each number of
-    the struct.
+    the struct. R: the attitude of a torso in whose axes the function is.
     """
     count, lane, tangents = draft.tail.parameter_numbers, 0, {}
     names = [p.name for p in struct_parameters(draft.tail)]
+    winds = draft.tail.widths and function == CORE
+    names += ["v"] if winds else []
     inner = tangent_program(assemble(function, draft.tail), names, count)
     for p in struct_parameters(draft.tail):
         if any(a.name == f"d_{p.name}" for a in inner.arrays):
             tangents[f"d_{p.name}"] = draft.wide(f"d_{p.name}", p.size, count)
             draft.unit(tangents[f"d_{p.name}"][0], lane)
+        if winds and p.name == "wind":  # it is a velocity of the torso the other way
+            tangents["d_v"] = draft.wide("d_v", draft.tail.nv, count)
+            draft.fill(tangents["d_v"].whole(), 0)
+            d_u = block(tangents["d_v"], VELOCITY)
+            draft.unit(d_u, lane)
+            draft.step(air.against_wind, {"R": R, "gust": d_u}, u=d_u)
         lane += p.size
     rows = draft.wide("rows", draft.tail.nv, count)
     draft.call(inner, d_force=rows, **arguments, **tangents)

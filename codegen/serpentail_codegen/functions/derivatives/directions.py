@@ -92,7 +92,7 @@ class Directions:
         sizes = {"d_q": self.tail.nq} if self.coordinates else {}
         sizes |= {"d_v": self.tail.nv} if self.rates or self.torso else {}
         tangents = {n: draft.wide(f"{n}_{self.label}", s, self.count) for n, s in sizes.items()}
-        if self.torso and (len(self.axes) < 3 or not self.rates):
+        if self.torso and (len(self.axes) < 3 or not self.rates or self.tail.widths):
             draft.fill(tangents["d_v"].whole(), 0)  # rows that no direction moves
         for lane, name in enumerate(self.torso):
             if name != "turn":

@@ -7,9 +7,10 @@ from serpentail_scene.layout import OMEGA, TORSO_NV, VELOCITY
 
 from ...autodiff.forward import Lanes, tangent_program, tangents_together
 from ...autodiff.reverse import adjoint_program
-from ...ir.program import Array, Ref, padded
+from ...ir.program import Array, Index, Ref, padded
 from ...mechanics import rotation_derivatives as turns
 from ...mechanics import rotations
+from ..air import in_air, move_in_air
 from ..draft import Draft
 from ..function import Function, assemble
 from ..layout import block
@@ -35,7 +36,8 @@ def assemble_inverse_dynamics_hessian(draft: Draft, arrays: dict[str, Array]) ->
     of_q, of_v = split_directions(draft.tail)
     axes = torso_axes(draft, arrays["q"], arrays["v_dot"], arrays["multiplier"])
     gradient = {name: draft.array(f"b_{name}", 3) for name in ("a", "u")}
-    given = {name: arrays[name] for name in ("q", "v", "v_dot", "multiplier")} | axes.arrays()
+    given = {name: arrays[name] for name in ("q", "v_dot", "multiplier")} | axes.arrays()
+    given["v"] = in_air(draft, arrays["q"], arrays["v"], axes.R)
     given["b_power"] = draft.fixed("one", [1]).array
     d_q, d_v = of_q.tangents(draft), of_v.tangents(draft)
     given |= d_q | {"dv_v": d_v["d_v"]}
@@ -58,6 +60,8 @@ def assemble_inverse_dynamics_hessian(draft: Draft, arrays: dict[str, Array]) ->
     draft.step(turns.term_by_turn, change, turn=turn_v[0])
     blocks.of_turn(turn_q, turn_v)
     turned_twice(draft, d_q, axes, gradient, blocks)
+    if draft.tail.widths:
+        add_drift(draft, axes, given, arrays)
 
 
 def split_directions(tail: Tail) -> tuple[Directions, Directions]:
@@ -129,6 +133,68 @@ def turned_twice(
     change = {"gradient": d_h[0], "vector": axes.u[0]}
     draft.step(turns.term_by_turn, change, turn=by_turn[0])
     blocks.of_turned_inertia(by_turn)
+
+
+def add_drift(
+    draft: Draft, axes: TorsoAxes, given: dict[str, Array], arrays: dict[str, Array]
+) -> None:
+    """Add what the velocity of B against the air gives: second derivatives by p_dot, and by a turn
+    of the torso, in whose axes it turns back.
+    """
+    tail, nv, first = draft.tail, draft.tail.nv, OMEGA.start
+    directions = Directions(tail, ("turn", "p_dot"), coordinates=False, rates=False)
+    turn, d_v = directions.turn(draft), directions.tangents(draft)["d_v"]
+    move_in_air(draft, given["v"], d_v, axes.R, turn)
+    sizes = {"q": tail.nq, "v": nv, "u": 3}
+    by = {name: draft.wide(f"drift_{name}", size, directions.count) for name, size in sizes.items()}
+    b_v = draft.array("b_v", nv)
+    inner = adjoint_program(assemble(VIRTUAL_POWER, tail), tuple(sizes), ("power",))
+    inner = tangent_program(inner, ("v",), directions.count, kept=("b_v",))
+    arguments = {name: given[name] for name in ("q", "v", "v_dot", "multiplier", "a", "u", "b_power")}
+    outputs = {f"d_b_{name}": array for name, array in by.items()}
+    draft.call(inner, **arguments, d_v=d_v, b_v=b_v, **outputs)
+
+    # by a turn twice: of both velocities, and of that against the air alone
+    both, other = (draft.wide(name, 3, directions.count) for name in ("by_turns", "by_u_turned"))
+    flow = {"gradient": block(by["v"], VELOCITY), "vector": block(given["v"], VELOCITY)}
+    draft.step(turns.term_by_turn, {"gradient": by["u"][0], "vector": axes.u[0]}, turn=other[0])
+    draft.copy(both.whole(), other.whole())
+    draft.step(turns.term_by_turn, flow, turn_=both[0])
+    rows = {f"row_{r}_": arrays["qq"].part(nv * (OMEGA.start + r) + OMEGA.start, 3) for r in range(3)}
+    reads = {"gradient": block(b_v, VELOCITY), "vector": flow["vector"]}
+    draft.step(turns.term_curvature, reads, **rows)
+
+    # the gradient by p_dot is in world axes
+    change = flow["gradient"]
+    reads = {"R": axes.R, "force": block(b_v, VELOCITY), "turn": turn, "change": change}
+    draft.step(turns.turning_force, reads, change=change)
+
+    def add(name: str, row: Index | int, column: Index | int, lanes: Ref, down: bool = False) -> None:
+        to = arrays[name].part(nv * row + column, 3, nv if down else 1)
+        draft.copy(to, lanes, adds=True)
+
+    with draft.loop("k", 3) as k:
+        add("qq", first + k, first, both.lane(k, 0, 3))
+        add("qq", first, first + k, other.lane(k, 0, 3), down=True)
+        add("qv", first + k, 0, other.lane(k, 3, 3))
+        add("qv", first, k, by["v"].lane(k, 0, 3), down=True)
+        add("vv", k, 0, by["v"].lane(k, 3, 3))
+    with draft.loop("k", nv - first) as number:
+        k = number + first
+        add("qv", first, k, by["v"].lane(k, 0, 3), down=True)
+        add("vv", k, 0, by["v"].lane(k, 3, 3))
+        add("vv", 0, k, by["v"].lane(k, 3, 3), down=True)
+    with draft.loop("k", tail.nt) as number:
+        k = number + TORSO_NV
+        add("qq", k, first, by["q"].lane(number + tail.torso_nq, 0, 3))
+        add("qq", first, k, by["q"].lane(number + tail.torso_nq, 0, 3), down=True)
+        add("qv", k, 0, by["q"].lane(number + tail.torso_nq, 3, 3))
+
+    # the same numbers on both sides of the diagonal
+    for name, at in (("qq", first), ("vv", 0)):
+        with draft.loop("k", 3) as k, draft.loop("l", k) as other:
+            H, row, column = arrays[name], k + at, other + at
+            draft.copy(H.part(nv * column + row, 1), H.part(nv * row + column, 1))
 
 
 def own_tail_mass(draft: Draft) -> dict[str, Ref]:

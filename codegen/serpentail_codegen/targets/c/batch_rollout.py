@@ -68,11 +68,11 @@ def batch_rollout(
 ) -> BatchRollout | None:
     """Return what advances runs in lanes, of a scene with rollout and a free torso.
 
-    With contacts it needs implicit methods. Trees with damping have none: their damping is not one
+    In air there is none. With contacts it needs implicit methods. Trees with damping have none: their damping is not one
     array.
     """
     names = {f.function.name for f in printed}
-    if "rollout" not in scene.functions or tail.fixed:
+    if "rollout" not in scene.functions or tail.fixed or tail.widths:
         return None
     if tail.branches and "damping" in tail.passive:
         return None

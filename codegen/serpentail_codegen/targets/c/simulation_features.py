@@ -25,14 +25,16 @@ class SimulationFeatures:
     contacts: int  # points that can touch the ground
     groups: tuple[tuple[str, int], ...]  # of these points: name and count
     legs: bool
+    air: bool
 
     @property
     def ledger(self) -> tuple[tuple[str, int], ...]:
         """Return the sums that a run keeps, and how many numbers each has: works (J), impulses of
-        groups (N s).
+        groups (N s), work and impulse of the air.
         """
         works = ["torques", "damping"] + ["ground"] * bool(self.contacts) + ["legs"] * self.legs
-        return tuple((name, 1) for name in works) + tuple((name, 3) for name, _ in self.groups)
+        sums = tuple((name, 1) for name in works) + tuple((name, 3) for name, _ in self.groups)
+        return sums + (("air", 1), ("air", 3)) * self.air
 
     @property
     def parts(self) -> tuple[tuple[str, int, int], ...]:
@@ -73,4 +75,5 @@ def simulation_features(tail: Tail, names: Collection[str], factors: int) -> Sim
     factors.
     """
     groups, legs = tuple(tail.groups.items()), "feet" in tail.contacts
-    return SimulationFeatures("pfl" in names, factors, tail.points, groups, legs)
+    air = tail.widths > 0
+    return SimulationFeatures("pfl" in names, factors, tail.points, groups, legs, air)
