@@ -188,8 +188,10 @@ class Tail(Sizes):
 
     @property
     def airborne_state(self) -> int:
-        """Length of an airborne state: a quaternion, the tail coordinates, their rates."""
-        return 4 + 2 * self.nt
+        """Length of an airborne state: a quaternion, the tail coordinates, their rates; in air also
+        the velocity of B against it, and omega.
+        """
+        return 4 + 2 * self.nt + 6 * bool(self.widths)
 
     @property
     def airborne_arguments(self) -> int:

@@ -17,7 +17,15 @@ from ..derivatives.jacobians import weightless
 from ..draft import Draft
 from ..function import Assembly, assemble
 from ..layout import block
-from .balance import QUATERNION, TURN, Balance, assemble_rates, at_coordinates, at_rates
+from .balance import (
+    QUATERNION,
+    TURN,
+    Balance,
+    assemble_rates,
+    at_coordinates,
+    at_drift,
+    at_rates,
+)
 from .equations import AT_BASE, CONSERVED
 from .slopes import AirborneSlopes, assemble_derivatives, placed
 
@@ -40,8 +48,10 @@ def assemble_hessian(draft: Draft, arrays: dict[str, Array]) -> None:
     """Rates of an airborne state with their Jacobian, and the Hessian of mu^T y."""
     b, slopes = assemble_derivatives(draft, arrays)
     found = curvatures(draft, b, slopes, arrays["weights"])
-    turning = store_turning(draft, b, found, arrays["weights"])
-    add_momenta(draft, b, found, turning)
+    turning = None
+    if not draft.tail.widths:
+        turning = store_turning(draft, b, found, arrays["weights"])
+        add_momenta(draft, b, found, turning)
     draft.fill(arrays["hessian"].whole(), 0)
     store_state(draft, slopes, found, arrays["hessian"])
     add_attitude(draft, b, slopes, turning, arrays)
@@ -56,7 +66,12 @@ def curvatures(draft: Draft, b: Balance, slopes: AirborneSlopes, mu: Array) -> C
     """
     tail, nt, count = draft.tail, draft.tail.nt, draft.tail.airborne_state
     multiplier, u = draft.array("multiplier", tail.nv), draft.array("u", 3)
-    b.factored.solve(weightless(draft, lambda k: mu.part(k + at_rates(tail), 1)), multiplier)
+    load = {}
+    if tail.widths:
+        at = at_drift(tail)
+        load = {"load_force": mu.part(at, 3), "load_moment": mu.part(at + 3, TURN)}
+    torques = weightless(draft, lambda k: mu.part(k + at_rates(tail), 1), **load)
+    b.factored.solve(torques, multiplier)
     draft.copy(u[0], block(multiplier, VELOCITY))
 
     sizes = {"q": tail.nq, "v": tail.nv, "v_dot": tail.nv, "a": 3}
@@ -131,17 +146,29 @@ def store_state(draft: Draft, slopes: AirborneSlopes, found: Curvatures, H: Arra
 
 
 def add_attitude(
-    draft: Draft, b: Balance, slopes: AirborneSlopes, turning: Array, arrays: dict[str, Array]
+    draft: Draft,
+    b: Balance,
+    slopes: AirborneSlopes,
+    turning: Array | None,
+    arrays: dict[str, Array],
 ) -> None:
-    """Add the second derivatives by the quaternion: of the momentum in torso axes, and of the
-    quaternion's rate, which is bilinear in it and omega.
+    """Add the second derivatives by the quaternion: of the momentum in torso axes, in air of
+    gravity, and of the quaternion's rate, which is bilinear in it and omega.
     """
     tail, size, H = draft.tail, draft.tail.airborne_arguments, arrays["hessian"]
     unit, twice = draft.wide("d_numbers", 4, 4), draft.wide("d_b_quaternion", 4, 4)
     draft.unit(unit[0], 0)
     inner = adjoint_program(assemble(CONSERVED, tail), ("quaternion",), ("momentum",))
     inner = tangent_program(inner, ("quaternion",), 4)
-    given = {"quaternion": b.quaternion, "angular": arrays["angular"], "b_momentum": turning}
+    constant = arrays["angular"]
+    if b.pull:
+        constant, turning = b.pull, draft.array("b_pull", 3)
+        mu = {"vector": arrays["weights"].part(at_drift(tail), 3)}
+        draft.step(airborne.opposite, mu, opposite=turning[0])
+        at = at_drift(tail) + 3
+        rows = {f"row_{r}_": H.part((at + r) * size + at - 3, 3) for r in range(3)}
+        draft.step(airborne.drift_curvature, {"weight": mu["vector"]}, **rows)
+    given = {"quaternion": b.quaternion, "angular": constant, "b_momentum": turning}
     draft.call(inner, **given, d_quaternion=unit, d_b_quaternion=twice)
     with draft.loop("k", 4) as k:
         draft.copy(H.part(k * size, 4), twice.lane(k, 0, 4), adds=True)

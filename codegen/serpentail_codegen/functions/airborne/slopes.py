@@ -20,6 +20,7 @@ from .balance import (
     Balance,
     assemble_rates,
     at_coordinates,
+    at_drift,
     at_rates,
     turn_and_drift,
 )
@@ -42,7 +43,7 @@ class AirborneSlopes:
 def assemble_derivatives(draft: Draft, arrays: dict[str, Array]) -> tuple[Balance, AirborneSlopes]:
     """Rates of an airborne state with their Jacobian."""
     b = assemble_rates(draft, arrays)
-    slopes = store_slopes(draft, b, arrays["angular"])
+    slopes = store_slopes(draft, b, arrays.get("angular"))
     store_jacobian(draft, b, slopes, arrays["J"])
     return b, slopes
 
@@ -52,7 +53,7 @@ def placed(tail: Tail) -> tuple[tuple[int, int, int], ...]:
 
     Coordinates come first, because only they move momenta at fixed velocities.
     """
-    moved = 2 * tail.nt
+    moved = tail.airborne_state - QUATERNION.stop
     return (0, at_coordinates(tail), moved), (moved, QUATERNION.start, QUATERNION.stop)
 
 
@@ -68,22 +69,11 @@ def store_slopes(draft: Draft, b: Balance, conserved: Array) -> AirborneSlopes:
     draft.unit(tail.all_q(d_q), 0)
     draft.fill(d_v.whole(), 0)
     draft.unit(tail.all_v(d_v), tail.nt)
-    draft.unit(d_quaternion[0], 2 * tail.nt)
-
-    # omega, and the velocity of B
-    given, linear, angular = (wide(name, 3) for name in ("d_momentum", "d_linear", "d_angular"))
-    inner = tangent_program(assemble(CONSERVED, tail), ("quaternion",), lanes)
-    turned = {"quaternion": b.quaternion, "angular": conserved, "d_quaternion": d_quaternion}
-    draft.call(inner, d_momentum=given, **turned)
-    moved = as_index(tail.nt)  # lanes
-    inner = tangent_program(assemble(AT_BASE, tail), ("q",), lanes, lambda loops: moved)
-    draft.call(inner, q=b.q, v=b.v, d_q=d_q, d_linear=linear, d_angular=angular)
-    columns = b.factored.columns
-    with draft.loop("k", tail.nt) as k:
-        reads = {"column": column_of(columns, k), "rate": tail.coordinate_v(d_v, k)}
-        draft.step(airborne.tail_momentum, reads, linear_=linear[0], angular_=angular[0])
-    body = b.factored.body
-    turn_and_drift(draft, b.inertia, body, given[0], linear[0], angular[0], d_v)
+    draft.unit(d_quaternion[0], lanes - QUATERNION.stop)
+    if tail.widths:
+        draft.unit(d_v.part(0, TORSO_NV), 2 * tail.nt)
+    else:
+        turn_slopes(draft, b, conserved, (d_quaternion, d_q, d_v))
 
     # accelerations
     a, rows, d_v_dot = draft.array("a", 3), wide("rows", tail.nv), wide("d_v_dot", tail.nv)
@@ -98,6 +88,42 @@ def store_slopes(draft: Draft, b: Balance, conserved: Array) -> AirborneSlopes:
     return AirborneSlopes(d_quaternion, d_v, d_v_dot, by_torque, a)
 
 
+def turn_slopes(draft: Draft, b: Balance, conserved: Array, moved: tuple[Array, ...]) -> None:
+    """Store how omega and the velocity of B change with all numbers of x.
+
+    moved: directions of the quaternion, q and v; they are completed.
+    """
+    tail, lanes, (d_quaternion, d_q, d_v) = draft.tail, draft.tail.airborne_state, moved
+    names = ("d_momentum", "d_linear", "d_angular")
+    given, linear, angular = (draft.wide(name, 3, lanes) for name in names)
+    inner = tangent_program(assemble(CONSERVED, tail), ("quaternion",), lanes)
+    turned = {"quaternion": b.quaternion, "angular": conserved, "d_quaternion": d_quaternion}
+    draft.call(inner, d_momentum=given, **turned)
+    first = as_index(tail.nt)  # lanes
+    inner = tangent_program(assemble(AT_BASE, tail), ("q",), lanes, lambda loops: first)
+    draft.call(inner, q=b.q, v=b.v, d_q=d_q, d_linear=linear, d_angular=angular)
+    columns = b.factored.columns
+    with draft.loop("k", tail.nt) as k:
+        reads = {"column": column_of(columns, k), "rate": tail.coordinate_v(d_v, k)}
+        draft.step(airborne.tail_momentum, reads, linear_=linear[0], angular_=angular[0])
+    body = b.factored.body
+    turn_and_drift(draft, b.inertia, body, given[0], linear[0], angular[0], d_v)
+
+
+def drift_slopes(draft: Draft, b: Balance, slopes: AirborneSlopes) -> Array:
+    """Return how the rate of the velocity against the air changes with all numbers of x."""
+    lanes = draft.tail.airborne_state
+    rate, own = draft.wide("d_drift_rate", 3, lanes), draft.wide("d_own_pull", 3, lanes)
+    inner = tangent_program(assemble(CONSERVED, draft.tail), ("quaternion",), lanes)
+    reads = {"quaternion": b.quaternion, "angular": b.pull, "d_quaternion": slopes.d_quaternion}
+    draft.call(inner, d_momentum=own, **reads)
+    changes = {"a": block(slopes.d_v_dot, VELOCITY), "pull": own[0]}
+    changes |= {"turn": block(slopes.d_v, OMEGA), "drift": block(slopes.d_v, VELOCITY)}
+    motion = {"omega": block(b.v, OMEGA), "u": block(b.v, VELOCITY)}
+    draft.step(airborne.drift_change, changes, motion, rate=rate[0])
+    return rate
+
+
 def store_jacobian(draft: Draft, b: Balance, slopes: AirborneSlopes, J: Array) -> None:
     """Store d(y)/d(x, tau), row by row."""
     tail, size = draft.tail, draft.tail.airborne_arguments
@@ -110,16 +136,24 @@ def store_jacobian(draft: Draft, b: Balance, slopes: AirborneSlopes, J: Array) -
     draft.step(rotations.turned_quaternion, reads, rate_=rate[0])
 
     draft.fill(J.whole(), 0)
-    sources = (
+    sources = [
         (rate, 0, 0, 4),
         (slopes.d_v_dot, TORSO_NV, second, nt),
         (slopes.d_v, OMEGA.start, count, TURN),
-    )
+    ]
+    responding = [(second, TORSO_NV, nt)]  # to torques: rows from, of v_dot from, how many
+    if tail.widths:
+        first = at_drift(tail)
+        sources.append((drift_slopes(draft, b, slopes), 0, first, 3))
+        sources.append((slopes.d_v_dot, OMEGA.start, first + 3, TURN))
+        responding.append((first, 0, TORSO_NV))
     for source, first, row, rows in sources:
         with draft.loop("row", rows) as r:
             for lane, at, some in placed(tail):
                 draft.copy(J.part((r + row) * size + at, some), source.lane(r + first, lane, some))
     with draft.loop("k", nt) as k:
         draft.fill(J.part((k + at_coordinates(tail)) * size + k + second, 1), 1)
-        to = J.part((k + second) * size + count, nt)
-        draft.copy(to, slopes.by_torque.lane(k + TORSO_NV, 0, nt))
+    for row, first, rows in responding:
+        with draft.loop("row", rows) as r:
+            to = J.part((r + row) * size + count, nt)
+            draft.copy(to, slopes.by_torque.lane(r + first, 0, nt))
