@@ -18,7 +18,7 @@ from .sweeps.wrenches import add_torso_drag, against_air, gather_wrenches
 from .tails.mechanism import Wrenches
 
 
-def airspeed(draft: Draft, state: State, R: Ref) -> Ref | None:
+def airspeed(draft: Draft, state: State, R: Ref | None) -> Ref | None:
     """Return the velocity of B against the air in torso axes; None without air."""
     if not draft.tail.widths:
         return None

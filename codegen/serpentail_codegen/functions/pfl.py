@@ -1,9 +1,12 @@
 """Partial feedback linearisation: the torques that give the tail wanted accelerations."""
 
+from dataclasses import replace
+
 from serpentail_scene.layout import OMEGA, VELOCITY
 
-from ..ir.program import Array, padded
+from ..ir.program import Array, Ref, padded
 from ..mechanics import branch, rotations, torso, translation
+from .air import airspeed, core_airspeed
 from .draft import Draft
 from .layout import block
 from .passive import add_passive_forces
@@ -11,7 +14,12 @@ from .scope import State, Vectors
 from .sweeps.chains import add, on_each, prepared, seen
 from .sweeps.inertia import column_of, columns_and_inertia
 from .sweeps.pieces import attitude
-from .sweeps.wrenches import forward_wrenches, gather_wrenches, torso_without_acceleration
+from .sweeps.wrenches import (
+    add_torso_drag,
+    forward_wrenches,
+    gather_wrenches,
+    torso_without_acceleration,
+)
 from .tails.mechanism import Segments
 
 
@@ -35,14 +43,15 @@ def assemble_pfl(draft: Draft, arrays: dict[str, Array]) -> None:
     # torques for a torso at rest, then the torso's acceleration, and the torques that it adds
     with draft.loop("k", tail.nt) as k:
         draft.copy(tail.coordinate_v(v_dot, k), arrays["accelerations"].part(k, 1))
-    wrench = tail_alone(draft, segments, v_dot, tau)
+    R = attitude(draft, state) if "v_dot" in arrays or tail.widths else None
+    wrench = tail_alone(draft, segments, v_dot, tau, airspeed(draft, state, R))
     motion = free_torso(draft, composite, wrench)
     add_passive_forces(draft, state, lambda i: draft.tail.segment_tau(tau, i), v_dot)
     with draft.loop("k", tail.nt) as k:
         column = {"column": column_of(columns, k)}
         draft.step(translation.coupling_torque, motion, column, torque_=tau.part(k, 1))
     if "v_dot" in arrays:
-        reads = {"R": attitude(draft, state), "a": motion["a"]}
+        reads = {"R": R, "a": motion["a"]}
         draft.step(rotations.world_acceleration, reads, p_ddot=block(v_dot, VELOCITY))
         draft.copy(block(v_dot, OMEGA), motion["w_dot"])
 
@@ -50,17 +59,20 @@ def assemble_pfl(draft: Draft, arrays: dict[str, Array]) -> None:
 def hold_base(draft: Draft, state: State, arrays: dict[str, Array]) -> None:
     """Torques H v_dot + C: on a fixed base they give exactly the wanted accelerations."""
     segments, v_dot = prepared(draft, state), arrays["accelerations"]
-    tail_alone(draft, segments, v_dot, arrays["tau"])
+    tail_alone(draft, segments, v_dot, arrays["tau"], core_airspeed(draft, state))
     add_passive_forces(draft, state, lambda i: draft.tail.segment_tau(arrays["tau"], i), v_dot)
     if "v_dot" in arrays:
         draft.copy(draft.tail.all_v(arrays["v_dot"]), draft.tail.all_v(v_dot))
 
 
-def tail_alone(draft: Draft, segments: list[Segments], v_dot: Array, tau: Array) -> Vectors:
+def tail_alone(
+    draft: Draft, segments: list[Segments], v_dot: Array, tau: Array, u: Ref | None
+) -> Vectors:
     """Compute ``force, moment`` at B and torques for ``v_dot`` of the chains while the torso does
-    not accelerate.
+    not accelerate; ``u``: its velocity against the air.
     """
-    motion, sums = torso_without_acceleration(draft, segments[0].state), Vectors({})
+    motion = replace(torso_without_acceleration(draft, segments[0].state), u=u)
+    sums = Vectors({})
     for own in on_each(draft, segments):
         wrenches = forward_wrenches(draft, own, seen(draft, motion), v_dot)
         total = gather_wrenches(draft, own, wrenches, lambda i: draft.tail.segment_tau(tau, i))
@@ -68,6 +80,8 @@ def tail_alone(draft: Draft, segments: list[Segments], v_dot: Array, tau: Array)
             add(draft, branch.chain_wrench, total, sums)
         else:
             sums = draft.store(torso.torso_wrench, motion, total, force=3, moment=3)
+            if not draft.tail.fixed:
+                add_torso_drag(draft, motion, sums)
     return sums
 
 

@@ -21,7 +21,7 @@ class NodeRecord(ctypes.Structure):
 
     _fields_ = (
         *((name, _int) for name in ("states", "controls", "constants", "rows")),
-        *((name, _int) for name in ("tail", "uses_turn")),
+        *((name, _int) for name in ("tail", "drift", "uses_turn")),
         *((name, _pointer) for name in ("rates", "slopes", "curvature", "parameters", "momentum")),
         ("damping", _double),
         ("work", _int),

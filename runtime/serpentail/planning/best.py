@@ -7,10 +7,12 @@ from ..model.model import Model
 from ..optimal.fork_gate import forks_wait
 from ..optimal.interrupt import stoppable
 from ..simulation.simulate import read_clocks
+from .air import in_air, refuse_air
 from .continuation import with_bound
 from .momentum import refuse_impossible
 from .paths_at_start import refuse_violated
 from .problem import PlanningProblem
+from .program.nodes import FUNCTIONS, is_compiled
 from .result.plan import Plan
 from .round import Round
 from .search import Search
@@ -30,6 +32,8 @@ def best_plan(model: Model, problem: PlanningProblem, settings: PlanSettings) ->
     begun, easier = read_clocks(), None
     model.serve("plan")
     model.need(*NEEDED)
+    if in_air(model):
+        refuse_more_in_air(model, problem)
     refuse_impossible(model, problem)
     refuse_violated(model, problem)
     with forks_wait(), Stage("plan", model.name) as stage:
@@ -49,6 +53,17 @@ def best_plan(model: Model, problem: PlanningProblem, settings: PlanSettings) ->
             elif not settings.tolerances.through_torso:
                 best, tried = kept_off(search, best, stage, begun)
         return tried.plan(best, len(rounds), begun)
+
+
+def refuse_more_in_air(model: Model, problem: PlanningProblem) -> None:
+    """PlanningError for what plans in air do not have yet."""
+    asked = {"design": problem.design.size, "free_start": problem.free_start}
+    asked |= {"clearance": problem.clearance is not None, "legs": problem.legs is not None}
+    for name in [name for name, here in asked.items() if here]:
+        refuse_air(model, name)
+    model.need(*FUNCTIONS.values())
+    if not is_compiled(model, problem):
+        raise PlanningError('model: a plan in air needs a compiled model of real = "double"')
 
 
 def explained(search: Search, best: Round, stage: Stage) -> tuple[Round, Search]:

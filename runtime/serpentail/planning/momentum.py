@@ -12,6 +12,7 @@ from serpentail_scene.layout import OMEGA, VELOCITY
 from ..basics.attitude import rotation_matrix
 from ..basics.errors import PlanningError
 from ..model.model import Model
+from .air import in_air
 from .goal import middle, room
 from .problem import PlanningProblem
 from .program.coordinates import IDENTITY_POSE
@@ -23,10 +24,10 @@ YAWS = np.linspace(0.0, 2 * np.pi, 73)
 def refuse_impossible(model: Model, problem: PlanningProblem) -> None:
     """PlanningError if no end of a flight can have the rates that the goal asks for.
 
-    Nothing is refused if parts of the start are free, because they change the momentum, or if the
-    torso's rate has a range.
+    Nothing is refused in air or if parts of the start are free, because they change the momentum,
+    or if the torso's rate has a range.
     """
-    if problem.free_start:
+    if problem.free_start or in_air(model):
         return
     goal, h = problem.goal, model.momentum(problem.q0, problem.v0)[1]
     size = float(np.linalg.norm(h))

@@ -14,7 +14,6 @@ from ..motion.body import semi_axes
 from ..motion.plausibility import SUNK, depth_in_torso, torso_is_known
 from .problem import PlanningProblem
 from .program.cache import memoised
-from .program.coordinates import rotated
 from .result.full_state import full_state
 from .result.plan import sample_times
 from .round import Round
@@ -59,10 +58,8 @@ def _outside(model: Model) -> "Callable[[Any], ca.SX]":
     def outside(point: Any) -> "ca.SX":
         import casadi as ca
 
-        points, c = point.tail_points, point.quaternion
-        own = [
-            rotated(c, points[k, :].T - point.position, -1) / axes for k in range(points.size1())
-        ]
+        points = point.tail_from_torso
+        own = [points[k, :].T / axes for k in range(points.size1())]
         rows = []
         for k in range(1, len(own)):
             for part in BETWEEN:

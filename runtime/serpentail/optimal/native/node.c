@@ -12,14 +12,20 @@ typedef struct {
     double *z, *tau, *air_out, *air_J, *air_H, *air_mu, *e_in, *out, *out_J, *out_H, *out_mu, *work;
 } Places;
 
+/* Length of the airborne state, with which x begins. */
+static int airborne_of(const Node *node)
+{
+    return ATTITUDE + 2 * node->tail + node->drift;
+}
+
 static Places places_of(const Node *node, double *scratch)
 {
     Places at;
     const int m = node->tail;
     at.zeta = zeta_of(node);
     at.y = y_of_node(node);
-    at.air = m > 0 ? ATTITUDE + 3 * m : 0;
-    at.air_y = m > 0 ? ATTITUDE + 2 * m + TURN : 0;
+    at.air = m > 0 ? airborne_of(node) + m : 0;
+    at.air_y = m > 0 ? airborne_of(node) + TURN : 0;
     at.e = at.zeta + (m > 0 ? TURN : 0);
     at.terms = (m > 0 ? 0 : node->states) + node->rows + 1;
     at.z = scratch;
@@ -68,7 +74,7 @@ static void in_si(const Node *node, const double *x, const double *u, const doub
         z[states + controls + j] = node->units[states + controls + j] * p[j];
     }
     for (int a = 0; a < m; a++) {
-        tau[a] = z[ATTITUDE + 2 * m + a] - node->damping * z[ATTITUDE + m + a];
+        tau[a] = z[airborne_of(node) + a] - node->damping * z[ATTITUDE + m + a];
     }
 }
 
@@ -86,8 +92,7 @@ static int evaluate_terms(const Node *node, Places at, double fraction, int orde
         at.e_in[in_e(node, j)] = at.z[j];
     }
     if (node->tail > 0) {
-        memcpy(at.e_in + node->states, at.air_out + ATTITUDE + 2 * node->tail,
-               TURN * sizeof(double));
+        memcpy(at.e_in + node->states, at.air_out + airborne_of(node), TURN * sizeof(double));
     }
     at.e_in[at.e] = fraction;
     for (int k = 0; k < node->given; k++) {
@@ -115,27 +120,27 @@ static void add(int count, double factor, const double *a, double *b)
 /* Columns of the torques enter those of the tail's rates. */
 static void damp_columns(const Node *node, double *rows, int count, int columns)
 {
-    const int m = node->tail, rates = ATTITUDE + m;
+    const int m = node->tail, rates = ATTITUDE + m, torques = airborne_of(node);
     for (int i = 0; i < count && node->damping != 0.0; i++) {
         double *row = rows + (size_t)i * columns;
         for (int a = 0; a < m; a++) {
-            row[rates + a] -= node->damping * row[rates + m + a];
+            row[rates + a] -= node->damping * row[torques + a];
         }
     }
 }
 
 static void damp_rows(const Node *node, double *H, int columns)
 {
-    const int m = node->tail, rates = ATTITUDE + m;
+    const int m = node->tail, rates = ATTITUDE + m, torques = airborne_of(node);
     for (int a = 0; a < m && node->damping != 0.0; a++) {
-        add(columns, -node->damping, H + (size_t)(rates + m + a) * columns,
+        add(columns, -node->damping, H + (size_t)(torques + a) * columns,
             H + (size_t)(rates + a) * columns);
     }
 }
 
 static void write_values(const Node *node, Places at, double *y)
 {
-    const int states = node->states, m = node->tail, own = ATTITUDE + 2 * m;
+    const int states = node->states, m = node->tail, own = airborne_of(node);
     const double *terms = at.out;
     if (m > 0) {
         memcpy(y, at.air_out, (size_t)own * sizeof *y);
@@ -152,7 +157,7 @@ static void write_values(const Node *node, Places at, double *y)
 
 static void write_slopes(const Node *node, Places at, double *J)
 {
-    const int states = node->states, m = node->tail, own = ATTITUDE + 2 * m;
+    const int states = node->states, m = node->tail, own = airborne_of(node);
     const double *terms = at.out_J;
     memset(J, 0, (size_t)at.y * at.zeta * sizeof *J);
     for (int i = 0; i < at.y; i++) {
@@ -180,7 +185,7 @@ static void write_slopes(const Node *node, Places at, double *J)
 static void write_curvature(const Node *node, Places at, double *H)
 {
     const int n = at.zeta, states = node->states, m = node->tail;
-    const double *O = at.air_J + (size_t)(ATTITUDE + 2 * m) * at.air;
+    const double *O = at.air_J + (size_t)airborne_of(node) * at.air;
     for (int i = 0; i < n; i++) {
         const double *term = at.out_H + (size_t)in_e(node, i) * at.e;
         for (int j = 0; j < n; j++) {
@@ -213,7 +218,7 @@ static void write_curvature(const Node *node, Places at, double *H)
 /* Weights of the terms, and of the emitted y: omega's are those that the terms have of it. */
 static void write_weights(const Node *node, Places at, const double *mu)
 {
-    const int own = ATTITUDE + 2 * node->tail, first = node->tail > 0 ? node->states : 0;
+    const int own = airborne_of(node), first = node->tail > 0 ? node->states : 0;
     for (int i = 0; i < at.terms; i++) {
         at.out_mu[i] = mu[first + i] / node->y_units[first + i];
     }
@@ -238,7 +243,7 @@ static int evaluate_airborne(const Node *node, Places at, int order)
 /* omega's weights: with terms that depend on omega, of these at omega. */
 static int weigh_turn(const Node *node, Places at, double fraction)
 {
-    const int own = ATTITUDE + 2 * node->tail;
+    const int own = airborne_of(node);
     memset(at.air_mu + own, 0, TURN * sizeof(double));
     if (!node->uses_turn) {
         return 0;

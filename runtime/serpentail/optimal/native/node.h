@@ -33,6 +33,7 @@ typedef int (*Terms)(const double **arg, double **res, long long *iw, double *w,
 typedef struct {
     int states, controls, constants, rows;
     int tail;                    /* tail coordinates of airborne rates; 0: terms give the rates */
+    int drift;                   /* in air 6: after q_t_dot, velocity against it and omega; else 0 */
     int uses_turn;               /* whether terms depend on omega */
     Rates rates;
     Slopes slopes;

@@ -9,6 +9,7 @@ from ...model.model import Model
 from ...optimal.mesh import TimeMesh
 from ...optimal.problem import OptimalProblem
 from ...optimal.rules import CollocationRule
+from ..air import drift_of_states, in_air
 from ..design import refuse_unused
 from ..problem import PlanningProblem
 from ..result.full_state import com_at_start
@@ -105,7 +106,7 @@ def plan_program(
         mesh=mesh,
         rule=rule,
         coefficients=coefficients_of(problem, rule),
-        start=_start(problem) / variables.scale(variables.states) if known else None,
+        start=_start(model, problem) / variables.scale(variables.states) if known else None,
         constants=constants,
         duration_is_free=least < most,
         control_limits=_limits(getattr(problem.bounds, controls), variables.units[controls]),
@@ -140,8 +141,12 @@ def coefficients_of(problem: PlanningProblem, rule: CollocationRule) -> int:
     return min(nodes, 2) if problem.objective == "time" else nodes
 
 
-def _start(problem: PlanningProblem) -> np.ndarray:
-    return np.concatenate([problem.q0[3:], problem.v0[6:]])
+def _start(model: Model, problem: PlanningProblem) -> np.ndarray:
+    """Return the states at the start, SI."""
+    parts = [problem.q0[3:], problem.v0[6:]]
+    if in_air(model):
+        parts += [x[0] for x in drift_of_states(model, problem.q0[None], problem.v0[None]).values()]
+    return np.concatenate(parts)
 
 
 def _flight_terms(flight: FlightDynamics) -> NodeTerms:

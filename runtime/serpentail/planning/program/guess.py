@@ -14,6 +14,7 @@ from ...motion.trajectory import Trajectory
 from ...optimal.mesh import TimeMesh
 from ...optimal.samples import MeshSamples
 from ...simulation.controllers.controller import TorqueTable
+from ..air import drift_of_states, in_air
 from ..flight import State, flight
 from ..problem import PlanningProblem
 from .build import PlanProgram, conserved_at
@@ -73,6 +74,8 @@ def of_trajectory(model: Model, motion: Trajectory, damping: float = 0.0) -> Gue
         "tail_rate": tail_rate,
         "torque": motion.tau + damping * tail_rate,
     }
+    if in_air(model):
+        samples |= drift_of_states(model, motion.q, motion.v)
     t = motion.t - motion.t[0]
 
     def at(times: np.ndarray) -> dict[str, np.ndarray]:

@@ -11,6 +11,7 @@ from ...basics.attitude import quaternion_rate
 from ...model.model import Model
 from ...optimal.problem import OcpNode
 from ...optimal.terms import Terms, terms_of
+from ..air import DRIFT, in_air
 from ..problem import PlanningProblem
 from .body import BodyFunctions
 from .coordinates import IDENTITY_POSE, rotated
@@ -47,6 +48,7 @@ class NodeSymbols:
         import casadi as ca
 
         own = ("design", "momentum", "com", "com_velocity", "softening", "numbers", "torque_rate")
+        own += tuple(name for name, _ in DRIFT)
         start = ca.vertcat(self.blocks["com"], self.blocks["com_velocity"])
         seen = {name: part for name, part in self.blocks.items() if name not in own}
         return point_of(self.body, seen, start, problem.legs)
@@ -173,6 +175,7 @@ class FlightDynamics:
                 airborne[name] = getattr(model.library, f"{model.name}_{function}")
             airborne |= {
                 "tail": model.layout.nt,
+                "drift": variables.size(DRIFT) if in_air(model) else 0,
                 "uses_turn": int(made.uses_turn),
                 "damping": float(self.problem.damping),
                 "work": max(model.manifest["work"][name] for name in FUNCTIONS.values()),

@@ -11,6 +11,7 @@ from serpentail_scene.layout import OMEGA, VELOCITY
 from ...basics.checks import did_you_mean, needed
 from ...basics.errors import PlanningError
 from ...model.model import Model
+from ..air import in_air
 from .body import BodyFunctions
 from .coordinates import COM_ENTRIES, IDENTITY_POSE, rotated
 
@@ -105,7 +106,7 @@ def point_of(
         )
 
     def tail_points(point: PathPoint) -> "ca.SX":
-        own = body.call("tail_points", at_identity(point))
+        own = point.tail_from_torso
         rows = [point.position + rotated(point.quaternion, own[k, :].T) for k in range(own.size1())]
         return ca.horzcat(*rows).T
 
@@ -120,11 +121,17 @@ def point_of(
     def body_points(point: PathPoint) -> "ca.SX":
         return _touching(body, point, any_legs(model))[model.contacts.get("feet", 0) :, :]
 
+    makers: dict[str, Callable[[PathPoint], Any]]
     makers = {
+        "drift": lambda point: drift_of(body, vars(point)),
+        "tail_from_torso": lambda point: body.call("tail_points", at_identity(point)),
+    }
+    if in_air(model):  # where the animal is depends on all the air before
+        return PathPoint(makers=makers, parameters=dict(body.parameters), **blocks)
+    makers |= {
         "center_of_mass": center_of_mass,
         "position": position,
         "height": lambda point: point.position[2],
-        "drift": lambda point: drift_of(body, vars(point)),
     }
     if "tail_points" in model.generated:
         makers |= {"tail_points": tail_points, "tip": lambda point: point.tail_points[-1, :].T}

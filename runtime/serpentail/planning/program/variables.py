@@ -8,6 +8,7 @@ import numpy as np
 from serpentail_scene.layout import TAIL_Q
 
 from ...model.model import Model
+from ..air import DRIFT, in_air
 from ..design import Design
 from ..problem import PlanningProblem
 
@@ -65,6 +66,9 @@ def variables_of(model: Model, problem: PlanningProblem, falls: bool) -> PlanVar
     states: Blocks = (("attitude", 4), ("tail", tail), ("tail_rate", tail))
     units = {name: np.full(size, UNITS[name]) for name, size in states}
     units |= {"torque": unit, "torso_rate": np.full(3, UNITS["torso_rate"]), "duration": np.ones(1)}
+    if in_air(model):
+        states += DRIFT
+        units |= {"airspeed": np.ones(3), "spin": np.full(3, UNITS["torso_rate"])}
     controls: Blocks = (("torque", tail),)
     if problem.bounds.torque_rate is not None:
         states, controls = (*states, *controls), (("torque_rate", tail),)

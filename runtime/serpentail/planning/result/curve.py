@@ -5,9 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from serpentail_scene.layout import POSITION
+
 from ...basics.short_repr import brief
 from ...optimal.rules import CollocationRule
 from ...optimal.samples import MeshSamples
+from ..air import in_air, world_velocity
 from ..program.build import PlanProgram
 
 
@@ -86,10 +89,13 @@ def curve(program: PlanProgram, samples: MeshSamples) -> Curve:
     torque = blocks.pop("torque")[:, 1:] if variables.torque_is_state else None
     if torque is None:
         torque = samples.controls * variables.units["torque"]
-    return Curve(
-        mesh.ends * samples.duration,
-        rule,
-        {name: values[:, 0] for name, values in blocks.items()},
-        {name: np.einsum("ij,kjx->kix", rule.states, x) for name, x in blocks.items()},
-        {"torque": torque},
-    )
+    starts = {name: values[:, 0] for name, values in blocks.items()}
+    increments = {name: np.einsum("ij,kjx->kix", rule.states, x) for name, x in blocks.items()}
+    ends = mesh.ends * samples.duration
+    if in_air(program.model):  # the position is a quadrature
+        inside = {name: values[:, 1:] for name, values in blocks.items()}
+        steps = world_velocity(program.model, inside) * np.diff(ends)[:, None, None]
+        grown = np.cumsum(np.einsum("j,njx->nx", rule.weights, steps), axis=0)[:-1]
+        starts["place"] = program.problem.q0[POSITION] + np.vstack([np.zeros(3), grown])
+        increments["place"] = steps
+    return Curve(ends, rule, starts, increments, {"torque": torque})

@@ -1,7 +1,7 @@
 """q and v of a planned motion, with the parts that the program eliminated.
 
 The angular velocity follows from the conserved angular momentum, the position from the free fall of
-the COM.
+the COM. In air nothing is eliminated but the position, which the curve has.
 """
 
 import numpy as np
@@ -11,6 +11,7 @@ from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V,
 from ...basics.attitude import rotation_matrix
 from ...model.model import Model
 from ...model.parameters import fall
+from ..air import in_air, world_velocity
 from ..program.coordinates import COM_ENTRIES, IDENTITY_POSE
 
 State = tuple[np.ndarray, np.ndarray]  # q, v
@@ -23,6 +24,9 @@ def full_state(
     """Return q (K, nq), v (K, nv) at times (K,) s from the start (q0, v0)."""
     quaternion = blocks["attitude"] / np.linalg.norm(blocks["attitude"], axis=1, keepdims=True)
     tail, tail_rate = _within_range(model, blocks["tail"]), blocks["tail_rate"]
+    if in_air(model):
+        moving = [world_velocity(model, blocks), blocks["spin"], tail_rate]
+        return np.column_stack([blocks["place"], quaternion, tail]), np.column_stack(moving)
     R, H = rotation_matrix(quaternion), model.mass_matrix(_at_identity(tail))
     h = np.einsum("kji,j->ki", R, model.momentum(*start)[1])
     omega = _carrying(H, h, tail_rate)

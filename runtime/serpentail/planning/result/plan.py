@@ -25,6 +25,7 @@ from ...simulation.controllers.controller import Controller, Damping, TorqueCurv
 from ..flight import flight
 from ..problem import PlanningProblem
 from .curve import Curve
+from ..air import refuse_air
 from .full_state import full_state
 from .truth import planned_torques
 
@@ -230,6 +231,9 @@ class Plan(NearNames):
 def refuse_unfit(name: str, model: Model, plan: Plan, functions: Iterable[str]) -> None:
     """ModelError or PlanningError if a model cannot fly a plan by a controller of this name."""
     model.refuse_fixed(name)
+    refuse_air(model, name)
+    if "airspeed" in plan.curve.starts:
+        raise PlanningError(f"{name}: the plan was made in air: give one of a model without air")
     model.need(*functions)
     if model.library is None:
         raise PlanningError(
