@@ -180,7 +180,7 @@ AIR = (
         ("torso_drag", 3, (0.0, 0.0, 0.0), "m^2", NOT_NEGATIVE,
          "drag coefficient times area of the torso, along x, y, z of B"),
         ("torso_drag_turning", 3, (0.0, 0.0, 0.0), "m^5", NOT_NEGATIVE,
-         "moment of the air on the torso about x, y, z of B, over density omega^2 / 2"),
+         "moment of the air on the torso about x, y, z of B, over density |omega| omega / 2"),
         ("torso_air_damping", 3, (0.0, 0.0, 0.0), "N m s", NOT_NEGATIVE,
          "moment of the air on the torso about x, y, z of B, over omega"),
         needs="air", tail="free",

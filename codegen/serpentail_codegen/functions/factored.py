@@ -38,14 +38,14 @@ def assemble_factored_dynamics(draft: Draft, arrays: dict[str, Array]) -> None:
     if not tail.fixed:
         quaternion = {"quaternion": state.quaternion}
         draft.step(rotations.quaternion_rotation, quaternion, R=arrays["R"].part(0, 9))
+    R = draft.fixed("identity", IDENTITY) if tail.fixed else arrays["R"].part(0, 9)
+    u = airspeed(draft, state, R)
     if draft.dynamics != "composite":
-        factored_dynamics_by_columns(draft, arrays, entry)
+        factored_dynamics_by_columns(draft, arrays, entry, u)
         draft.factor(A, size)
         return
     columns = arrays["columns"]
     segments, composite = animal_inertia(draft, state, A_tail, columns)
-    R = draft.fixed("identity", IDENTITY) if tail.fixed else arrays["R"].part(0, 9)
-    u = airspeed(draft, state, R)
     if tail.fixed:
         core_bias(draft, segments, bias, u)
         draft.factor(A, size)

@@ -13,8 +13,8 @@ from .link import link_angular_velocity, link_linear_velocity
 from .rotations import Y
 from .shapes import M33, V1, V2, V3, V4, V6, V12
 
-OFF = Float(0.15**0.5)  # sqrt(3/5) / 2
-POINTS = ((0.5 - OFF, Rational(5, 18)), (Rational(1, 2), Rational(4, 9)), (0.5 + OFF, Rational(5, 18)))
+OFF = Float(0.15**0.5)  # sqrt(3/5) / 2: of the outer points from the middle
+HALF, END, MIDDLE = Rational(1, 2), Rational(5, 18), Rational(4, 9)  # weights of both sorts
 
 
 @dataclass(frozen=True)
@@ -90,12 +90,14 @@ def link_drag(let, drag: Drag, link: V6, w: V3, u_joint: V3) -> dict:
     length, (root, tip) = link[1], drag.tail_widths
     pressure = let("pressure", drag.air_density[0] * length / 2)
     swing = let("swing", length * Matrix([w[2], 0, -w[0]]))  # what the whole link adds to u
-    across, lever = Matrix([0, 0, 0]), Matrix([0, 0, 0])
-    for place, weight in POINTS:
-        x, _, z = let("u", u_joint + place * swing)
-        width = let("width", weight * (root + place * (tip - root)))
-        f = let("f", let("pull", width * speed(let, drag, x, z)) * Matrix([x, 0, z]))
-        across, lever = across + f, lever + place * f
+    middle, off = let("middle", u_joint + swing / 2), let("off", OFF * swing)
+    f = []
+    for side, weight in ((-1, END), (0, MIDDLE), (1, END)):
+        x, _, z = let("u", middle + side * off)
+        width = weight * ((HALF - side * OFF) * root + (HALF + side * OFF) * tip)
+        f.append(let("pull", width * speed(let, drag, x, z)) * Matrix([x, 0, z]))
+    across = let("across", f[0] + f[1] + f[2])
+    lever = across / 2 + OFF * (f[2] - f[0])
     normal = let("normal", pressure * drag.tail_drag[0])
     axial = pressure * drag.tail_drag[1] * (root + tip) / 2
     along = axial * speed(let, drag, u_joint[1]) * u_joint[1]
@@ -118,10 +120,10 @@ def torso_drag(let, drag: TorsoDrag, w: V3, u: V3) -> dict:
     """Minus force and moment of the air on the torso at B."""
     half = let("half", drag.air_density[0] / 2)
     push = let("push", half * speed(let, drag, *u))
-    turn = [half * k * speed(let, drag, x) for k, x in zip(drag.torso_drag_turning, w, strict=True)]
+    turn = let("turn", half * speed(let, drag, *w)) * drag.torso_drag_turning
     return {
         "force": push * drag.torso_drag.multiply_elementwise(u),
-        "moment": (Matrix(turn) + drag.torso_air_damping).multiply_elementwise(w),
+        "moment": (turn + drag.torso_air_damping).multiply_elementwise(w),
     }
 
 

@@ -17,20 +17,20 @@ from ..scope import Motion, Vectors
 from ..tails.mechanism import Segments, Wrenches
 from .inertia import column_of, columns_of
 from .pieces import across, each_piece, mechanism
-from .wrenches import forward_wrenches
+from .wrenches import add_torso_drag, forward_wrenches
 
 
 def factored_dynamics_by_columns(
-    draft: Draft, arrays: dict[str, Array], entry: Callable[..., Ref]
+    draft: Draft, arrays: dict[str, Array], entry: Callable[..., Ref], u: Ref | None
 ) -> None:
     """Fill ``A`` (by ``entry(row, column)``, lower triangle), ``columns``, ``bias`` and the
-    quantities that elimination needs.
+    quantities that elimination needs. ``u``: velocity of B against the air.
     """
     nt, columns, bias = draft.tail.nt, arrays["columns"], arrays["bias"]
     state = draft.state(arrays["q"], arrays["v"])
     segments = mechanism(draft).prepare(draft, state, True)
     zero = draft.zero(3)
-    motion = Motion(state.omega, zero, zero)
+    motion = Motion(state.omega, zero, zero, u)
 
     # from the torso to the tip, and back with all columns
     wrenches = forward_wrenches(draft, segments, motion, None)
@@ -49,6 +49,7 @@ def factored_dynamics_by_columns(
     reads = {"w": motion.w, "a": motion.a, "F": total}
     writes = {"force": block(bias, VELOCITY), "moment": block(bias, OMEGA)}
     draft.step(link_columns.torso_bias, reads, **writes)
+    add_torso_drag(draft, motion, Vectors(writes))
     with draft.loop("k", nt) as k:
         draft.copy(draft.tail.coordinate_v(bias, k), rows.lane(k, nt))
         for r in range(6):
