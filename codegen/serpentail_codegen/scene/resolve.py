@@ -101,7 +101,7 @@ def resolve_parameters(
         widths = widths_of(segments, tail_links // segments, kind, shape)
     problems += missing(named, ("air", *passive))
     parameters = parameters_of(kind, contacts, shape, passive, segments, widths)
-    sized = {p.name: p for p in (*PARAMETERS, *parameters)}
+    sized = {p.name: p for p in (*PARAMETERS, *AIR, *parameters)}
     for p in [p for p in sized.values() if p.name in named]:
         try:
             numbers[p.name] = of_pieces(p, in_unit(named[p.name], p.unit))

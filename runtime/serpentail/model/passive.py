@@ -62,15 +62,20 @@ def behind_stops(model: "Model", angles: Any) -> str:
     return ""
 
 
-def idle(values: Mapping[str, Any], parts: tuple[str, ...]) -> dict[str, float]:
-    """Return changes of parameters under which "stops", "damping" and "spring" of all chains do
-    nothing.
+def idle(values: Mapping[str, Any], parts: tuple[str, ...]) -> dict[str, Any]:
+    """Return changes of parameters under which "stops", "damping" and "spring" of all chains, and
+    "air", do nothing.
     """
     idling = {"stops": {"_stop_lower": -OUT_OF_REACH, "_stop_upper": OUT_OF_REACH}}
     idling |= {"damping": {"_damping": 0.0}, "spring": {"_stiffness": 0.0}}
-    ends = [pair for part in parts for pair in idling[part].items()]
-    names = [name for name in values if not name.endswith("_stop_stiffness")]
-    return {name: value for end, value in ends for name in names if name.endswith(end)}
+    ends = [pair for part in parts for pair in idling.get(part, {}).items()]
+    names = [n for n in values if not n.endswith("_stop_stiffness") and not n.startswith("torso_")]
+    found: dict[str, Any]
+    found = {name: value for end, value in ends for name in names if name.endswith(end)}
+    if "air" in parts and "air_density" in values:
+        found |= {"air_density": 0.0, "wind": (0.0, 0.0, 0.0)}
+        found |= {"torso_air_damping": (0.0, 0.0, 0.0)} if "torso_air_damping" in values else {}
+    return found
 
 
 def _of(values: Mapping[str, Any], name: str) -> np.ndarray:

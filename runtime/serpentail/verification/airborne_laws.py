@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from serpentail_scene.layout import OMEGA, QUATERNION, TAIL_V
+from serpentail_scene.layout import OMEGA, QUATERNION, TAIL_V, VELOCITY
 
-from ..basics.attitude import quaternion_rate
+from ..basics.attitude import quaternion_rate, rotation_matrix
 from ..model.model import Model
 from .derivative_laws import slopes
 from .errors import relative, sensitivity
@@ -17,19 +17,23 @@ NEARER = 8.0
 
 @law("airborne_rates momentum forward_dynamics mass_matrix", VALUE_LIMIT)
 def airborne_rates_are_those_of_the_animal(model: Model, s: Case) -> Errors:
-    """With omega of an airborne state the animal has its angular momentum; its tail accelerates as
-    q_t_ddot says, relative to cond(H).
+    """With omega of an airborne state the animal has its angular momentum, but in air the omega
+    that is given; its tail accelerates as q_t_ddot says, relative to cond(H).
     """
     nt = model.layout.nt
     y = model.airborne_rates(s.x, s.tau, s.angular).astype(float)
-    turning, rates, accelerations, omega = np.split(y, (4, 4 + nt, 4 + 2 * nt))
+    turning, rates, accelerations, _, omega = np.split(y, (4, 4 + nt, 4 + 2 * nt, len(s.x)))
     v = np.concatenate([np.zeros(3), omega, s.v[TAIL_V]])
-    v_dot = model.forward_dynamics(s.q, v, s.tau)[TAIL_V].astype(float)
-    tail = model.momentum(s.q, v * np.repeat([0, 1], [OMEGA.stop, nt]))[1].astype(float)
     condition = sensitivity(model, s.q)
-    momentum = model.momentum(s.q, v)[1]
-    return {
-        "momentum": relative(momentum, s.angular, abs(s.angular) + abs(tail)) / condition,
+    if s.drift.size:
+        v[VELOCITY] = rotation_matrix(s.q[QUATERNION]) @ s.drift[:3] + model.parameters["wind"]
+        error = {"omega": relative(omega, s.drift[3:])}
+    else:
+        tail = model.momentum(s.q, v * np.repeat([0, 1], [OMEGA.stop, nt]))[1].astype(float)
+        momentum, scale = model.momentum(s.q, v)[1], abs(s.angular) + abs(tail)
+        error = {"momentum": relative(momentum, s.angular, scale) / condition}
+    v_dot = model.forward_dynamics(s.q, v, s.tau)[TAIL_V].astype(float)
+    return error | {
         "q_t_ddot": relative(accelerations, v_dot) / condition,
         "q_t_dot": relative(rates, s.v[TAIL_V]),
         "quaternion": relative(turning, quaternion_rate(s.q[QUATERNION], omega)),
@@ -39,7 +43,7 @@ def airborne_rates_are_those_of_the_animal(model: Model, s: Case) -> Errors:
 def direction(s: Case) -> np.ndarray:
     """Return how (x, tau) moves along the state's directions."""
     turning = quaternion_rate(s.q[QUATERNION], s.dq[OMEGA])
-    return np.concatenate([turning, s.dq[TAIL_V], s.dv[TAIL_V], s.dtau])
+    return np.concatenate([turning, s.dq[TAIL_V], s.dv[TAIL_V], 0 * s.drift, s.dtau])
 
 
 def block_errors(

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, VELOCITY
+from serpentail_scene.parameters import PARTS
 
 from ..basics.attitude import product
 from ..basics.errors import UnusualSize
@@ -19,7 +20,9 @@ from .states import Case, is_fixed
 # limits in roundings (eps of the model's real type)
 VALUE_LIMIT = 450  # 1e-13 in double
 SLOPE_LIMIT = 10 * VALUE_LIMIT  # a slope divides rounding by its step
-PIECEWISE = ("stops",)  # of the passive tail: their forces have no slopes by wide differences
+# their forces have no slopes by wide differences: stops are piecewise, the air's drag almost
+PIECEWISE = ("stops", "air")
+ACTING = (*PARTS, "air")  # all that acts beside gravity and torques
 FEW_LINKS = 8  # in a segment: with more of them, rounding grows
 
 Errors = float | dict[str, float]  # one error, or one for each place
@@ -38,7 +41,7 @@ class Law:
     floor: float = 0.0  # limit of errors with other causes than rounding
     only: str = ""  # real type or kind of tail of the models that it holds for; "free" torsos
     casadi: bool = False  # whether it evaluates CasADi functions
-    without: tuple[str, ...] = ()  # parts of the passive tail that it holds without
+    without: tuple[str, ...] = ()  # parts of the passive tail, or "air", that it holds without
 
     def limit(self, model: Model) -> float:
         """Return the limit, which grows with the links of a segment.

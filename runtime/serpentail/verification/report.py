@@ -18,6 +18,7 @@ from ..basics.extras import needed
 from ..model.model import Model
 from ..model.passive import idle
 from . import (
+    air_laws,
     airborne_laws,
     call_laws,
     contact_laws,
@@ -31,7 +32,7 @@ from .states import Case, states
 
 FILES = (
     *(value_laws, frame_laws, call_laws, derivative_laws),
-    *(contact_laws, passive_laws, airborne_laws),
+    *(contact_laws, passive_laws, air_laws, airborne_laws),
 )
 LAWS = tuple(each for file in FILES for each in vars(file).values() if isinstance(each, Law))
 OF = {"free": "a torso that moves"}
@@ -98,6 +99,7 @@ def unchecked(entry: Law, model: Model) -> str:
     kinds += ["contact"] if model.contacts else []
     kinds += [] if model.fixed else ["free"]
     kinds += ["passive"] if idle(model.parameters, PARTS) else []
+    kinds += ["air"] if idle(model.parameters, ("air",)) else []
     if entry.only not in kinds:
         return f"only for {OF.get(entry.only, entry.only + ' models')}"
     if entry.casadi:
@@ -105,9 +107,9 @@ def unchecked(entry: Law, model: Model) -> str:
             needed("casadi", "plan")
         except ExtraMissing as missing:
             return str(missing)
-    changed = entry.only == "passive" or idle(model.parameters, entry.without)
+    changed = entry.only in ("passive", "air") or idle(model.parameters, entry.without)
     if changed and model.manifest["scene"]["baked"]:
-        return "the passive tail cannot be left out: parameters are baked"
+        return "the passive tail and the air cannot be left out: parameters are baked"
     absent = ", ".join(name for name in entry.needs if name not in model.generated)
     return f"not generated: {absent}" if absent else ""
 

@@ -30,6 +30,7 @@ class Case:
     dv: np.ndarray
     dtau: np.ndarray
     multiplier: np.ndarray
+    drift: np.ndarray  # in air, velocity of B against it and omega, torso axes
 
     @property
     def accelerations(self) -> np.ndarray:
@@ -38,8 +39,8 @@ class Case:
 
     @property
     def x(self) -> np.ndarray:
-        """The airborne state: quaternion, tail coordinates, their rates."""
-        return np.concatenate([self.q[QUATERNION], self.q[TAIL_Q], self.v[TAIL_V]])
+        """The airborne state: quaternion, tail coordinates, their rates, and the drift in air."""
+        return np.concatenate([self.q[QUATERNION], self.q[TAIL_Q], self.v[TAIL_V], self.drift])
 
     @property
     def angular(self) -> np.ndarray:
@@ -85,7 +86,10 @@ def random_arrays(model: Model, rng: np.random.Generator, kind: str, k: int) -> 
         q, v, v_dot = (x[-tail:] for x in (q, v, v_dot))
 
     # directions of derivatives
-    return [q, v, v_dot, tau, f_ext, *(rng.uniform(-1, 1, len(x)) for x in (v, v, tau, v))]
+    directions = [rng.uniform(-1, 1, len(x)) for x in (v, v, tau, v)]
+    flies = "air_density" in model.parameters and not model.fixed
+    drift = blocks(rng, 0, (2.0, 20.0, 0.0)) if flies else np.zeros(0)
+    return [q, v, v_dot, tau, f_ext, *directions, drift]
 
 
 def direction(rng: np.random.Generator, size: int) -> np.ndarray:

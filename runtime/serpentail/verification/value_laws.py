@@ -21,7 +21,7 @@ from ..motion.trajectory import Trajectory
 from ..simulation.controllers.schedules import Legs
 from ..simulation.simulate import simulate
 from .errors import block_error, blocks_of, difference, differing, relative, rounding, worst
-from .law import PIECEWISE, VALUE_LIMIT, Errors, fastest, law, moved, slope
+from .law import ACTING, PIECEWISE, VALUE_LIMIT, Errors, fastest, law, moved, slope
 from .states import Case
 
 FLIGHT, STEPS = 0.2, 2000  # s
@@ -226,7 +226,7 @@ def flight(model: Model, s: Case, **settings: Any) -> Trajectory:
     return motion
 
 
-@law("rollout energy momentum", 4 * STEPS, floor=1e-10, without=PARTS)
+@law("rollout energy momentum", 4 * STEPS, floor=1e-10, without=ACTING)
 def energy_is_constant_in_flight(model: Model, s: Case) -> Errors:
     """In 0.2 s of flight without torques, or 0.02 s on a fixed base (2000 steps of RK4), the sum of
     both energies is constant.
@@ -235,7 +235,7 @@ def energy_is_constant_in_flight(model: Model, s: Case) -> Errors:
     return relative(motion.energy, motion.energy[0], abs(motion.kinetic) + abs(motion.potential))
 
 
-@law("rollout energy momentum", 4 * STEPS, floor=1e-10, only="free", without=PARTS)
+@law("rollout energy momentum", 4 * STEPS, floor=1e-10, only="free", without=ACTING)
 def momentum_is_constant_in_flight(model: Model, s: Case) -> Errors:
     """In flight angular momentum about the COM is constant, and momentum changes by - M g t."""
     motion = flight(model, s)
@@ -248,7 +248,7 @@ def momentum_is_constant_in_flight(model: Model, s: Case) -> Errors:
     }
 
 
-@law("rollout mass_matrix energy momentum", 4 * STEPS, floor=1e-10, only="free", without=PARTS)
+@law("rollout mass_matrix energy momentum", 4 * STEPS, floor=1e-10, only="free", without=ACTING)
 def center_of_mass_flies_a_parabola(model: Model, s: Case) -> Errors:
     """In flight the COM is at c + c_dot t - g t^2 / 2."""
     motion = flight(model, s)

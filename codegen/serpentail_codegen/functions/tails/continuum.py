@@ -147,7 +147,7 @@ def move_arc(
 
 def each_slice(draft: Draft, piece: Vectors) -> Iterator[Vectors]:
     """Open a loop over the slices of an arc at which the air acts; yields what is known of each."""
-    numbers = draft.constant(draft.own("slices"), SLICES)
+    numbers = draft.fixed("slices", SLICES).array
     part = draft.scratch(angles_part=2, section_part=2, tip_part=8)
     found = draft.scratch(E_slice=9, r_slice=3, bend_slice=12)
     angles, section, tip = (part[name] for name in part.named)
