@@ -36,7 +36,9 @@ def pieces_of(model):
     links, arcs = (iter(np.atleast_1d(p.get(n, ()))) for n in ("link_lengths", "arc_lengths"))
     equal = p["tail_length"] / sum(each)
     own = {"articulated": links, "continuum": arcs}
-    counted = [(i, kind, int(each[i]) if kind == "articulated" else 1) for i, kind in enumerate(kinds)]
+    counted = [
+        (i, kind, int(each[i]) if kind == "articulated" else 1) for i, kind in enumerate(kinds)
+    ]
     return [(i, kind, next(own[kind], equal)) for i, kind, count in counted for _ in range(count)]
 
 
@@ -72,7 +74,12 @@ def along(q, v):
         return v
     w, x, y, z = q[3:7]
     a, b, c = v[3:6] / 2
-    turn = [-x * a - y * b - z * c, w * a + y * c - z * b, w * b + z * a - x * c, w * c + x * b - y * a]
+    turn = [
+        -x * a - y * b - z * c,
+        w * a + y * c - z * b,
+        w * b + z * a - x * c,
+        w * c + x * b - y * a,
+    ]
     return np.concatenate([v[:3], turn, v[6:]])
 
 
@@ -101,7 +108,10 @@ def air_force(model, q, v):
             width = (1 - s) * widths[k] + s * widths[k + 1]
             own = axial if kind == "continuum" else 0.0
             out += push(k, j, normal, own, length * w * width)
-    roots = [places(model, q + 1j * STEP * along(q, d), dict.fromkeys(POINTS, [0.0])) for d in (v, *np.eye(nv))]
+    roots = [
+        places(model, q + 1j * STEP * along(q, d), dict.fromkeys(POINTS, [0.0]))
+        for d in (v, *np.eye(nv))
+    ]
     still, moving = places(model, q, dict.fromkeys(POINTS, [0.0])), roots
     for k, (_, kind, length) in enumerate(pieces_of(model)):
         if kind == "articulated":  # its velocity along itself is the same everywhere

@@ -68,7 +68,9 @@ def assemble_air_force(draft: Draft, arrays: dict[str, Array]) -> None:
     across(draft, mount.flow_at_root, u=w)
 
     # minus the wrenches, then their sum at B
-    wrenches = Wrenches(draft.array("wrench", 6, tail.pieces), mechanism(draft).declare_torques(draft))
+    wrenches = Wrenches(
+        draft.array("wrench", 6, tail.pieces), mechanism(draft).declare_torques(draft)
+    )
     for i, g in each_piece(draft):
         mechanism(draft).fly(draft, own, (i, g), velocity, wrenches.at(i, g))
     total = gather_wrenches(draft, own, wrenches, lambda i: tail.segment_v(force, i))

@@ -1,8 +1,8 @@
 """Exact first derivatives with respect to the parameters."""
 
-from ...autodiff.forward import tangent_program
 from serpentail_scene.layout import VELOCITY
 
+from ...autodiff.forward import tangent_program
 from ...ir.program import Array, Ref
 from ...mechanics import air
 from ..air import in_air

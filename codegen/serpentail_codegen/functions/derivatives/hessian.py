@@ -150,7 +150,9 @@ def add_drift(
     b_v = draft.array("b_v", nv)
     inner = adjoint_program(assemble(VIRTUAL_POWER, tail), tuple(sizes), ("power",))
     inner = tangent_program(inner, ("v",), directions.count, kept=("b_v",))
-    arguments = {name: given[name] for name in ("q", "v", "v_dot", "multiplier", "a", "u", "b_power")}
+    arguments = {
+        name: given[name] for name in ("q", "v", "v_dot", "multiplier", "a", "u", "b_power")
+    }
     outputs = {f"d_b_{name}": array for name, array in by.items()}
     draft.call(inner, **arguments, d_v=d_v, b_v=b_v, **outputs)
 
@@ -160,7 +162,9 @@ def add_drift(
     draft.step(turns.term_by_turn, {"gradient": by["u"][0], "vector": axes.u[0]}, turn=other[0])
     draft.copy(both.whole(), other.whole())
     draft.step(turns.term_by_turn, flow, turn_=both[0])
-    rows = {f"row_{r}_": arrays["qq"].part(nv * (OMEGA.start + r) + OMEGA.start, 3) for r in range(3)}
+    rows = {
+        f"row_{r}_": arrays["qq"].part(nv * (OMEGA.start + r) + OMEGA.start, 3) for r in range(3)
+    }
     reads = {"gradient": block(b_v, VELOCITY), "vector": flow["vector"]}
     draft.step(turns.term_curvature, reads, **rows)
 
@@ -169,7 +173,9 @@ def add_drift(
     reads = {"R": axes.R, "force": block(b_v, VELOCITY), "turn": turn, "change": change}
     draft.step(turns.turning_force, reads, change=change)
 
-    def add(name: str, row: Index | int, column: Index | int, lanes: Ref, down: bool = False) -> None:
+    def add(
+        name: str, row: Index | int, column: Index | int, lanes: Ref, down: bool = False
+    ) -> None:
         to = arrays[name].part(nv * row + column, 3, nv if down else 1)
         draft.copy(to, lanes, adds=True)
 

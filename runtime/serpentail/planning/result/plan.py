@@ -22,10 +22,10 @@ from ...optimal.mesh import TimeMesh
 from ...optimal.rules import CollocationRule
 from ...optimal.solution import Solution
 from ...simulation.controllers.controller import Controller, Damping, TorqueCurve
+from ..air import refuse_air
 from ..flight import flight
 from ..problem import PlanningProblem
 from .curve import Curve
-from ..air import refuse_air
 from .full_state import full_state
 from .truth import planned_torques
 
