@@ -12,7 +12,6 @@ from serpentail_scene.layout import (
     TORSO_NV,
     VELOCITY,
 )
-from serpentail_scene.parameters import PARTS
 
 from ..basics.attitude import rotation_matrix
 from ..model.model import Model

@@ -6,14 +6,14 @@ In torso axes nothing depends on attitude or gravity: R^T (p_b_ddot + g z) stand
 from serpentail_scene.layout import OMEGA
 from serpentail_scene.signatures.arguments import FORCE, MULTIPLIER, V_DOT, Argument, Q, V
 
-from ...ir.program import Array
+from ...ir.program import Array, Ref
 from .. import dynamics, kinematics
 from ..air import core_airspeed
 from ..draft import Draft
 from ..function import Function, signed
 from ..layout import block
 from ..passive import add_passive_forces, add_passive_power
-from ..scope import Motion, Vectors
+from ..scope import Motion, State, Vectors
 from ..sweeps.chains import prepared
 from ..sweeps.momentum import gather_moment
 from ..sweeps.wrenches import inertial_forces, virtual_power

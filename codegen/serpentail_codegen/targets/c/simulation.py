@@ -94,7 +94,7 @@ def simulation_context(
         "damped": own_damping(scene, tail),
         "damped_chains": damped_chains(tail),
         "motors": motors(scene),
-        "driven": PER_SEGMENT * scene.segments,
+        "driven": tail.nt,
         "looks": LOOKS,
         "resolution": resolution,
         "level": level,
