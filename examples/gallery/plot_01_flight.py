@@ -52,6 +52,7 @@ print(f"energy of the free tail: {np.abs(free.energy - free.energy[0]).max():.0e
 print(f"angular momentum of the damped tail: {momentum:.0e} kg m^2/s")
 
 # %%
-# Both flights over each other. Click *Play*, or drag the slider.
+# Both flights over each other. Click *Play*, or drag the slider. Under *Change and compute
+# again* you may change the first one: the page contains the model's C, and computes it.
 
-st.view([free, damped], None, names=["free tail", "damped tail"])
+st.view([free, damped], None, names=["free tail", "damped tail"], live=True)

@@ -13,7 +13,7 @@ import numpy as np
 import serpentail as st
 
 kick = st.scenario("kick")
-motion = kick.simulate()
+motion = kick.simulate(output_step=2e-3)  # s
 numbers = kick.summary(motion)
 for name in ("take_off_s", "apex_m", "recontact_s", "body_weight_N"):
     print(f"{name:<20} {numbers[name]:.3f}")
@@ -47,6 +47,6 @@ plt.show()
 # The tail is passive here, and nothing stops the tumbling in the air. The page
 # shows the forces of the ground as arrows. Its warnings are part of the result: for
 # example, the tail passes through the ground, because only the feet of this scene
-# have contact.
+# have contact. Give the ground less friction, or the tail more mass, and it jumps again.
 
-motion
+motion.view(None, live=True)

@@ -64,7 +64,9 @@ left.legend(fontsize="small")
 plt.show()
 
 # %%
-# The page shows the motion as planned, what the planned torques do in a simulation
-# ("true"), and a passive tail from the same start.
+# The page shows what the planned torques do in a simulation, which it computes again for
+# other bodies and starts, and the motion as planned.
 
-own
+table = st.TorqueTable(motion.t, motion.tau)
+flight = st.simulate(model, motion.q[0], motion.v[0], controller=table, t_span=motion.t[-1])
+st.view([flight, motion], None, names=["by the torques", "as planned"], live=True)

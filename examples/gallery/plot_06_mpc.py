@@ -63,6 +63,7 @@ right.legend()
 plt.show()
 
 # %%
-# The three flights over each other:
+# The three flights over each other. PFL can be computed again with other gains:
 
-st.view(list(flights.values()), None, names=list(flights))
+names = ["PFL", "MPC", "open loop"]
+st.view([flights[name] for name in names], None, names=names, live=True)

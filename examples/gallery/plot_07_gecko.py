@@ -50,6 +50,9 @@ right.legend(loc="center right")
 plt.show()
 
 # %%
-# The page compares the plan with its torques in a simulation, and with a passive tail.
+# The page simulates the torques of the plan, and computes that again for other geckos: the
+# plan knows one body only.
 
-plan
+table = st.TorqueTable(motion.t, motion.tau)
+flight = st.simulate(gecko, motion.q[0], motion.v[0], controller=table, t_span=motion.t[-1])
+st.view([flight, motion], None, names=["by the torques", "as planned"], live=True)

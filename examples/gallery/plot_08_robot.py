@@ -40,4 +40,4 @@ plt.show()
 # %%
 # Both robots over each other:
 
-st.view([swing, held], None, names=["tail swings", "tail held straight"])
+st.view([swing, held], None, names=["tail swings", "tail held straight"], live=True)

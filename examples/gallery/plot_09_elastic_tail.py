@@ -47,4 +47,4 @@ print(f"damping {1e3 * work:.4f} mJ, energy {1e3 * np.ptp(motion.energy[[0, -1]]
 # %%
 # The elastic tail and the tail without springs, over each other:
 
-st.view([motion, limp], None, names=["elastic tail", "without springs"])
+st.view([motion, limp], None, names=["elastic tail", "without springs"], live=True)

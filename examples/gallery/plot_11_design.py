@@ -58,6 +58,6 @@ ax.legend(title="path")
 plt.show()
 
 # %%
-# The best of the twelve candidates:
+# The best of the twelve candidates, to be tried on other bodies:
 
-flights["circle", 2]
+flights["circle", 2].view(None, live=True)

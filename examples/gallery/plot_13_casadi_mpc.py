@@ -64,4 +64,4 @@ flight.plot("torque", ax=right)
 right.set_title("A new torque every 20 ms")
 plt.show()
 
-flight
+flight.view(None, live=True)

@@ -55,6 +55,6 @@ right.legend()
 plt.show()
 
 # %%
-# Four links and the continuum, over each other:
+# The continuum and four links, over each other:
 
-st.view([linked[1], smooth], None, names=["4 links", "continuum"])
+st.view([smooth, linked[1]], None, names=["continuum", "4 links"], live=True)

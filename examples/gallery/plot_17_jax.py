@@ -68,4 +68,4 @@ right.plot(flight.t, tilt)
 right.set(title="After 100 steps", xlabel="time (s)", ylabel="tilt of the back (deg)")
 plt.show()
 
-flight
+flight.view(None, live=True)

@@ -50,6 +50,9 @@ ax.legend(fontsize="small")
 plt.show()
 
 # %%
-# Both motions over each other.
+# The torques of the best plan in a simulation, and what was planned, over each other.
 
-st.view([best.trajectory, both.trajectory], None, names=["own start", "chosen start"])
+motion, body = best.trajectory, rat.with_parameters(**best.design)
+table = st.TorqueTable(motion.t, motion.tau)
+flight = st.simulate(body, q0, v0, controller=table, t_span=motion.t[-1])
+st.view([flight, motion], None, names=["by the torques", "as planned"], live=True)

@@ -103,6 +103,12 @@ function obey(event, player, switches, look) {
   action();
 }
 
+// In a frame of another page only the animal is shown; it moves unless the reader wants no motion.
+function playAlone(player) {
+  document.body.className = "alone";
+  player.toggle(!matchMedia("(prefers-reduced-motion: reduce)").matches);
+}
+
 // The digit keys show and hide runs.
 function switched(switches, key) {
   const box = /^[1-9]$/.test(key) && switches[Number(key) - 1];
@@ -110,7 +116,10 @@ function switched(switches, key) {
 }
 
 open().then(
-  (player) => Object.assign(page, { ready: true, seek: (t) => player.seek(t) }),
+  (player) => {
+    Object.assign(page, { ready: true, seek: (t) => player.seek(t) });
+    if (location.hash === "#alone") playAlone(player);
+  },
   (error) => {
     page.error = String(error.stack ?? error);
     addNote(`This page could not be opened: ${error.message ?? error}`);
