@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from docutils import nodes
+from matplotlib.transforms import Bbox
 from sphinx import addnodes
 
 import serpentail as st
@@ -30,8 +31,10 @@ def draw_card(block, block_vars: dict[str, Any], gallery_conf: dict[str, Any]) -
     if motions:
         path = script.parent / CARDS / f"{script.stem}.png"
         path.parent.mkdir(parents=True, exist_ok=True)
-        figure, _ = st.filmstrip(motions[-1], path, frames=3, views=["oblique"])
-        figure.clear()
+        figure, axes = st.filmstrip(motions[-1], frames=3, views=["oblique"])
+        moments = Bbox.union([each.get_window_extent() for each in axes.flat])
+        inches = moments.transformed(figure.dpi_scale_trans.inverted())
+        figure.savefig(path, bbox_inches=inches, dpi=200)
     return ""
 
 
