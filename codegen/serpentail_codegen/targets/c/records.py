@@ -9,6 +9,7 @@ manifest.
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from textwrap import dedent
 
 from .simulation_features import SimulationFeatures
 
@@ -29,9 +30,13 @@ class Field:
         return "pointer" if "*" in self.type or self.type == "torque" else self.type
 
 
-def fields(*rows: tuple[str, str, str]) -> list[Field]:
-    """Return the members of a record."""
-    return [Field(*row) for row in rows]
+def fields(table: str) -> list[Field]:
+    """Return the members of a record, a line each, such as ``real *q: configuration``.
+
+    A line goes on in lines that are indented more.
+    """
+    rows = re.findall(r"^(\S.*?)(\w+): (.*(?:\n .*)*)", dedent(table), re.MULTILINE)
+    return [Field(name, kind.strip(), " ".join(text.split())) for kind, name, text in rows]
 
 
 def records(has: SimulationFeatures) -> dict[str, list[Field]]:
@@ -41,11 +46,9 @@ def records(has: SimulationFeatures) -> dict[str, list[Field]]:
         "controller": CONTROLLER[:2] + (PFL if has.pfl else []) + CONTROLLER[2:],
         "drive": DRIVE + (LEGS if has.legs else []),
         "run": START
-        + LEDGER
         + (BRISTLES[:1] if has.contacts else [])
         + SETTINGS
-        + SAMPLES
-        + (contact_samples(has))
+        + (BRISTLES[1:] + EVENT_FIELDS if has.contacts else [])
         + KEPT
         + (CONTACT_KEPT if has.contacts else [])
         + (LANDED if has.legs else []),
@@ -75,151 +78,107 @@ def layout(members: Sequence[Field]) -> list[list[str]]:
     return [[f.name, f.kind] for f in members]
 
 
-PIECEWISE = fields(
-    ("pieces", "int", "number of polynomials"),
-    ("channels", "int", "number of functions of time in the table"),
-    ("degree", "int", "degree of the polynomials"),
-    ("times", "const real *", "[pieces + 1] limits of the pieces, increasing (s)"),
-    (
-        "coefficients",
-        "const real *",
-        "[pieces][channels][degree + 1], for powers of t - times[piece], constants first",
-    ),
-)
-CONTROLLER = fields(
-    (
-        "damping",
-        "const real *",
-        "[NT] damping (N m s): tau = -damping q_t_dot (Eq. 47); NULL: none",
-    ),
-    ("torques", "const piecewise *", "NT channels of torques (N m), added; NULL: none"),
-    ("function", "torque", "your torques (N m), added; NULL: none"),
-    ("context", "void *", "first argument of `function`"),
-    ("clock", "real", "time of the run at which the clock of `function` is 0 (s)"),
-)
-PFL = fields(
-    (
-        "reference",
-        "const piecewise *",
-        "NT channels (rad) that Eq. 46 tracks; its torques are added; NULL: none",
-    ),
-    ("kp", "real", "gain K_p of tracking (1/s^2)"),
-    ("kd", "real", "gain K_d of tracking (1/s)"),
-    ("feedforward", "int", "1: add the acceleration of the reference; 0: feedback only"),
-    ("limit", "const real *", "[NT] largest torque of tracking (N m); NULL: no limit"),
-)
-DRIVE = fields(
-    ("phases", "int", "number of controllers"),
-    (
-        "begins",
-        "const real *",
-        "[phases] start of each controller, increasing (s); the first also acts before",
-    ),
-    ("controllers", "const controller *", "[phases] one controller after another"),
-    ("stops", "int", "number of times at which a torque or leg motion is not smooth"),
-    ("stop_times", "const real *", "[stops] these times, increasing (s); steps end there"),
-)
-LEGS = fields(
-    ("legs", "const piecewise *", "4 channels: gamma_1, delta_1, gamma_2, delta_2 (rad)"),
-    (
-        "landing",
-        "const piecewise *",
-        "the same from a touch-down of the feet on, in one piece over the time since then; NULL: "
-        "`legs` go on",
-    ),
-    ("landing_from", "real", "the first touch-down from this time (s) on counts"),
-)
-START = fields(
-    ("parameters", "const parameters *", "parameters of the model"),
-    ("drive", "const drive *", "controllers and leg motion"),
-    ("t", "real", "time (s): the start, then the current time"),
-    ("q", "real *", "[NQ] configuration: the start, then the current one"),
-    ("v", "real *", "[NV] velocity: the start, then the current one"),
-)
-LEDGER = fields(
-    (
-        "ledger",
-        "real *",
-        "work so far (J) of torques, damping, ground, legs; impulses (N s) on groups; or NULL",
-    )
-)
-BRISTLES = fields(
-    (
-        "bristles",
-        "real *",
-        "[2 CONTACTS] bristle deflections (m): the start, then the current ones",
-    ),
-    ("bristles_out", "real *", "[samples][2 CONTACTS] bristle deflections (m)"),
-)
-SETTINGS = fields(
-    ("method", "int", "one of the methods above"),
-    ("rtol", "real", "relative tolerance of one step"),
-    ("atol", "real", "absolute tolerance, added (m, rad, m/s, rad/s; mm for bristles)"),
-    ("step", "real", "fixed step, or first step of an adaptive method (s); 0: it is chosen"),
-    ("least_step", "real", "smallest step (s)"),
-    ("most_step", "real", "largest step (s)"),
-    ("most_steps", "long", "largest number of steps, accepted and rejected"),
-    ("pause", "long", "largest number of steps in one call"),
-)
-SAMPLES = fields(
-    ("samples", "long", "number of samples"),
-    ("times", "const real *", "[samples] times, increasing from t (s); the run ends at the last"),
-    ("q_out", "real *", "[samples][NQ] configurations"),
-    ("v_out", "real *", "[samples][NV] velocities"),
-    ("tau_out", "real *", "[samples][NT] torques (N m)"),
-    ("work", "real *", "[WORK_ROLLOUT] workspace; it contains the run between calls"),
-)
-EVENT_FIELDS = fields(
-    (
-        "peaks",
-        "real *",
-        "[parts][2] largest force (N) so far on all points, each group, each foot, and its time "
-        "(s); or NULL",
-    ),
-    (
-        "stop_at",
-        "int",
-        "sum of 1 << event for events that end the run; event = 2 group + (0: it begins to press, "
-        "1: it ceases to)",
-    ),
-    ("most_events", "long", "length of the next two arrays"),
-    ("event_times", "real *", "[most_events] times of events (s)"),
-    (
-        "event_kinds",
-        "int *",
-        "[most_events] events; 2 GROUPS + group: all points of the group are above ground again",
-    ),
-    ("events", "long", "number of events so far"),
-    ("unfelt", "long", "contacts shorter than a step, which its stages may have missed"),
-)
-KEPT = fields(
-    ("begun", "int", "whether the run has started"),
-    ("done", "long", "number of samples written"),
-    ("steps", "long", "number of accepted steps"),
-    ("rejected", "long", "number of rejected steps"),
-    ("evaluations", "long", "number of evaluations of the forward dynamics"),
-    ("factorisations", "long", "number of factorisations of 1 - w J"),
-    ("stop", "int", "index of the next stop of the drive"),
-    ("until", "real", "end of the current smooth part (s)"),
-    ("next_step", "real", "length of the next step (s)"),
-    ("error_before", "real", "error of the last step relative to the tolerance"),
-    ("known", "int", "whether the workspace contains the rate at t"),
-)
-
-
-CONTACT_KEPT = fields(
-    ("touching", "int", "whether a point touches the ground at t"),
-    ("near_point", "int", "point that passed above the ground, the closest for its error"),
-    ("near_time", "real", "time of this pass (s)"),
-    ("near_height", "real", "height of the point (m)"),
-    ("near_error", "real", "estimated error of the height (m), larger than it; 0: no such pass"),
-)
-LANDED = fields(("landed_at", "real", "time (s) at which `landing` began; far off: not yet"))
-
-
-def contact_samples(has: SimulationFeatures) -> list[Field]:
-    """Return the members that a run with contacts has."""
-    return BRISTLES[1:] + EVENT_FIELDS if has.contacts else []
+PIECEWISE = fields("""
+    int pieces: number of polynomials
+    int channels: number of functions of time in the table
+    int degree: degree of the polynomials
+    const real *times: [pieces + 1] limits of the pieces, increasing (s)
+    const real *coefficients: [pieces][channels][degree + 1], for powers of t - times[piece],
+        constants first
+""")
+CONTROLLER = fields("""
+    const real *damping: [NT] damping (N m s): tau = -damping q_t_dot (Eq. 47); NULL: none
+    const piecewise *torques: NT channels of torques (N m), added; NULL: none
+    torque function: your torques (N m), added; NULL: none
+    void *context: first argument of `function`
+    real clock: time of the run at which the clock of `function` is 0 (s)
+""")
+PFL = fields("""
+    const piecewise *reference: NT channels (rad) that Eq. 46 tracks; its torques are added; NULL:
+        none
+    real kp: gain K_p of tracking (1/s^2)
+    real kd: gain K_d of tracking (1/s)
+    int feedforward: 1: add the acceleration of the reference; 0: feedback only
+    const real *limit: [NT] largest torque of tracking (N m); NULL: no limit
+""")
+DRIVE = fields("""
+    int phases: number of controllers
+    const real *begins: [phases] start of each controller, increasing (s); the first also acts
+        before
+    const controller *controllers: [phases] one controller after another
+    int stops: number of times at which a torque or leg motion is not smooth
+    const real *stop_times: [stops] these times, increasing (s); steps end there
+""")
+LEGS = fields("""
+    const piecewise *legs: 4 channels: gamma_1, delta_1, gamma_2, delta_2 (rad)
+    const piecewise *landing: the same from a touch-down of the feet on, in one piece over the time
+        since then; NULL: `legs` go on
+    real landing_from: the first touch-down from this time (s) on counts
+""")
+START = fields("""
+    const parameters *parameters: parameters of the model
+    const drive *drive: controllers and leg motion
+    real t: time (s): the start, then the current time
+    real *q: [NQ] configuration: the start, then the current one
+    real *v: [NV] velocity: the start, then the current one
+    real *ledger: work so far (J) of torques, damping, ground, legs; impulses (N s) on groups; or
+        NULL
+""")
+BRISTLES = fields("""
+    real *bristles: [2 CONTACTS] bristle deflections (m): the start, then the current ones
+    real *bristles_out: [samples][2 CONTACTS] bristle deflections (m)
+""")
+SETTINGS = fields("""
+    int method: one of the methods above
+    real rtol: relative tolerance of one step
+    real atol: absolute tolerance, added (m, rad, m/s, rad/s; mm for bristles)
+    real step: fixed step, or first step of an adaptive method (s); 0: it is chosen
+    real least_step: smallest step (s)
+    real most_step: largest step (s)
+    long most_steps: largest number of steps, accepted and rejected
+    long pause: largest number of steps in one call
+    long samples: number of samples
+    const real *times: [samples] times, increasing from t (s); the run ends at the last
+    real *q_out: [samples][NQ] configurations
+    real *v_out: [samples][NV] velocities
+    real *tau_out: [samples][NT] torques (N m)
+    real *work: [WORK_ROLLOUT] workspace; it contains the run between calls
+""")
+EVENT_FIELDS = fields("""
+    real *peaks: [parts][2] largest force (N) so far on all points, each group, each foot, and its
+        time (s); or NULL
+    int stop_at: sum of 1 << event for events that end the run; event = 2 group + (0: it begins to
+        press, 1: it ceases to)
+    long most_events: length of the next two arrays
+    real *event_times: [most_events] times of events (s)
+    int *event_kinds: [most_events] events; 2 GROUPS + group: all points of the group are above
+        ground again
+    long events: number of events so far
+    long unfelt: contacts shorter than a step, which its stages may have missed
+""")
+KEPT = fields("""
+    int begun: whether the run has started
+    long done: number of samples written
+    long steps: number of accepted steps
+    long rejected: number of rejected steps
+    long evaluations: number of evaluations of the forward dynamics
+    long factorisations: number of factorisations of 1 - w J
+    int stop: index of the next stop of the drive
+    real until: end of the current smooth part (s)
+    real next_step: length of the next step (s)
+    real error_before: error of the last step relative to the tolerance
+    int known: whether the workspace contains the rate at t
+""")
+CONTACT_KEPT = fields("""
+    int touching: whether a point touches the ground at t
+    int near_point: point that passed above the ground, the closest for its error
+    real near_time: time of this pass (s)
+    real near_height: height of the point (m)
+    real near_error: estimated error of the height (m), larger than it; 0: no such pass
+""")
+LANDED = fields("""
+    real landed_at: time (s) at which `landing` began; far off: not yet
+""")
 
 
 def record_views(prefix: str, has: SimulationFeatures) -> dict[str, list[dict]]:
@@ -238,23 +197,23 @@ def _typed(text: str, prefix: str) -> str:
     return full if full.endswith("*") else full + " "
 
 
-STEPS = fields(
-    ("parameters", "const real *", "[count][PARAMETERS]"),
-    ("q", "real *", "[count][NQ] configurations, advanced in place"),
-    ("v", "real *", "[count][NV] velocities, advanced in place"),
-    ("torques", "const real *", "[NT] constant torques (N m) of the first state"),
-    ("torques_apart", "size_t", "reals from one state's torques to the next; 0: the same for all"),
-    ("count", "size_t", "number of states; STATES are computed at a time"),
-    ("h", "real", "length of a step (s)"),
-    ("steps", "long", "number of steps"),
-    ("work", "real *", "workspace"),
-    ("first", "size_t", "first of the states that are computed now; those before it are done"),
-)
-GROUND_STEPS = fields(
-    ("bristles", "real *", "[count][NU] bristle deflections (m), advanced in place"),
-    ("legs", "const real *", "[4][2] angle (rad) and rate (rad/s) of each hinge, first state"),
-    ("legs_apart", "size_t", "reals from one state's legs to the next; 0: the same for all"),
-)
+STEPS = fields("""
+    const real *parameters: [count][PARAMETERS]
+    real *q: [count][NQ] configurations, advanced in place
+    real *v: [count][NV] velocities, advanced in place
+    const real *torques: [NT] constant torques (N m) of the first state
+    size_t torques_apart: reals from one state's torques to the next; 0: the same for all
+    size_t count: number of states; STATES are computed at a time
+    real h: length of a step (s)
+    long steps: number of steps
+    real *work: workspace
+    size_t first: first of the states that are computed now; those before it are done
+""")
+GROUND_STEPS = fields("""
+    real *bristles: [count][NU] bristle deflections (m), advanced in place
+    const real *legs: [4][2] angle (rad) and rate (rad/s) of each hinge, first state
+    size_t legs_apart: reals from one state's legs to the next; 0: the same for all
+""")
 
 
 def steps_record(bristles: int) -> list[Field]:
@@ -262,13 +221,13 @@ def steps_record(bristles: int) -> list[Field]:
     return (GROUND_STEPS if bristles else []) + STEPS
 
 
-ROLLOUTS = fields(
-    ("runs", "void *", "[count] run records of the simulation header, all by rk4 or all by tsit5"),
-    ("count", "long", "number of runs"),
-    ("statuses", "int *", "[count] of ended runs: OK; anything else: compute the run by itself"),
-    ("lanes", "long *", "[STATES] index of the run in each lane; -1: none"),
-    ("next", "long", "index of the next run to start"),
-    ("pause", "long", "largest number of steps in one call"),
-    ("work", "real *", "workspace; it contains the flights between calls"),
-    ("lane", "int", "the lane whose run all others are in step with; -1: they are not"),
-)
+ROLLOUTS = fields("""
+    void *runs: [count] run records of the simulation header, all by rk4 or all by tsit5
+    long count: number of runs
+    int *statuses: [count] of ended runs: OK; anything else: compute the run by itself
+    long *lanes: [STATES] index of the run in each lane; -1: none
+    long next: index of the next run to start
+    long pause: largest number of steps in one call
+    real *work: workspace; it contains the flights between calls
+    int lane: the lane whose run all others are in step with; -1: they are not
+""")
