@@ -79,9 +79,12 @@ def test_tsit5_embeds_order_four_and_interpolates_with_it():
 
 def test_ros34pw2_has_order_three_with_any_jacobian():
     """Rang and Angermann 2005: alpha and gamma each fulfil the conditions, whatever J is."""
-    method = ROS34PW2
-    alpha, gamma = square(method.alpha), square(method.below) + method.gamma * np.eye(4)
-    one, b, e = np.ones(4), np.array(method.weights), np.array(method.embedded)
+    method = ROS34PW2  # in u = gamma k
+    gamma = np.linalg.inv(np.eye(4) / method.gamma - square(method.couplings))
+    np.testing.assert_allclose(np.diag(gamma), method.gamma, atol=1e-15)
+    alpha, b, off = (np.array(x) @ gamma for x in (square(method.rows), method.weights, method.error))
+    np.testing.assert_allclose(alpha.sum(axis=1), method.nodes, atol=1e-15)
+    one, e = np.ones(4), b - off
     a, g = alpha @ one, gamma @ one
     expected = [(b @ one, 1), (b @ a, 1 / 2), (b @ g, 0), (b @ a**2, 1 / 3), (b @ alpha @ a, 1 / 6)]
     expected += [(b @ alpha @ g, 0), (b @ gamma @ a, 0), (b @ gamma @ g, 0)]

@@ -10,7 +10,7 @@ from ...functions.tail import Tail
 from ...scene.scene import Scene
 from .records import DESCRIPTIONS, record_views
 from .simulation_features import METHODS, SimulationFeatures
-from .tableaux import DP8, RK4, ROS34PW2, TSIT5, transformed
+from .tableaux import DP8, RK4, ROS34PW2, TSIT5
 
 LOOKS = 24  # parts of parts of a step in which contacts are looked for: up to 2^-23 of it
 # heights (m): how exactly the sides of the ground are told apart; depths from which a point counts
@@ -118,7 +118,7 @@ def simulation_context(
         "tsit5": TSIT5,
         "rk4": RK4,
         "dp8": DP8,
-        "ros34pw2": transformed(ROS34PW2),
+        "ros34pw2": ROS34PW2,
     }
 
 

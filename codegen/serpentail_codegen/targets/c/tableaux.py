@@ -1,7 +1,6 @@
-"""Integration methods: their coefficients as published, and as the C needs them."""
+"""Integration methods: their coefficients, as the C needs them."""
 
 from dataclasses import dataclass
-from fractions import Fraction
 
 Row = tuple[float, ...]
 
@@ -137,73 +136,24 @@ DP8 = Explicit(
 # fmt: on
 
 
-@dataclass(frozen=True)
-class Classical:
-    """A Rosenbrock method as papers state it: alpha, gamma below its diagonal, its diagonal."""
-
-    gamma: float
-    alpha: tuple[Row, ...]
-    below: tuple[Row, ...]
-    weights: Row
-    embedded: Row
-
-
 # J. Rang, L. Angermann, New Rosenbrock W-methods of order 3 for PDAEs of index 1, BIT 45 (2005)
-# 761-787: order 3 with any J, order 2 embedded, L-stable and stiffly accurate with the exact J.
-ROS34PW2 = Classical(
+# 761-787, in u = Gamma k (Hairer and Wanner, Eq. IV.7.25): order 3 with any J, order 2 embedded,
+# L-stable and stiffly accurate with the exact J.
+ROS34PW2 = Rosenbrock(
     gamma=0.435866521508459,
-    alpha=(
+    nodes=(0.0, 0.871733043016918, 0.7315799577888524, 1.0),
+    rows=(
         (),
-        (0.8717330430169180,),
-        (0.8445706001536942, -0.11299064236484185),
-        (0.0, 0.0, 1.0),
+        (2.0,),
+        (1.4192173174557645, -0.2592322116729697),
+        (4.18476048231916, -0.28519201735549593, 2.294280360279042),
     ),
-    below=(
+    couplings=(
         (),
-        (-0.8717330430169180,),
-        (-0.9033805701304408, 0.05418067238809533),
-        (0.24212380706095346, -1.2232505839045147, 0.5452602553351021),
+        (-4.588560720558084,),
+        (-4.18476048231916, 0.28519201735549593),
+        (-6.368179200128358, -6.795620944466836, 2.870098604331056),
     ),
-    weights=(0.24212380706095346, -1.2232505839045147, 1.5452602553351021, 0.435866521508459),
-    embedded=(0.3781090314581937, -0.09604229221242318, 0.5, 0.2179332607542295),
+    weights=(4.18476048231916, -0.28519201735549593, 2.2942803602790414, 1.0),
+    error=(0.2777499476479679, -1.4032398951759992, 1.772630127667551, 0.5),
 )
-
-
-def transformed(method: Classical) -> Rosenbrock:
-    """Return a method in u = Gamma k (Hairer and Wanner, Eq. IV.7.25), computed without
-    rounding.
-    """
-    size, gamma = len(method.weights), Fraction(method.gamma)
-    lower = [[*map(Fraction, row), gamma] for row in method.below]
-    inverse = _inverse(lower)
-
-    def times(row: Row) -> Row:
-        return tuple(
-            float(sum(Fraction(x) * inverse[i][j] for i, x in enumerate(row) if i >= j))
-            for j in range(len(row))
-        )
-
-    return Rosenbrock(
-        gamma=method.gamma,
-        nodes=tuple(float(sum(map(Fraction, row))) for row in method.alpha),
-        rows=tuple(map(times, method.alpha)),
-        couplings=tuple(tuple(float(-inverse[i][j]) for j in range(i)) for i in range(size)),
-        weights=times(method.weights),
-        error=times(
-            tuple(
-                float(Fraction(b) - Fraction(e))
-                for b, e in zip(method.weights, method.embedded, strict=True)
-            )
-        ),
-    )
-
-
-def _inverse(lower: list[list[Fraction]]) -> list[list[Fraction]]:
-    """Return the inverse of a lower triangular matrix, row by row."""
-    size = len(lower)
-    inverse = [[Fraction(0)] * size for _ in range(size)]
-    for j in range(size):
-        inverse[j][j] = 1 / lower[j][j]
-        for i in range(j + 1, size):
-            inverse[i][j] = -sum(lower[i][k] * inverse[k][j] for k in range(j, i)) / lower[i][i]
-    return inverse
