@@ -82,7 +82,9 @@ def test_ros34pw2_has_order_three_with_any_jacobian():
     method = ROS34PW2  # in u = gamma k
     gamma = np.linalg.inv(np.eye(4) / method.gamma - square(method.couplings))
     np.testing.assert_allclose(np.diag(gamma), method.gamma, atol=1e-15)
-    alpha, b, off = (np.array(x) @ gamma for x in (square(method.rows), method.weights, method.error))
+    alpha, b, off = (
+        np.array(x) @ gamma for x in (square(method.rows), method.weights, method.error)
+    )
     np.testing.assert_allclose(alpha.sum(axis=1), method.nodes, atol=1e-15)
     one, e = np.ones(4), b - off
     a, g = alpha @ one, gamma @ one

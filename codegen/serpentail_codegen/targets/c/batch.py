@@ -162,15 +162,10 @@ def batch_files(
     for part in PARTS:
         here = [batch for batch in batches if BATCHED[batch.function.name] == part]
         if here:
-            text = render("c", "batch/batch.c.jinja", context | batch_context(scene, tail, here))
-            files[f"src/{scene.name}_{part}.c"] = text
+            views = [BatchView(batch, tail, scene.name) for batch in here]
+            own = context | lanes_context(scene, here) | {"functions": views}
+            files[f"src/{scene.name}_{part}.c"] = render("c", "batch/batch.c.jinja", own)
     return files
-
-
-def batch_context(scene: Scene, tail: Tail, batches: Sequence[Batch]) -> dict[str, Any]:
-    """Return what the template of one file lays out."""
-    views = [BatchView(batch, tail, scene.name) for batch in batches]
-    return lanes_context(scene, batches) | {"functions": views}
 
 
 def lanes_context(scene: Scene, parts: Sequence[Batch | LaneFunction]) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from ...ir.program import Apply, Copy, Ref, When, statements
 from ..target import body_lines, refused
-from .routine import pointer, scalar, singles
+from .routine import each_lane, pointer, scalar, singles
 
 if TYPE_CHECKING:
     from .loops import LoopPrinter
@@ -57,4 +57,4 @@ def copied_where(printer: LoopPrinter, target: Ref, source: Ref, adds: bool) -> 
         value = f"LOAD({address}) + {number}" if adds else number
         chosen = f"{printer.prefix}_select_row(LOAD({where} + c), {value}, LOAD({address}))"
         lines.append(f"STORE({address}, {chosen});")
-    return [f"for (int c = 0; c < {row}; c += LANES) {{", *("  " + line for line in lines), "}"]
+    return each_lane(str(row), lines)

@@ -113,6 +113,7 @@ def model_context(scene: Scene, tail: Tail) -> dict[str, Any]:
         "parameter_count": sum(p.size for p in struct_parameters(scene)),
         # the type of all numbers, its limits and its functions
         "real": scene.real,
+        "size": 4 if single else 8,
         "least": "FLT_MIN" if single else "DBL_MIN",
         "largest": "FLT_MAX" if single else "DBL_MAX",
         "sqrt": dialect(scene.real).functions["sqrt"],

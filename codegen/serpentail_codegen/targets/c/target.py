@@ -15,7 +15,7 @@ from .loops import LoopPrinter
 from .model import c_context, model_files
 from .records import layouts
 
-PACKAGE = {
+PACKAGE = {  # files that a user of the C alone needs besides it
     "Makefile": "package/makefile.jinja",
     "CMakeLists.txt": "package/cmake.txt.jinja",
     "LICENSE": "package/license.txt.jinja",
@@ -32,8 +32,9 @@ def emit(scene: Scene, tail: Tail, functions: Iterable[Function], version: str) 
     # what a host uses beside the model
     batched = batches(scene, tail, printed)
     runs = batch_rollout(scene, tail, printed)
-    files = model | batch_files(scene, tail, batched, context) | package_files(context)
+    files = model | batch_files(scene, tail, batched, context)
     files |= batch_rollout_file(scene, tail, runs, context)
+    files |= {name: render("c", template, context) for name, template in PACKAGE.items()}
 
     entries = c_entries(context) | {"batch": batch_entry(scene, batched)}
     entries |= batch_rollout_entry(tail, runs)
@@ -61,12 +62,6 @@ def c_entries(context: dict[str, Any]) -> dict[str, Any]:
             "records": layouts(has),
         }
     return entries
-
-
-def package_files(context: dict) -> dict[str, str]:
-    """Render the files that a user of the C alone needs besides it."""
-    context = context | {"size": {"float": 4, "double": 8}[context["real"]]}
-    return {name: render("c", template, context) for name, template in PACKAGE.items()}
 
 
 C = Target("c", LoopPrinter, emit)
