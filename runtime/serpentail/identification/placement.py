@@ -27,13 +27,6 @@ from ..model.state import Quantities
 TORSO = -1  # the piece of a marker on the torso
 NOWHERE = (0.0, 0.0, 0.0)
 STRAIGHT = 1e-5  # rad: polar coordinates have no value at 0
-CROSS = np.array(
-    [
-        [[0.0, 0, 0], [0, 0, -1], [0, 1, 0]],
-        [[0, 0, 1], [0, 0, 0], [-1, 0, 0]],
-        [[0, -1, 0], [1, 0, 0], [0, 0, 0]],
-    ]
-)  # CROSS[k] is the matrix of e_k x
 STEP = 1e-5  # of differences, in rad or relative to sizes; their error is about its square
 
 
@@ -155,7 +148,8 @@ def marker_points(placed: Placements, q: np.ndarray) -> tuple[np.ndarray, np.nda
     # shifts, turns of the torso, bends of the tail
     by_q = np.zeros((*body.shape[1:], placed.model.nv))
     by_q[..., :3] = np.eye(3)
-    by_q[..., OMEGA] = -R @ np.einsum("fmk,kij->fmij", body[0], CROSS)
+    turns = np.cross(np.eye(3), body[0][..., None, :])  # rows e_k x of each point
+    by_q[..., OMEGA] = R @ np.swapaxes(turns, -1, -2)
     slopes = (body[1 : nt + 1] - body[nt + 1 :]) / (2 * STEP)
     by_q[..., TAIL_V] = R @ np.moveaxis(slopes, 0, -1)
     return _in_world(q, R, body[0]), by_q

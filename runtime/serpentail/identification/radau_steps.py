@@ -11,7 +11,6 @@ import numpy as np
 
 from serpentail_scene.layout import OMEGA, QUATERNION, TAIL_Q
 
-from ..basics.attitude import turn_between, turned
 from ..model.model import Model
 from ..model.state_space import product_matrix
 from ..optimal.rules import collocation_rule
@@ -147,21 +146,12 @@ def cotangents(model: Model, x: np.ndarray) -> np.ndarray:
 
 def moved(model: Model, x: np.ndarray, step: np.ndarray) -> np.ndarray:
     """Return states (..., nx) after steps (..., 2nv) in their tangent spaces, quaternions unit."""
-    nq, nv = model.nq, model.nv
-    new = x.copy()
-    new[..., :3] += step[..., :3]
-    new[..., QUATERNION] = turned(x[..., QUATERNION], step[..., OMEGA])
-    new[..., TAIL_Q.start : nq] += step[..., 6:nv]
-    new[..., nq:] += step[..., nv:]
-    return new
+    q = model.integrate(x[..., : model.nq], step[..., : model.nv], 1.0)
+    return np.concatenate([q, x[..., model.nq :] + step[..., model.nv :]], axis=-1)
 
 
 def difference(model: Model, to: np.ndarray, x: np.ndarray) -> np.ndarray:
     """Return the steps (..., 2nv) from states x to others; turns as rotation vectors."""
-    nq, nv = model.nq, model.nv
-    step = np.zeros((*x.shape[:-1], 2 * nv))
-    step[..., :3] = to[..., :3] - x[..., :3]
-    step[..., OMEGA] = turn_between(x[..., QUATERNION], to[..., QUATERNION])
-    step[..., 6:nv] = to[..., TAIL_Q.start : nq] - x[..., TAIL_Q.start : nq]
-    step[..., nv:] = to[..., nq:] - x[..., nq:]
-    return step
+    nq = model.nq
+    moves = model.difference(x[..., :nq], to[..., :nq])
+    return np.concatenate([moves, to[..., nq:] - x[..., nq:]], axis=-1)

@@ -72,7 +72,8 @@ def fit(unknowns: Unknowns, start: FitPoint, stage: Stage) -> Fit:
         )
     weight, converged = 1.0, False
     for iteration in range(1, ITERATIONS + 1):
-        linear = _linearised(unknowns, point)
+        placed = unknowns.placed_at(point.values)
+        linear = tuple(linearised(unknowns, placed, iterate) for iterate in point.iterates)
         step = _step(unknowns, point.values, linear, pinned)
         stage.tell(iteration / ITERATIONS)
         if _length(linear, step) < 1:
@@ -104,12 +105,6 @@ def _integrated(unknowns: Unknowns, point: FitPoint) -> FitPoint | None:
             return None
         iterates.append(integrated)
     return FitPoint(point.values, tuple(iterates))
-
-
-def _linearised(unknowns: Unknowns, point: FitPoint) -> tuple[Linear, ...]:
-    """Return each trial's linear problem at a point."""
-    placed = unknowns.placed_at(point.values)
-    return tuple(linearised(unknowns, placed, iterate) for iterate in point.iterates)
 
 
 def shared_rows(unknowns: Unknowns, values: np.ndarray, linear: tuple[Linear, ...]) -> np.ndarray:

@@ -1,13 +1,13 @@
 """Where the search begins: the motion that the markers show by themselves, frame by frame."""
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from serpentail_scene.layout import PER_SEGMENT, QUATERNION, TAIL_Q, TORSO_Q
 
 from ..basics.attitude import sign_continuous
 from ..model.model import Model
 from .placement import Placements, marker_points, world_points
-from .radau_steps import difference, moved
 from .tracks import MarkerTracks
 
 ITERATIONS = 25
@@ -109,9 +109,7 @@ def fitted(
 
 def turned(model: Model, q: np.ndarray, step: np.ndarray) -> np.ndarray:
     """Return configurations (F, nq) after steps (F, nv)."""
-    none = np.zeros_like(step)
-    states = np.column_stack([q, none])
-    return within(model, moved(model, states, np.column_stack([step, none]))[:, : model.nq])
+    return within(model, model.integrate(q, step, 1.0))
 
 
 def within(model: Model, q: np.ndarray) -> np.ndarray:
@@ -166,21 +164,8 @@ def _laid(body: np.ndarray, world: np.ndarray) -> np.ndarray:
     middle, centre = body.mean(axis=0), world.mean(axis=0)
     U, _, Vt = np.linalg.svd((world - centre).T @ (body - middle))
     R = U @ np.diag([1, 1, np.sign(np.linalg.det(U @ Vt))]) @ Vt
-    return np.concatenate([centre - R @ middle, quaternion_of(R)])
-
-
-def quaternion_of(R: np.ndarray) -> np.ndarray:
-    """Return the unit quaternion of a rotation matrix: the largest eigenvector of Bar-Itzhack's."""
-    xx, yy, zz = np.diag(R)
-    K = np.array(
-        [
-            [xx + yy + zz, R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]],
-            [R[2, 1] - R[1, 2], xx - yy - zz, R[1, 0] + R[0, 1], R[0, 2] + R[2, 0]],
-            [R[0, 2] - R[2, 0], R[1, 0] + R[0, 1], yy - xx - zz, R[2, 1] + R[1, 2]],
-            [R[1, 0] - R[0, 1], R[0, 2] + R[2, 0], R[2, 1] + R[1, 2], zz - xx - yy],
-        ]
-    )
-    return np.linalg.eigh(K)[1][:, -1]
+    quaternion = np.roll(Rotation.from_matrix(R).as_quat(), 1)  # SciPy has its real part last
+    return np.concatenate([centre - R @ middle, quaternion])
 
 
 def interpolated(times: np.ndarray, rows: np.ndarray, at: np.ndarray) -> np.ndarray:
@@ -194,11 +179,11 @@ def interpolated(times: np.ndarray, rows: np.ndarray, at: np.ndarray) -> np.ndar
 
 def velocities(model: Model, times: np.ndarray, q: np.ndarray) -> np.ndarray:
     """Return velocities (F, nv) of configurations (F, nq): slopes of local parabolas."""
-    count, states = len(times), np.column_stack([q, np.zeros((len(q), model.nv))])
-    v, width = np.zeros((count, model.nv)), min(WINDOW, count)
+    count, width = len(times), min(WINDOW, len(times))
+    v = np.zeros((count, model.nv))
     for k in range(count):
         first = int(np.clip(k - width // 2, 0, count - width))
-        near, middle = slice(first, first + width), np.repeat(states[k : k + 1], width, axis=0)
-        steps = difference(model, states[near], middle)[:, : model.nv]
+        near = slice(first, first + width)
+        steps = model.difference(q[k], q[near])
         v[k] = np.linalg.lstsq(np.vander(times[near] - times[k], 3), steps, rcond=None)[0][1]
     return v

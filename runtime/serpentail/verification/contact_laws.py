@@ -8,7 +8,7 @@ from serpentail_scene.layout import POSITION, TORSO_NV, VELOCITY
 
 from ..model.model import Model
 from .errors import relative, sensitivity, worst
-from .law import PIECEWISE, SLOPE_LIMIT, VALUE_LIMIT, Errors, fastest, law, moved, slope
+from .law import PIECEWISE, SLOPE_LIMIT, VALUE_LIMIT, Errors, fastest, law, slope
 from .states import Case, at_origin
 
 DEPTH = 3e-3  # m, of the lowest point in the ground
@@ -33,13 +33,14 @@ def bristles(model: Model) -> np.ndarray:
 def sunk(model: Model, s: Case) -> Case:
     """Return the state with its lowest point in the ground."""
     positions, _ = model.contact_points(s.q, s.v, *legs(model))
-    return replace(s, q=raised(s.q, -(positions[:, 2].min() + DEPTH)))
+    return replace(s, q=raised(s, -(positions[:, 2].min() + DEPTH)))
 
 
-def raised(q: np.ndarray, height: float) -> np.ndarray:
-    """Return the configuration with B higher by a height (m)."""
-    q = q.copy()
-    q[2] += height
+def raised(s: Case, height: float) -> np.ndarray:
+    """Return the configuration with B higher by a height (m), unless it is fixed."""
+    q = s.q.copy()
+    if not s.fixed:
+        q[2] += height
     return q
 
 
@@ -91,7 +92,7 @@ def implicit_step(
     u = (bristles(model),) if model.contacts else ()
     weight = [w, 1.0] if u else [w]
     ground = (*u, *legs(model)) if u else ()
-    high = raised(s.q, HEIGHT)
+    high = raised(s, HEIGHT)
     factors = model.kernel("implicit_factor")(high, s.v, damping, gains, weight, *ground)
     return [x.astype(float) for x in model.kernel("implicit_solve")(factors, s.dq, s.dv, *u)]
 
@@ -104,9 +105,8 @@ def velocities_are_the_rates_of_the_points(model: Model, s: Case) -> Errors:
     rate = fastest(model, s.v) + np.abs(LEGS[4:]).max()
 
     def positions(time: float) -> np.ndarray:
-        return model.contact_points(moved(s.q, s.v, time), s.v, *legs(model, time))[0][
-            :count
-        ].astype(float)
+        q = model.integrate(s.q, s.v, time)
+        return model.contact_points(q, s.v, *legs(model, time))[0][:count].astype(float)
 
     change, largest = slope(positions, rate)
     velocities = model.contact_points(s.q, s.v, *legs(model))[1][:count]

@@ -9,13 +9,8 @@ from serpentail_scene.layout import OMEGA
 
 from ..model.model import Model
 from .errors import block_error, blocks_of, relative, worst
-from .law import PIECEWISE, SLOPE_LIMIT, Errors, fastest, law, moved, slope
+from .law import PIECEWISE, SLOPE_LIMIT, Errors, fastest, law, slope
 from .states import Case, at_origin
-
-
-def along(s: Case, time: float) -> Case:
-    """Return the state after moving along the state's own directions of q, v and tau."""
-    return replace(s, q=moved(s.q, s.dq, time), v=s.v + time * s.dv, tau=s.tau + time * s.dtau)
 
 
 def slopes(
@@ -27,7 +22,13 @@ def slopes(
     """
     s = at_origin(s)
     rate = nearer * max(1.0, fastest(model, s.dq))
-    change, largest = slope(lambda t: np.asarray(f(along(s, t)), float), rate)
+
+    def along(time: float) -> np.ndarray:
+        q = model.integrate(s.q, s.dq, time)
+        there = replace(s, q=q, v=s.v + time * s.dv, tau=s.tau + time * s.dtau)
+        return np.asarray(f(there), float)
+
+    change, largest = slope(along, rate)
     return change, rate * largest
 
 

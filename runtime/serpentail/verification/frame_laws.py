@@ -23,7 +23,7 @@ from .errors import (
     turned_array,
     worst,
 )
-from .law import VALUE_LIMIT, Errors, fastest, law, moved, slope
+from .law import VALUE_LIMIT, Errors, fastest, law, slope
 from .states import Case, at_origin, outputs, state_functions
 
 WORLD = ("mass_matrix_world", "bias_force_world")
@@ -137,7 +137,7 @@ def jacobians_are_the_derivatives_of_the_points(model: Model, s: Case) -> Errors
         rate = max(1.0, fastest(model, unit))
 
         def points(time: float, v: np.ndarray = unit) -> np.ndarray:
-            return model.tail_points(moved(q, v, time)).astype(float)
+            return model.tail_points(model.integrate(q, v, time)).astype(float)
 
         column, largest = slope(points, rate)
         errors.append(relative(J[:, :, k], column, rate * largest))

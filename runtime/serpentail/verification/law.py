@@ -7,15 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, VELOCITY
+from serpentail_scene.layout import OMEGA
 from serpentail_scene.parameters import PARTS
 
-from ..basics.attitude import product
 from ..basics.errors import UnusualSize
 from ..model.model import Model
 from ..model.passive import idle
 from .errors import rounding
-from .states import Case, is_fixed
+from .states import Case
 
 # limits in roundings (eps of the model's real type)
 VALUE_LIMIT = 450  # 1e-13 in double
@@ -91,17 +90,6 @@ def slope(f: Callable[[float], np.ndarray], rate: float) -> tuple[np.ndarray, np
     samples = [(w, f(k * step), f(-k * step)) for k, w in enumerate(STENCIL, 1)]
     largest = np.max([np.maximum(abs(ahead), abs(behind)) for _, ahead, behind in samples], axis=0)
     return sum(w * (ahead - behind) for w, ahead, behind in samples) / step, largest
-
-
-def moved(q: np.ndarray, v: np.ndarray, time: float) -> np.ndarray:
-    """Return the configuration that the constant velocity v leads to."""
-    if is_fixed(q, v):
-        return q + time * v
-    omega = v[OMEGA]
-    angle = np.linalg.norm(omega) * time / 2
-    turn = np.concatenate([[np.cos(angle)], np.sinc(angle / np.pi) * time / 2 * omega])
-    position = q[POSITION] + time * v[VELOCITY]
-    return np.concatenate([position, product(q[QUATERNION], turn), q[TAIL_Q] + time * v[TAIL_V]])
 
 
 def fastest(model: Model, v: np.ndarray) -> float:

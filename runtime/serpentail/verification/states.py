@@ -33,6 +33,11 @@ class Case:
     drift: np.ndarray  # in air, velocity of B against it and omega, torso axes
 
     @property
+    def fixed(self) -> bool:
+        """Whether the base is fixed; else the quaternion has one number more than its rates."""
+        return len(self.q) == len(self.v)
+
+    @property
     def accelerations(self) -> np.ndarray:
         """Wanted accelerations of the tail coordinates."""
         return self.v_dot[-len(self.tau) :]
@@ -128,22 +133,16 @@ def blocks(rng: np.random.Generator, tail: int, scales: tuple[float, float, floa
 
 def at_origin(s: Case) -> Case:
     """Return the state with B at the origin."""
-    if is_fixed(s.q, s.v):
-        return s
     q = s.q.copy()
-    q[POSITION] = 0
+    if not s.fixed:
+        q[POSITION] = 0
     return replace(s, q=q)
-
-
-def is_fixed(q: np.ndarray, v: np.ndarray) -> bool:
-    """Tell if a state is that of a tail on a fixed base."""
-    return len(q) == len(v)
 
 
 def scaled(s: Case, factor: float) -> Case:
     """Return another state: all but the attitude times a factor."""
     q = s.q * factor
-    if not is_fixed(q, s.v):
+    if not s.fixed:
         q[QUATERNION] = s.q[QUATERNION]
     return replace(
         s, q=q, v=s.v * factor, v_dot=s.v_dot * factor, tau=s.tau * factor, f_ext=s.f_ext * factor

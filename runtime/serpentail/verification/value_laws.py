@@ -20,7 +20,7 @@ from ..motion.trajectory import Trajectory
 from ..simulation.controllers.schedules import Legs
 from ..simulation.simulate import simulate
 from .errors import block_error, blocks_of, difference, differing, relative, rounding, worst
-from .law import ACTING, PIECEWISE, VALUE_LIMIT, Errors, fastest, law, moved, slope
+from .law import ACTING, PIECEWISE, VALUE_LIMIT, Errors, fastest, law, slope
 from .states import Case
 
 FLIGHT, STEPS = 0.2, 2000  # s
@@ -200,7 +200,7 @@ def energy_changes_by_the_power_of_the_torques(model: Model, s: Case) -> Errors:
     rate = 2 * fastest(model, s.v)  # energy has products of two sines
 
     def energy(time: float) -> np.ndarray:
-        return np.array(model.energy(moved(s.q, s.v, time), s.v + time * v_dot), float)
+        return np.array(model.energy(model.integrate(s.q, s.v, time), s.v + time * v_dot), float)
 
     power, largest = slope(energy, rate)
     rates = s.v[model.layout.tail_v]
