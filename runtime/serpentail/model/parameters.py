@@ -16,6 +16,7 @@ from ..basics.checks import numbers_in, satisfying
 from ..basics.errors import ModelError
 from ..basics.plausible_values import warn_of_sizes
 from .chains import entries, owner_of
+from .weight import OTHER_CHAINS, weight_of
 
 Values = Mapping[str, Any]  # name -> number or numbers, SI; of many runs (k,) or (k, size)
 # parameters that follow from the values of single links or arcs
@@ -24,7 +25,6 @@ TOTALS = {
     "tail_length": ("link_lengths", "arc_lengths"),
 }
 SHAPE_OF_LINKS = ("tail_mass", "tail_length", "link_radius")  # of equal links
-OTHER_CHAINS = "other_chains_mass"  # kg, of all chains but the tail; it follows from their masses
 
 
 def resolve(manifest: dict, changes: Mapping[str, object] | None) -> MappingProxyType[str, Value]:
@@ -86,24 +86,6 @@ def warn_of_parameters(manifest: dict, values: Values, calls: int) -> None:
 def real_type(manifest: dict) -> type[np.floating]:
     """Return the type of a model's numbers."""
     return np.float32 if manifest["real"] == "float" else np.float64
-
-
-def total_mass(values: Values) -> Any:
-    """Return the mass (kg) of torso and chains, or one of each run; of the tail on a fixed base."""
-    others = values.get(OTHER_CHAINS, 0.0)
-    return values.get("torso_mass", 0.0) + values["tail_mass"] + others
-
-
-def fall(values: Values) -> np.ndarray:
-    """Return the acceleration of gravity (3,), m/s^2, world, or (k, 3) of k runs."""
-    if "gravity_vector" in values:
-        return np.asarray(values["gravity_vector"], float)
-    return np.asarray(values["gravity"], float)[..., None] * [0.0, 0.0, -1.0]
-
-
-def weight_of(values: Values) -> Any:
-    """Return the weight (N) of torso and chains, or one of each run; 0 without gravity."""
-    return total_mass(values) * np.linalg.norm(fall(values), axis=-1)
 
 
 def merged(values: Values, changes: Values) -> dict[str, Any]:

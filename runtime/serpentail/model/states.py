@@ -16,8 +16,8 @@ from ..basics.errors import StateError
 from .functions import Array
 from .lazy import lazy_property
 from .names import Names
-from .parameters import total_mass
 from .state import State, StateWords, state_of
+from .weight import total_mass
 
 if TYPE_CHECKING:
     from .model import Model

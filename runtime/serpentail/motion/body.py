@@ -4,7 +4,7 @@ import numpy as np
 
 from ..basics.attitude import Array
 from ..model.model import Model
-from ..model.parameters import weight_of
+from ..model.weight import weight_of
 
 
 def weight(model: Model) -> float:

@@ -13,7 +13,7 @@ from serpentail_scene.layout import POSITION, QUATERNION
 from ..basics.attitude import Array, rotation_matrix
 from ..basics.errors import StateError
 from ..model.model import Model
-from ..model.parameters import total_mass
+from ..model.weight import total_mass
 from .body import semi_axes, weight
 from .ground import peaks
 

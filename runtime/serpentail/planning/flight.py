@@ -9,7 +9,7 @@ from serpentail_scene.layout import POSITION, VELOCITY
 
 from ..basics.errors import SimulationError
 from ..model.model import Model
-from ..model.parameters import fall, total_mass
+from ..model.weight import fall, total_mass
 from ..motion.trajectory import Trajectory
 from ..simulation.controllers.controller import Controller
 from ..simulation.controllers.schedules import Legs

@@ -12,7 +12,7 @@ from ..basics.checks import number, numbers, refusal, shown
 from ..basics.errors import PlanningError, UnusualSize
 from ..basics.plausible_values import warn_of_unusual
 from ..model.model import Model
-from ..model.parameters import fall, total_mass
+from ..model.weight import fall, total_mass
 from .goal import HALF_TURN, MOTOR, Bounds
 
 HUGE = 1e100  # beyond it squares overflow

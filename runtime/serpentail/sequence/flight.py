@@ -11,7 +11,7 @@ from serpentail_scene.layout import QUATERNION, TAIL_Q
 
 from ..basics.errors import SimulationError
 from ..model.model import Model
-from ..model.parameters import fall
+from ..model.weight import fall
 from ..mpc.mpc import Mpc
 from ..planning.goal import Goal
 from ..planning.planner import plan

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..basics.short_repr import brief
 from ..model.model import Model
-from ..model.parameters import fall, total_mass, weight_of
+from ..model.weight import fall, total_mass, weight_of
 
 # An imbalance relative to what was moved is reported if it exceeds the smaller of the first two,
 # with steps of a fixed length the second, and the third. docs/contact.md has measured ones.

@@ -11,7 +11,8 @@ from ..basics.checks import finite_array, refusal
 from ..basics.errors import SimulationError
 from ..model.kernel import RunKernel
 from ..model.model import Model
-from ..model.parameters import RunParameters, weight_of
+from ..model.parameters import RunParameters
+from ..model.weight import weight_of
 from ..motion.contact import Contact
 from .controllers.schedules import Legs
 from .start import Start

@@ -10,7 +10,7 @@ from serpentail_scene.layout import OMEGA, POSITION, TAIL_V, VELOCITY
 
 from ..basics.attitude import pose_of
 from ..model.model import Model
-from ..model.parameters import fall, total_mass, weight_of
+from ..model.weight import fall, total_mass, weight_of
 from .states import Case, outputs
 
 BLOCKS = (VELOCITY, OMEGA, TAIL_V)  # of forces and accelerations: B's translation, rotation, tail

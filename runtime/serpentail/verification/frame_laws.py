@@ -12,7 +12,7 @@ from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TORSO_N
 from ..basics.attitude import pose_of, product, rotation_matrix
 from ..model.chains import values_of
 from ..model.model import Model
-from ..model.parameters import fall, total_mass
+from ..model.weight import fall, total_mass
 from .errors import (
     block_error,
     difference,

@@ -7,8 +7,8 @@ import numpy as np
 from serpentail_scene.parameters import PARTS
 
 from ..model.model import Model
-from ..model.parameters import fall, total_mass
 from ..model.passive import passive_force, stored_energy
+from ..model.weight import fall, total_mass
 from .contact_laws import implicit_step
 from .errors import relative, rounding, sensitivity
 from .law import PIECEWISE, VALUE_LIMIT, Errors, law, rid_of

@@ -11,7 +11,7 @@ from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V
 from ..basics.errors import ModelError
 from ..model.chains import bend_ranges
 from ..model.model import Model
-from ..model.parameters import total_mass
+from ..model.weight import total_mass
 
 KINDS = ("random", "straight", "folded")
 

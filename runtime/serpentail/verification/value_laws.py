@@ -15,7 +15,7 @@ from serpentail_scene.layout import (
 
 from ..basics.attitude import rotation_matrix
 from ..model.model import Model
-from ..model.parameters import fall, total_mass
+from ..model.weight import fall, total_mass
 from ..motion.trajectory import Trajectory
 from ..simulation.controllers.schedules import Legs
 from ..simulation.simulate import simulate

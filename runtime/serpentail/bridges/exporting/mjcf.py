@@ -10,7 +10,7 @@ from xml.etree import ElementTree as Xml
 from ...basics.checks import shown
 from ...basics.errors import ExportError
 from ...model.model import Model
-from ...model.parameters import fall
+from ...model.weight import fall
 from .chain import AXES, Capsule, Chain, Link, along, chain_of, origin, text, torso_capsule
 from .export import xml_file
 

@@ -10,7 +10,7 @@ from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V,
 
 from ...basics.attitude import rotation_matrix
 from ...model.model import Model
-from ...model.parameters import fall
+from ...model.weight import fall
 from ..air import in_air, world_velocity
 from ..program.coordinates import COM_ENTRIES, IDENTITY_POSE
 
