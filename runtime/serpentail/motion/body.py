@@ -1,15 +1,9 @@
-"""What of the animal's body numbers and pictures need: its weight, and the size of its torso."""
+"""The size of the torso, which numbers and pictures need."""
 
 import numpy as np
 
 from ..basics.attitude import Array
 from ..model.model import Model
-from ..model.weight import weight_of
-
-
-def weight(model: Model) -> float:
-    """Return the weight (N) of torso and tail, of the tail on a fixed base; 0 without gravity."""
-    return float(weight_of(model.parameters))
 
 
 def semi_axes(model: Model) -> Array:

@@ -13,7 +13,7 @@ from serpentail_scene.layout import OMEGA, QUATERNION, VELOCITY
 
 from ..basics.attitude import Array, rotation_matrix
 from ..model.model import Model
-from .body import weight
+from ..model.weight import weight_of
 from .ground import feet
 from .resample import smooth
 from .trajectory import Trajectory
@@ -190,7 +190,7 @@ class Landing:
             return None
         carried = motion.contact.of("feet").forces[-1, :, 2].sum()
         slow = np.linalg.norm(motion.v[-1, VELOCITY]) < MAX_SPEED
-        heavy = carried > MIN_SHARE * weight(self.model)
+        heavy = carried > MIN_SHARE * weight_of(self.model.parameters)
         return bool(upright(motion) > MIN_UPRIGHT and slow and heavy)
 
     def landed(self) -> bool | None:

@@ -13,7 +13,7 @@ import numpy as np
 from ..basics.attitude import pitch_roll_yaw, tilt_deg
 from ..model.model import Model
 from ..model.passive import stored_energy
-from .body import weight
+from ..model.weight import weight_of
 from .ground import Peak, peaks, slip
 from .landing import MAX_SPEED, MIN_SHARE, MIN_UPRIGHT, Landing, upright
 from .plausibility import warnings_of
@@ -26,7 +26,7 @@ class Facts:
 
     def __init__(self, model: Model, motion: Trajectory):
         self.model, self.motion = model, motion
-        self.landing, self.weight = Landing(model, motion), weight(model)
+        self.landing, self.weight = Landing(model, motion), weight_of(model.parameters)
 
     @cached_property
     def peaks(self) -> dict[str, Peak]:
@@ -57,7 +57,7 @@ class Number(NamedTuple):
 
 def com_rise(model: Model, motion: Trajectory) -> float | None:
     """Highest rise (m) of the centre of mass against gravity, by M g h; None without g."""
-    whole = weight(model)
+    whole = weight_of(model.parameters)
     lifted = motion.potential - stored_energy(model.passive_values, motion.tail)
     return float((lifted.max() - lifted[0]) / whole) if whole else None
 

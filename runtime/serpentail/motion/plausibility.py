@@ -13,8 +13,8 @@ from serpentail_scene.layout import POSITION, QUATERNION
 from ..basics.attitude import Array, rotation_matrix
 from ..basics.errors import StateError
 from ..model.model import Model
-from ..model.weight import total_mass
-from .body import semi_axes, weight
+from ..model.weight import total_mass, weight_of
+from .body import semi_axes
 from .ground import peaks
 
 if TYPE_CHECKING:
@@ -166,7 +166,7 @@ def borne(model: Model) -> float:
 
 def _blows(model: Model, motion: "Trajectory") -> list[str]:
     """A force of the ground that no legs of the animal's size bear."""
-    largest, whole = peaks(motion), weight(model)
+    largest, whole = peaks(motion), weight_of(model.parameters)
     if not largest or not whole:
         return []
     force, time = largest["all"]

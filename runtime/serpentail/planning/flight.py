@@ -62,9 +62,9 @@ def _lift(model: Model, start: State, duration: float) -> float:
     if not model.contacts:
         return 0.0
     p, speed = model.parameters, float(np.abs(start[1][VELOCITY]).max())
-    falls = float(np.linalg.norm(fall(p))) * duration**2
+    fallen = float(np.linalg.norm(fall(p))) * duration**2
     size = 10 * (p["tail_length"] + float(np.abs(p["tail_mount"]).max()))
-    return size + speed * duration + falls + float(np.abs(start[0][UP]))
+    return size + speed * duration + fallen + float(np.abs(start[0][UP]))
 
 
 def _moved(q: np.ndarray, lift: float) -> np.ndarray:

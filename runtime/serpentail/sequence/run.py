@@ -9,7 +9,7 @@ import numpy as np
 from ..basics.near_names import NearNames
 from ..basics.short_repr import brief
 from ..model.model import Model
-from ..motion.body import weight
+from ..model.weight import weight_of
 from ..motion.derived import AGAIN
 from ..motion.ground import peaks
 from ..motion.joined import JoinedAgain, joined
@@ -116,7 +116,7 @@ def _rough(model: Model, motion: Trajectory, parts: list[Trajectory]) -> list[st
     """Return warnings of a landing whose torso turns fast, and of a push that no blow explains:
     of blows ``Trajectory.warnings`` tells.
     """
-    landing, whole = Landing(model, motion), weight(model)
+    landing, whole = Landing(model, motion), weight_of(model.parameters)
     rate, momentum = landing.torso_rate(1), landing.angular_momentum(1)
     take_off, warnings = landing.flight[0], []
     if rate is not None and momentum is not None and np.linalg.norm(rate) > MOST_SPIN:

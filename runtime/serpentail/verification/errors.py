@@ -55,8 +55,7 @@ def cancelling_size(model: Model, output: str, state: Case) -> float:
     if model.fixed:
         return 0.0
     speed, weights = (float(np.linalg.norm(x[VELOCITY])) for x in (state.v, state.multiplier))
-    g = np.linalg.norm(fall(model.parameters))
-    load = float(np.linalg.norm(state.v_dot[VELOCITY]) + g)
+    load = sum(np.linalg.norm(x) for x in (state.v_dot[VELOCITY], fall(model.parameters)))
     sizes = {"kinetic_dq": speed**2, "qq": load * weights, "aq": weights}
     return total_mass(model.parameters) * sizes.get(output, 0.0)
 

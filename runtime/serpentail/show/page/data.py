@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...model.model import Model
-from ...motion.body import weight as weight_of
+from ...model.weight import weight_of
 from ...motion.numbers import UNITS
 from ...motion.plausibility import warnings_of
 from ...motion.summary import summary
@@ -65,7 +65,7 @@ def page_data(
         numbers = [*_numbers(model, motion), ("samples", str(len(motion.t)))]
         words = {"name": name, "numbers": numbers, "events": _events(motion, prefix)}
         runs.append(_run(few, model, animal) | words)
-    weight = max(map(weight_of, models))
+    weight = max(float(weight_of(model.parameters)) for model in models)
     return {
         "runs": runs,
         "notes": notes,
