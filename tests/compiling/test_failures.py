@@ -101,12 +101,11 @@ def test_place_of_the_cache_and_what_cannot_be_one(model, monkeypatch, tmp_path)
     """One below /tmp serves; /tmp itself does not, and nobody is told to close it."""
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.setenv("XDG_CACHE_HOME", "/xdg")
-    assert cache_folder(tmp_path / "argument") == tmp_path / "argument"
-    assert cache_folder(None) == tmp_path / "cache"
+    assert cache_folder() == tmp_path / "cache"
     monkeypatch.delenv("SERPENTAIL_CACHE")
-    assert cache_folder(None) == Path("/xdg/serpentail")
+    assert cache_folder() == Path("/xdg/serpentail")
     monkeypatch.setenv("XDG_CACHE_HOME", "relative")
-    assert cache_folder(None) == tmp_path / ".cache" / "serpentail"
+    assert cache_folder() == tmp_path / ".cache" / "serpentail"
     monkeypatch.setenv("SERPENTAIL_CACHE", "/dev/null/cache")
     assert re.search("/dev/null.*SERPENTAIL_CACHE", refusal(model))
     cache = tmp_path / "all" / "mine"

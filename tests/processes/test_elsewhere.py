@@ -168,9 +168,9 @@ folder, *places = sys.argv[1:]
 for _ in range(2):
     model = st.load(folder)
 told["z"] = round(st.simulate(model, [0, 0, 0, 1, 0, 0, 0, 0, 0], [0] * 8, t_span=0.1).q[-1, 2], 6)
-held = contents(cache_folder(None))
-empty(cache_folder(None))
-told["cache"] = [held["libraries"], held["models"], contents(cache_folder(None))["libraries"]]
+held = contents(cache_folder())
+empty(cache_folder())
+told["cache"] = [held["libraries"], held["models"], contents(cache_folder())["libraries"]]
 told["refused"] = []
 for place in places:
     try:

@@ -61,7 +61,7 @@ def cache(arguments: argparse.Namespace) -> VerbOutcome:
     from ..compiling.cache import cache_folder
     from ..compiling.cache_limit import contents, empty
 
-    folder = cache_folder(None)
+    folder = cache_folder()
     if arguments.clean:
         empty(folder)
     report = contents(folder)

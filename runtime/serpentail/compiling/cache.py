@@ -31,9 +31,9 @@ LOCKS = "locks"
 PARTS = "parts"
 
 
-def cache_folder(cache: Path | None = None) -> Path:
-    """Return the cache: as asked, else $SERPENTAIL_CACHE, else in $XDG_CACHE_HOME or ~/.cache."""
-    chosen = cache or os.environ.get("SERPENTAIL_CACHE")
+def cache_folder() -> Path:
+    """Return the cache: $SERPENTAIL_CACHE, else in $XDG_CACHE_HOME or ~/.cache."""
+    chosen = os.environ.get("SERPENTAIL_CACHE")
     shared = os.environ.get("XDG_CACHE_HOME", "")
     if not os.path.isabs(shared):  # the XDG specification has relative paths ignored
         shared = "~/.cache"

@@ -50,19 +50,21 @@ def compile_library(
     sources: Sequence[Path],
     include: Path,
     profile: str = "fast",
-    cache: Path | None = None,
     flags: tuple[str, ...] = (),
 ) -> Path:
     """Return the shared library of sources and headers; compile it unless it is in the cache.
 
     Headers are those below `include` and next to the sources. `profile` is "fast" or
-    "reproducible"; `cache` defaults to $SERPENTAIL_CACHE, then the user's cache; `flags` are added
-    to the profile's. Raises CompilerNotFound, CompileFailed, ModelError (unreadable sources),
-    SerpentailError (profile, cache).
+    "reproducible"; `flags` are added to the profile's. Raises CompilerNotFound, CompileFailed,
+    ModelError (unreadable sources), SerpentailError (profile, cache).
     """
-    texts = _read(sources, include)
+    return library_of_texts(_read(sources, include), profile, flags)
+
+
+def library_of_texts(texts: Texts, profile: str = "fast", flags: tuple[str, ...] = ()) -> Path:
+    """Return the library of texts; arguments and errors as of ``compile_library``."""
     digests = {name: hashlib.sha256(text).hexdigest() for name, text in texts.items()}
-    return library_of(digests, lambda: texts, profile, cache_folder(cache), flags)
+    return library_of(digests, lambda: texts, profile, cache_folder(), flags)
 
 
 def _read(sources: Sequence[Path], include: Path) -> Texts:

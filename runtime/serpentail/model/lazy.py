@@ -1,7 +1,7 @@
 """Properties that are made when they are first asked for."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 
 def lazy_property(make: Callable[[Any], Any]) -> property:
@@ -17,7 +17,3 @@ def lazy_property(make: Callable[[Any], Any]) -> property:
         return known[name] if name in known else known.setdefault(name, make(self))
 
     return property(value, doc=make.__doc__)
-
-
-if TYPE_CHECKING:  # which keeps the type of what is made
-    pass

@@ -271,7 +271,7 @@ class Model(ModelMethods, ModelStates, NearNames):
 
     def __reduce__(self) -> tuple[Any, ...]:
         with suppress(SerpentailError):  # a folder that is as it was serves too
-            snapshot(self.checked, cache_folder(None))
+            snapshot(self.checked, cache_folder())
         return _unpickled, (
             self.checked.manifest_hash,
             self.folder.absolute(),

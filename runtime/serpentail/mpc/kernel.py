@@ -1,15 +1,13 @@
 """The controller's C for a type of numbers, compiled once, and its structures for ctypes."""
 
 import ctypes
-import hashlib
 import re
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..basics.errors import CompilerNotFound, PlanningError
-from ..compiling.cache import cache_folder
-from ..compiling.compiler import library_of, opened
+from ..compiling.compiler import library_of_texts, opened
 
 NATIVE = Path(__file__).parent / "native"
 HEADERS = ("mpc.h", "mpc_layout.h")
@@ -84,9 +82,8 @@ def state_fields(real: Any) -> list[tuple[str, Any]]:
 def kernel(real: str) -> ControllerCode:
     """The controller in C, compiled once; PlanningError if no compiler works."""
     texts = {name: text_of(name, real).encode() for name in (*HEADERS, *SOURCES)}
-    digests = {name: hashlib.sha256(text).hexdigest() for name, text in texts.items()}
     try:
-        code = opened(lambda: library_of(digests, lambda: texts, "fast", cache_folder(None), FLAGS))
+        code = opened(lambda: library_of_texts(texts, flags=FLAGS))
     except CompilerNotFound as error:
         raise PlanningError(f"Mpc: {error}") from error
     number = REALS[real]
@@ -98,12 +95,10 @@ def kernel(real: str) -> ControllerCode:
     code.mpc_control.argtypes = (_pointer, number, number, *(_pointer,) * 3)
     code.mpc_quadratic.argtypes = (_pointer,)
     code.mpc_begin.restype = code.mpc_torque.restype = code.mpc_control.restype = None
-    return ControllerCode(code, number, *_structures(number))
 
-
-def _structures(real: Any) -> tuple[type[ctypes.Structure], type[ctypes.Structure]]:
-    """Return the structures ``mpc_task`` and ``mpc_simulation``."""
-    task = type("mpc_task", (ctypes.Structure,), {"_fields_": task_fields(real)})
-    state = type("mpc_state", (ctypes.Structure,), {"_fields_": state_fields(real)})
-    members = [("state", state), ("step_begin", _pointer), ("clock", real)]
-    return task, type("mpc_simulation", (ctypes.Structure,), {"_fields_": members})
+    # its structures
+    task = type("mpc_task", (ctypes.Structure,), {"_fields_": task_fields(number)})
+    state = type("mpc_state", (ctypes.Structure,), {"_fields_": state_fields(number)})
+    members = [("state", state), ("step_begin", _pointer), ("clock", number)]
+    simulation = type("mpc_simulation", (ctypes.Structure,), {"_fields_": members})
+    return ControllerCode(code, number, task, simulation)

@@ -1,7 +1,6 @@
 """Terms of a node: rates, rows and cost as CasADi expressions, called from C with derivatives."""
 
 import ctypes
-import hashlib
 import threading
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -9,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..basics.errors import CompilerNotFound, PlanningError
-from ..compiling.cache import cache_folder
-from ..compiling.compiler import library_of, opened
+from ..compiling.compiler import library_of_texts, opened
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -75,13 +73,8 @@ def _compiled(functions: "list[ca.Function]") -> ctypes.CDLL:
     for function in functions:
         generator.add(function)
     text = generator.dump().encode()
-    digests = {"terms.c": hashlib.sha256(text).hexdigest()}
     try:
-        return opened(
-            lambda: library_of(
-                digests, lambda: {"terms.c": text}, "fast", cache_folder(None), FLAGS
-            )
-        )
+        return opened(lambda: library_of_texts({"terms.c": text}, flags=FLAGS))
     except CompilerNotFound as error:
         raise PlanningError(f"solver: {error}") from error
 

@@ -2,11 +2,10 @@
 
 import hashlib
 import platform
-import tempfile
 from pathlib import Path, PurePosixPath
 
 from ...basics.errors import ExportError
-from ...compiling.compiler import compile_library
+from ...compiling.compiler import library_of_texts
 from ...model.model import Model
 from ...simulation.methods import DOUBLE_RTOL
 from .bundle import zipped
@@ -35,7 +34,7 @@ def fmu(model: Model) -> bytes:
     files["modelDescription.xml"] = description(model, guid, names)
     place = PLATFORMS.get((platform.system(), platform.machine()))
     if place is not None:  # on other platforms there are only the sources
-        files[f"binaries/{place}/{model.name}.so"] = _library(sources, names)
+        files[f"binaries/{place}/{model.name}.so"] = _library(sources)
     return zipped(files)
 
 
@@ -95,10 +94,8 @@ def _names(model: Model) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _library(sources: dict[str, bytes], names: list[str]) -> bytes:
+def _library(sources: dict[str, bytes]) -> bytes:
     """Return the shared library, which runs on any processor of this family."""
-    with tempfile.TemporaryDirectory() as folder:
-        for name, content in sources.items():
-            Path(folder, name).write_bytes(content)
-        paths = [Path(folder, name) for name in names]
-        return compile_library(paths, Path(folder), "reproducible", flags=HIDDEN).read_bytes()
+    folders = {".c": "src", ".h": "include"}
+    texts = {f"{folders[name[-2:]]}/{name}": text for name, text in sources.items()}
+    return library_of_texts(texts, "reproducible", HIDDEN).read_bytes()

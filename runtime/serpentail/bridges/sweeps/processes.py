@@ -35,7 +35,7 @@ from ...model.manifest import CheckedFolder, snapshot
 from ...model.model import Model
 from .axis import as_json
 from .points import Point, points_of
-from .runs import Job, run_points
+from .runs import run_points
 from .store import Row
 
 TRIES = 2  # of a point whose process ends: something else may have ended it
@@ -69,7 +69,7 @@ def model_of(bundle: Bundle | None) -> Model | None:
     if bundle is None:
         return None
     checked, parameters, profile = pickle.loads(zlib.decompress(bundle.content))
-    checked = replace(checked, folder=snapshot(checked, cache_folder(None)))
+    checked = replace(checked, folder=snapshot(checked, cache_folder()))
     return model_from(checked, parameters, profile=profile)
 
 
@@ -235,10 +235,7 @@ def ending() -> Iterator[None]:
 # In such a process.
 
 
-@lru_cache(1)
-def _job(content: bytes) -> Job:
-    job: Job = pickle.loads(content)
-    return job
+_job = lru_cache(1)(pickle.loads)  # one after another: tasks of a sweep have the same
 
 
 def serve(descriptor: int) -> None:

@@ -96,11 +96,9 @@ class Job:
     def identity(self) -> str:
         """Return what rows depend on besides the model and the point; objects as digests."""
         told = [_name_of(self.run), self.settings, self.outputs, self.table, self.phases]
-        return json.dumps(told, sort_keys=True, default=lambda x: _digest(pickle.dumps(x)))
-
-
-def _digest(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()
+        return json.dumps(
+            told, sort_keys=True, default=lambda x: hashlib.sha256(pickle.dumps(x)).hexdigest()
+        )
 
 
 def _name_of(run: Any) -> Any:
