@@ -42,9 +42,7 @@ def generated(scene: Mapping[str, Any], name: str, given: Mapping[str, object]) 
     try:
         key = digest([generator_digest(), name, text])
     except ModuleNotFoundError as error:
-        raise ModelError(
-            f"no model can be generated without the package {error.name}: {REMEDY}"
-        ) from error
+        raise _without(error.name) from error
     stored = in_cache(read_note(cache, BUILDS, key), cache)
     if stored:
         return stored

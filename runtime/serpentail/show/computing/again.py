@@ -1,7 +1,5 @@
 """What a page needs to compute a run again, as data; or the reason why it only replays."""
 
-import base64
-import gzip
 from typing import Any
 
 import numpy as np
@@ -18,6 +16,7 @@ from ...simulation.methods import SCIPY
 from ...simulation.runs.outcomes import FAILED
 from ...simulation.runs.single import CompiledRun
 from ...simulation.simulate import RunAgain
+from ..page.samples import as_text
 from .image import BASE, Image
 from .knobs import REAL, knobs
 from .webassembly import webassembly
@@ -86,8 +85,8 @@ def _data(model: Model, again: RunAgain, run: CompiledRun) -> dict[str, Any]:
     offsets = {name: (getattr(kind, name).offset, of) for name, of in image.members["run"]}
     simulation = {name: code.manifest["simulation"].get(name, []) for name in ("ledger", "parts")}
     return simulation | {
-        "module": _text(webassembly(code.checked, exports)),
-        "image": _text(bytes(image.bytes)),
+        "module": as_text(webassembly(code.checked, exports)),
+        "image": as_text(bytes(image.bytes)),
         "base": BASE,
         "prefix": prefix,
         "run": record,
@@ -145,8 +144,3 @@ def _calls(run: CompiledRun, image: Image) -> tuple[dict[str, Any], dict[str, in
         call = [image.at(run.record.parameters), 0, 0, work, *(known[each][0] for each in inputs)]
         calls[name] = image.put(np.array(call + [0] * (4 + ARRAYS - len(call)), "<u4").tobytes())
     return known, calls
-
-
-def _text(content: bytes) -> str:
-    """Return bytes as text: gzip, base64."""
-    return base64.b64encode(gzip.compress(content, mtime=0)).decode("ascii")

@@ -76,4 +76,9 @@ def packed(samples: NDArray[np.float64]) -> str:
     bits = np.ascontiguousarray(np.clip(columns, -LARGEST, LARGEST), "<f4").view("<u4")
     steps = np.diff(bits, axis=1, prepend=np.zeros((len(bits), 1), "<u4"))
     planes = np.ascontiguousarray(steps).reshape(-1, 1).view(np.uint8).T
-    return base64.b64encode(gzip.compress(planes.tobytes(), mtime=0)).decode("ascii")
+    return as_text(planes.tobytes())
+
+
+def as_text(content: bytes) -> str:
+    """Return bytes as text: gzip, base64."""
+    return base64.b64encode(gzip.compress(content, mtime=0)).decode("ascii")
