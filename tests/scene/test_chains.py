@@ -47,6 +47,13 @@ def test_wrong_chains_are_refused():
         ("chain", 3, 3),
         ("chain.a", "a", {"a": PLAIN | {"pair": True}, "a_left": PLAIN}),
         ("chain.a_stop", "a_stop", {"a": PLAIN, "a_stop": PLAIN}),
+        (
+            "chain.a_b",
+            "a_b",
+            {"a": limb(BONE | {"name": "b_c"}), "a_b": limb(BONE | {"name": "c"})},
+        ),
+        ("chain.a", "a", {"a": limb(BONE, BONE | {"name": "knee_dot"})}),
+        ("chain.omega", "omega", {"omega": limb(BONE | {"name": "x"})}),
         ("chain", 121, {f"c{k}": PLAIN | {"segments": 3} for k in range(40)}),
     ):
         with row(place, found):

@@ -26,8 +26,9 @@ REFUSED: dict[str, tuple[Callable[[Any], bool], str]] = {
     "plan": (bool, "remove the table [plan], or the chains"),
     "identify": (bool, "remove the table [identify], or the chains"),
 }
+ENDS = ("", "_dot")  # of the names of coordinates and of their rates
 REQUIRED = ("tail_mount", "tail_mass", "tail_length")  # where a chain has them
-TAKEN = ("tail", "torso", "tau")  # words that names of parameters or torques begin with
+TAKEN = ("tail", "torso", "tau", "omega")  # words that names of other numbers begin with
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ def chains_of(values: Mapping[str, Any], parse: Parse) -> Chains:
                 chains.append(_chain(name, table, own, parse))
             except SceneError as error:
                 problems += [_in_table(place, p) for p in error.problems]
-    problems += _clashes(chains, list(tables))
+    problems += _clashes(chains, tables)
     problems += tree_problems(values, chains)
     return Chains(tuple(chains), given if isinstance(named, Mapping) else named, tuple(problems))
 
@@ -123,19 +124,24 @@ def _chain(name: str, table: Mapping[str, Any], own: Mapping[str, Any], parse: P
     return Chain(name, table.get("pair") is True, scene)
 
 
-def _clashes(chains: Collection[Chain], tables: Collection[str]) -> list[Problem]:
-    """Return a problem for each chain whose name, or that of a parameter, another one has, too."""
+def _clashes(chains: Collection[Chain], tables: Mapping[str, Any]) -> list[Problem]:
+    """Return a problem for each chain whose name, or that of a parameter or of a joint and its
+    rate, another one has, too.
+    """
     problems, seen = [], {*NAMES}
     names: list[str] = []
     for chain in chains:
         parameters = [name_in(chain.name, p.name) for p in OF_CHAINS.values()]
         twice = [n for n in chain.names if n in names or (chain.pair and n in tables)]
+        joints = [joint["name"] for joint in tables[chain.name].get("joints", ())]
+        own = [f"{name}_{joint}{end}" for name in chain.names for joint in joints for end in ENDS]
         twice += [n for n in parameters if n in seen]
+        twice += [n for n in own if n in names or own.count(n) > 1]
         if twice:
             remedy = f"{twice[0]} would mean two things: give the chain another name"
             problems.append(Problem(f"chain.{chain.name}", chain.name, remedy))
         seen |= {*parameters}
-        names += chain.names
+        names += [*chain.names, *own]
     return problems
 
 
