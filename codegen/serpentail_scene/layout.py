@@ -85,7 +85,7 @@ class Layout(Sizes):
     def widths(self) -> tuple[int, ...]:
         """The number of coordinates of each segment."""
         each = [(c.tau, c.segments.stop - c.segments.start) for c in self.chains]
-        runs = [((tau.stop - tau.start) // count,) * count for tau, count in each]
+        runs = [((tau.stop - tau.start) // count,) * count for tau, count in each if count]
         return tuple(chain.from_iterable(runs)) or (PER_SEGMENT,) * self.segments
 
     @property
