@@ -17,10 +17,10 @@ class Parameter:
     others.
 
     ``needs`` is a group of contact points, "contacts" for any of them, a part of the passive tail,
-    or "air"; empty: every scene has the parameter.  ``tail`` says which tails have it: "equal", tails
-    of equal pieces; "link" or "arc", tails whose pieces have their own values, ``size`` numbers
-    each; "geared", limbs with rotors; "tilted", tails on turned axes; "free", tails of a torso that
-    moves; "weight", all but weightless ones and those of "sloped" scenes; empty: all.
+    or "air"; empty: every scene has the parameter.  ``tail`` says which tails have it: "equal",
+    tails of equal pieces; "link" or "arc", tails whose pieces have their own values, ``size``
+    numbers each; "geared", limbs with rotors; "tilted", tails on turned axes; "free", tails of a
+    torso that moves; "weight", all but weightless ones and those of "sloped" scenes; empty: all.
     """
 
     name: str

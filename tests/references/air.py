@@ -91,8 +91,10 @@ def air_force(model, q, v):
     still = places(model, q, shares)
     moving = [places(model, q + 1j * STEP * along(q, d), shares) for d in (v, *np.eye(nv))]
     wind, e, widths = np.array(p["wind"]), p["tail_drag_speed"], np.array(p["tail_widths"])
-    size = lambda u: np.sqrt(u @ u + e * e)
-    out = np.zeros(nv)
+    out, roots = np.zeros(nv), {kind: [0.0] for kind in POINTS}
+
+    def size(u):
+        return np.sqrt(u @ u + e * e)
 
     def push(k, j, across, along_axis, weight):
         columns = np.array([(np.imag(one[k][j][0]) / STEP) for one in moving])
@@ -108,11 +110,8 @@ def air_force(model, q, v):
             width = (1 - s) * widths[k] + s * widths[k + 1]
             own = axial if kind == "continuum" else 0.0
             out += push(k, j, normal, own, length * w * width)
-    roots = [
-        places(model, q + 1j * STEP * along(q, d), dict.fromkeys(POINTS, [0.0]))
-        for d in (v, *np.eye(nv))
-    ]
-    still, moving = places(model, q, dict.fromkeys(POINTS, [0.0])), roots
+    still = places(model, q, roots)
+    moving = [places(model, q + 1j * STEP * along(q, d), roots) for d in (v, *np.eye(nv))]
     for k, (_, kind, length) in enumerate(pieces_of(model)):
         if kind == "articulated":  # its velocity along itself is the same everywhere
             out += push(k, 0, 0.0, axial, length * (widths[k] + widths[k + 1]) / 2)

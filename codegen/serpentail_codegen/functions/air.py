@@ -4,18 +4,21 @@ If a scene has air, inertial wrenches are less those of the air in all functions
 axes, ``v`` then begins with the velocity of B against the air.
 """
 
+from types import MappingProxyType
+
 from serpentail_scene.layout import OMEGA, VELOCITY
 
 from ..ir.program import Array, Ref
-from ..mechanics import air, branch, mount, rotations, torso
+from ..mechanics import air, rotations, torso
 from ..mechanics import rotation_derivatives as turns
 from .draft import Draft
 from .layout import block
-from .scope import Motion, State, Vectors
-from .sweeps.chains import add, prepared
-from .sweeps.pieces import IDENTITY, across, attitude, each_piece, mechanism
-from .sweeps.wrenches import add_torso_drag, against_air, gather_wrenches
-from .tails.mechanism import Wrenches
+from .scope import Motion, State
+from .sweeps.chains import prepared
+from .sweeps.pieces import IDENTITY, attitude
+from .sweeps.wrenches import inertial_forces
+
+MASSES = ("_mass", "_masses", "_inertia", "_inertias")  # how the names of parameters end
 
 
 def airspeed(draft: Draft, state: State, R: Ref | None) -> Ref | None:
@@ -57,30 +60,18 @@ def move_in_air(draft: Draft, v: Array, d_v: Array, R: Ref, turn: Ref) -> None:
 
 
 def assemble_air_force(draft: Draft, arrays: dict[str, Array]) -> None:
-    """Wrenches of the air on all pieces, summed to the torso."""
+    """What acts on an animal without mass that does not accelerate."""
     tail, force, zero = draft.tail, arrays["force"], draft.zero(3)
+    masses = [name for name in draft.parameters if name.endswith(MASSES)]
+    none = {n: draft.fixed(f"no_{n}", [0] * draft.parameters[n].size) for n in masses}
+    draft.parameters = MappingProxyType({**draft.parameters, **none})
     state = draft.state(arrays["q"], arrays["v"])
-    R, own = attitude(draft, state), prepared(draft, state)[0]
+    R = attitude(draft, state)
     motion = Motion(state.omega, zero, zero, airspeed(draft, state, R))
-    w = draft.vector("w_here", 3)
-    draft.copy(w, state.omega)
-    velocity = Vectors({"w": w, "u": against_air(draft, motion)})
-    across(draft, mount.flow_at_root, u=w)
-
-    # minus the wrenches, then their sum at B
-    wrenches = Wrenches(
-        draft.array("wrench", 6, tail.pieces), mechanism(draft).declare_torques(draft)
-    )
-    for i, g in each_piece(draft):
-        mechanism(draft).fly(draft, own, (i, g), velocity, wrenches.at(i, g))
-    total = gather_wrenches(draft, own, wrenches, lambda i: tail.segment_v(force, i))
+    inertial_forces(draft, prepared(draft, state), motion, None, force)
     if not tail.fixed:
-        sums = Vectors({"force": block(force, VELOCITY), "moment": block(force, OMEGA)})
-        for ref in sums.named.values():
-            draft.fill(ref, 0)
-        add_torso_drag(draft, motion, sums)
-        add(draft, branch.chain_wrench, total, sums)
-        draft.step(rotations.world_vector, {"R": R, "vector": sums["force"]}, vector=sums["force"])
+        at_B = block(force, VELOCITY)
+        draft.step(rotations.world_vector, {"R": R, "vector": at_B}, vector=at_B)
     with draft.loop("k", tail.nv) as k:
         number = force.part(k, 1)
         draft.step(air.opposite, {"minus": number}, force=number)

@@ -66,8 +66,8 @@ class Pose(Fields):
 
 @dataclass(frozen=True)
 class Motion(Fields):
-    """Angular velocity of a frame, its rate, and the acceleration of the frame's origin; in air, its
-    velocity ``u`` against the air.
+    """Angular velocity of a frame, its rate, and the acceleration of the frame's origin; ``u``: its
+    velocity against the air, if any acts.
     """
 
     w: Ref

@@ -69,11 +69,6 @@ def relative_velocity(let, R: M33, p_dot: V3, wind: V3) -> dict:
     return {"u": R.T * let("against", p_dot - wind)}
 
 
-def against_wind(let, R: M33, gust: V3) -> dict:
-    """What a wind adds to the velocity of B against the air, in torso axes."""
-    return {"u": -(R.T * gust)}
-
-
 def opposite(let, minus: V1) -> dict:
     """A number of the opposite sign."""
     return {"force": -minus}

@@ -35,13 +35,6 @@ def term_by_turn(let, gradient: V3, vector: V3) -> dict:
     return {"turn": gradient.cross(vector)}
 
 
-def term_curvature(let, gradient: V3, vector: V3) -> dict:
-    """Second derivatives of that term by rotations (by the exponential map), row by row."""
-    half = let("half", gradient / 2)
-    total = half * vector.T + vector * half.T - gradient.dot(vector) * eye(3)
-    return {f"row_{r}": total.row(r).T for r in range(3)}
-
-
 def turn_curvature(let, torso_mass: V1, tail_mass: V1, a: V3, u: V3, b_a: V3, b_u: V3) -> dict:
     """Second derivatives of P by rotations (by the exponential map), row by row."""
     mass = let("mass", torso_mass[0] + tail_mass[0])

@@ -148,26 +148,12 @@ def contact_problems(
     if "friction" in table and not contacts:
         problems.append(Problem("friction", table["friction"], remedy))
     wanted = values["functions"] if isinstance(values["functions"], list | tuple) else ()
-    wanted = [name for name in wanted if NEEDS.get(str(name)) != "air"]
-    lacks = {name: lacking(needs, contacts) for name, needs in NEEDS.items() if name in wanted}
+    present = (*contacts, *["air"] * any(name in parameters for name in AIR_NAMES))
+    lacks = {name: lacking(needs, present) for name, needs in NEEDS.items() if name in wanted}
     for name, group in [(name, group) for name, group in lacks.items() if group]:
         other = f'needs {group}: add "{group}" to `contacts`'
-        problems.append(Problem("functions", name, other if contacts else remedy))
-    return problems
-
-
-def air_problems(table: Mapping[str, Any], values: Mapping[str, Any]) -> list[Problem]:
-    """Return a problem for each function of the air in a scene that has none, and for arcs in
-    air.
-    """
-    wanted = values["functions"] if isinstance(values["functions"], list | tuple) else ()
-    named = [name for name in AIR_NAMES if name in parameters_in(table)]
-    remedy = "needs air: give parameters.air_density"
-    problems = [
-        Problem("functions", name, remedy)
-        for name, needs in NEEDS.items()
-        if needs == "air" and name in wanted and not named
-    ]
+        other = "needs air: give parameters.air_density" if group == "air" else other
+        problems.append(Problem("functions", name, other if contacts or group == "air" else remedy))
     return problems
 
 

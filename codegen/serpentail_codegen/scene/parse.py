@@ -19,7 +19,6 @@ from .body import OF_TORSO, body_table, scaled_parameters
 from .chains import all_parameters, chains_of
 from .checks import (
     MOST_LINKS,
-    air_problems,
     contact_problems,
     fixed_problems,
     function_problems,
@@ -82,7 +81,7 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
     problems += [*tail.problems, *key_problems(values), *kind_problems(table, kind)]
     problems += function_problems(values["functions"]) + contact_problems(table, values, contacts)
     problems += polar_problems(table, kind, contacts, values["functions"])
-    problems += fixed_problems(values, contacts) + air_problems(table, values)
+    problems += fixed_problems(values, contacts)
 
     # the kind and the contacts determine which parameters there are
     links = min(sum(values["shape"].counts) or tail_pieces(values), MOST_LINKS)

@@ -96,9 +96,7 @@ def resolve_parameters(
         problems.append(Problem("parameters.link_inertia", named["link_inertia"], remedy))
     numbers: dict[str, Any] = {}
     passive = parts_of(named)
-    widths = 0
-    if any(p.name in named for p in AIR):
-        widths = widths_of(segments, tail_links // segments, kind, shape)
+    widths = widths_of(named, segments, tail_links // segments, kind, shape)
     problems += missing(named, ("air", *passive))
     parameters = parameters_of(kind, contacts, shape, passive, segments, widths)
     sized = {p.name: p for p in (*PARAMETERS, *AIR, *parameters)}
@@ -113,9 +111,7 @@ def resolve_parameters(
         if not fits(p, numbers[p.name]):
             problems.append(number_problem(p, named[p.name]))
     problems += [] if problems else piece_problems(numbers, shape, foreign_to(kind)[1])
-    if not problems and widths and WIDTHS not in named and not has_radius(named, shape, kind):
-        remedy = "has no default, because this tail has no link_radius: give it in m"
-        problems.append(Problem(f"parameters.{WIDTHS}", None, remedy))
+    problems += missing_widths(named, kind, shape) if widths and not problems else []
     if not problems and "stops" in passive:
         problems += stop_problems(numbers)
     if problems:
@@ -126,9 +122,7 @@ def resolve_parameters(
     values = {p.name: p.default for p in parameters if p.name != unused}
     own = shape.links and kind not in LIMBS
     values |= with_link_defaults(numbers, shape.links) if own else numbers
-    if widths and WIDTHS not in numbers:
-        values[WIDTHS] = (2 * values["link_radius"],) * widths
-    floats = {name: _floats(value) for name, value in values.items()}
+    floats = {name: _floats(value) for name, value in (values | wide(values, widths)).items()}
     if "link_radius" in floats:
         floats["link_inertia"] = _ellipsoid_inertia(floats, tail_links)
     return Parameters(tuple((name, floats[name]) for name in NAMES if name in floats))
@@ -189,7 +183,7 @@ def _floats(value: Any) -> Value:
     return float(value) + 0.0
 
 
-# ---- the air, and the passive tail ---------------------------------------------------------------------------
+# ---- the air, and the passive tail ---------------------------------------------------------------
 
 
 def passive_parameters(passive: Collection[str], size: int) -> tuple[Parameter, ...]:
@@ -207,14 +201,28 @@ def for_all(parameter: Parameter, value: Any) -> Any:
     return [value] * parameter.size if alone else value
 
 
-def widths_of(segments: int, links: int, kind: str, shape: Shape) -> int:
-    """Return the number of widths of a tail in the air: one at its root, one for each piece."""
+def widths_of(named: Mapping[str, Any], segments: int, links: int, kind: str, shape: Shape) -> int:
+    """Return the number of widths of a tail in the air, one at its root and one for each piece; 0
+    without air.
+    """
+    if not any(p.name in named for p in AIR):
+        return 0
     return stretches_of(segments, links, kind, shape)[-1].pieces_before(segments) + 1
 
 
-def has_radius(named: Mapping[str, Any], shape: Shape, kind: str) -> bool:
-    """Tell if a tail has a link_radius, which gives its widths in the air."""
-    return kind == "articulated" and not shape.own and "link_inertia" not in named
+def wide(values: Mapping[str, Any], widths: int) -> dict[str, Any]:
+    """Return the widths of a tail that names none, which are those of its links."""
+    given = not widths or values[WIDTHS] is not None
+    return {} if given else {WIDTHS: (2 * values["link_radius"],) * widths}
+
+
+def missing_widths(named: Mapping[str, Any], kind: str, shape: Shape) -> list[Problem]:
+    """Return a problem if a tail in air has neither widths nor a link_radius that gives them."""
+    round_ = kind == "articulated" and not shape.own and "link_inertia" not in named
+    if round_ or WIDTHS in named:
+        return []
+    remedy = "has no default, because this tail has no link_radius: give it in m"
+    return [Problem(f"parameters.{WIDTHS}", None, remedy)]
 
 
 def missing(named: Mapping[str, Any], parts: Collection[str]) -> list[Problem]:

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from ..basics.errors import PlanningError
 from ..basics.progress import Stage
 from ..model.model import Model
 from ..optimal.fork_gate import forks_wait

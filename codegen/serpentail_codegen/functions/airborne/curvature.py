@@ -168,6 +168,7 @@ def add_attitude(
         at = at_drift(tail) + 3
         rows = {f"row_{r}_": H.part((at + r) * size + at - 3, 3) for r in range(3)}
         draft.step(airborne.drift_curvature, {"weight": mu["vector"]}, **rows)
+    assert turning is not None  # one of both has weights
     given = {"quaternion": b.quaternion, "angular": constant, "b_momentum": turning}
     draft.call(inner, **given, d_quaternion=unit, d_b_quaternion=twice)
     with draft.loop("k", 4) as k:

@@ -43,7 +43,7 @@ class AirborneSlopes:
 def assemble_derivatives(draft: Draft, arrays: dict[str, Array]) -> tuple[Balance, AirborneSlopes]:
     """Rates of an airborne state with their Jacobian."""
     b = assemble_rates(draft, arrays)
-    slopes = store_slopes(draft, b, arrays.get("angular"))
+    slopes = store_slopes(draft, b, arrays["angular"])
     store_jacobian(draft, b, slopes, arrays["J"])
     return b, slopes
 
@@ -115,6 +115,7 @@ def drift_slopes(draft: Draft, b: Balance, slopes: AirborneSlopes) -> Array:
     lanes = draft.tail.airborne_state
     rate, own = draft.wide("d_drift_rate", 3, lanes), draft.wide("d_own_pull", 3, lanes)
     inner = tangent_program(assemble(CONSERVED, draft.tail), ("quaternion",), lanes)
+    assert b.pull is not None  # as it is in air
     reads = {"quaternion": b.quaternion, "angular": b.pull, "d_quaternion": slopes.d_quaternion}
     draft.call(inner, d_momentum=own, **reads)
     changes = {"a": block(slopes.d_v_dot, VELOCITY), "pull": own[0]}

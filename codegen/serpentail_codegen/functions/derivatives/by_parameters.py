@@ -3,9 +3,8 @@
 from serpentail_scene.layout import VELOCITY
 
 from ...autodiff.forward import tangent_program
-from ...ir.program import Array, Ref
-from ...mechanics import air
-from ..air import in_air
+from ...ir.program import Array
+from ...mechanics import torso
 from ..draft import Draft
 from ..function import Function, assemble
 from ..layout import block
@@ -25,16 +24,19 @@ def assemble_forward_dynamics_parameter_derivatives(draft: Draft, arrays: dict[s
     """-H^-1 times the tangents of H v_dot + C with respect to every parameter, at fixed v_dot."""
     count = draft.tail.parameter_numbers
     factored, motion = forward_dynamics_first(draft, arrays)
-    v = in_air(draft, arrays["q"], arrays["v"], factored.R)
-    arguments = {"q": arrays["q"], "v": v} | motion
-    # in torso axes gravity acts as an acceleration of a torso that moves
-    inner = FUNCTIONS["inverse_dynamics"] if draft.tail.fixed else CORE
+    arguments = {name: arrays[name] for name in ("q", "v")} | motion
+    # in torso axes gravity acts as an acceleration of a torso that moves; wind is of the world
+    world = draft.tail.fixed or draft.tail.widths
+    inner = FUNCTIONS["inverse_dynamics"] if world else CORE
     arguments = {a.name: arguments[a.name] for a in inner.inputs}
-    rows = parameter_tangents(draft, inner, arguments, factored.R)
+    rows = parameter_tangents(draft, inner, arguments)
+    if draft.tail.widths and not draft.tail.fixed:
+        force = block(rows, VELOCITY)
+        draft.step(torso.torso_velocity, {"R": factored.R, "p_dot": force}, u=force)
     x = draft.wide("x", draft.tail.nv, count)
     gravity = None
     name, size = draft.gravity
-    if name in draft.parameters and not draft.tail.fixed:
+    if name in draft.parameters and not world:
         # it is the first parameter: p_b_ddot changes by the same amount
         gravity = draft.wide("d_gravity_z", size, count)[0]
         draft.unit(gravity, 0)
@@ -42,27 +44,17 @@ def assemble_forward_dynamics_parameter_derivatives(draft: Draft, arrays: dict[s
     spread_parameters(draft, x, arrays["dparameters"])
 
 
-def parameter_tangents(
-    draft: Draft, function: Function, arguments: dict[str, Array], R: Ref | None = None
-) -> Array:
+def parameter_tangents(draft: Draft, function: Function, arguments: dict[str, Array]) -> Array:
     """Return the tangents of a force with respect to every parameter: one lane for each number of
-    the struct. R: the attitude of a torso in whose axes the function is.
+    the struct.
     """
     count, lane, tangents = draft.tail.parameter_numbers, 0, {}
     names = [p.name for p in struct_parameters(draft.tail)]
-    winds = draft.tail.widths and function == CORE
-    names += ["v"] if winds else []
     inner = tangent_program(assemble(function, draft.tail), names, count)
     for p in struct_parameters(draft.tail):
         if any(a.name == f"d_{p.name}" for a in inner.arrays):
             tangents[f"d_{p.name}"] = draft.wide(f"d_{p.name}", p.size, count)
             draft.unit(tangents[f"d_{p.name}"][0], lane)
-        if winds and p.name == "wind":  # it is a velocity of the torso the other way
-            tangents["d_v"] = draft.wide("d_v", draft.tail.nv, count)
-            draft.fill(tangents["d_v"].whole(), 0)
-            d_u = block(tangents["d_v"], VELOCITY)
-            draft.unit(d_u, lane)
-            draft.step(air.against_wind, {"R": R, "gust": d_u}, u=d_u)
         lane += p.size
     rows = draft.wide("rows", draft.tail.nv, count)
     draft.call(inner, d_force=rows, **arguments, **tangents)

@@ -7,6 +7,7 @@ from serpentail_scene.layout import OMEGA
 from serpentail_scene.signatures.arguments import FORCE, MULTIPLIER, V_DOT, Argument, Q, V
 
 from ...ir.program import Array, Ref
+from ...mechanics import airborne
 from .. import dynamics, kinematics
 from ..air import core_airspeed
 from ..draft import Draft
@@ -65,6 +66,17 @@ def assemble_virtual_power(draft: Draft, arrays: dict[str, Array]) -> None:
     add_passive_power(draft, state, multiplier, v_dot, arrays["power"][0])
 
 
+def assemble_world_power(draft: Draft, arrays: dict[str, Array]) -> None:
+    """lambda^T (H v_dot + C), whose vectors are those of the arguments."""
+    force = draft.array("force", draft.tail.nv)
+    given = {name: arrays[name] for name in ("q", "v", "v_dot")}
+    dynamics.assemble_inverse_dynamics(draft, given | {"force": force})
+    draft.fill(arrays["power"][0], 0)
+    with draft.loop("k", draft.tail.nv) as k:
+        reads = {"weight": arrays["multiplier"].part(k, 1), "row": force.part(k, 1)}
+        draft.step(airborne.product, reads, sum_=arrays["power"][0])
+
+
 CORE = Function("core", "H v_dot + C in torso axes", (Q, V, V_DOT, A), (FORCE,), assemble_core)
 MOMENT = Function(
     "first_moment", "first moment of the animal", (Q,), (FIRST_MOMENT,), assemble_first_moment
@@ -75,6 +87,13 @@ VIRTUAL_POWER = Function(
     (Q, V, V_DOT, A, MULTIPLIER, U_VIRTUAL),
     (POWER,),
     assemble_virtual_power,
+)
+WORLD_POWER = Function(
+    "world_power",
+    "lambda^T (H v_dot + C)",
+    (Q, V, V_DOT, MULTIPLIER),
+    (POWER,),
+    assemble_world_power,
 )
 # functions of one state without contact, of which derivatives are taken
 FUNCTIONS = signed(dynamics.ASSEMBLIES | kinematics.ASSEMBLIES)

@@ -3,22 +3,22 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from serpentail_scene.layout import OMEGA, TORSO_NV, VELOCITY
+from serpentail_scene.layout import OMEGA, QUATERNION, TORSO_NV, VELOCITY
 
 from ...autodiff.forward import Lanes, tangent_program, tangents_together
 from ...autodiff.reverse import adjoint_program
-from ...ir.program import Array, Index, Ref, padded
+from ...ir.program import Array, Ref, padded
 from ...mechanics import rotation_derivatives as turns
 from ...mechanics import rotations
-from ..air import in_air, move_in_air
 from ..draft import Draft
 from ..function import Function, assemble
 from ..layout import block
 from ..scope import Vectors
 from ..tail import Tail
-from .differentiated import MOMENT, VIRTUAL_POWER
+from .differentiated import MOMENT, VIRTUAL_POWER, WORLD_POWER
 from .directions import Directions
 from .hessian_blocks import HessianBlocks
+from .jacobians import with_unit_quaternion
 from .torso_axes import TorsoAxes, torso_axes
 
 BY_Q = ("q", "v", "v_dot", "a", "u")
@@ -33,11 +33,13 @@ def assemble_inverse_dynamics_hessian(draft: Draft, arrays: dict[str, Array]) ->
 
     All terms with rotations of the torso follow from these.
     """
+    if draft.tail.widths:
+        hessian_by_numbers(draft, arrays)
+        return
     of_q, of_v = split_directions(draft.tail)
     axes = torso_axes(draft, arrays["q"], arrays["v_dot"], arrays["multiplier"])
     gradient = {name: draft.array(f"b_{name}", 3) for name in ("a", "u")}
-    given = {name: arrays[name] for name in ("q", "v_dot", "multiplier")} | axes.arrays()
-    given["v"] = in_air(draft, arrays["q"], arrays["v"], axes.R)
+    given = {name: arrays[name] for name in ("q", "v", "v_dot", "multiplier")} | axes.arrays()
     given["b_power"] = draft.fixed("one", [1]).array
     d_q, d_v = of_q.tangents(draft), of_v.tangents(draft)
     given |= d_q | {"dv_v": d_v["d_v"]}
@@ -60,8 +62,37 @@ def assemble_inverse_dynamics_hessian(draft: Draft, arrays: dict[str, Array]) ->
     draft.step(turns.term_by_turn, change, turn=turn_v[0])
     blocks.of_turn(turn_q, turn_v)
     turned_twice(draft, d_q, axes, gradient, blocks)
-    if draft.tail.widths:
-        add_drift(draft, axes, given, arrays)
+
+
+def hessian_by_numbers(draft: Draft, arrays: dict[str, Array]) -> None:
+    """Tangents of the gradient by all numbers of q and by v, in air, where all forces depend on
+    the attitude and the velocity of B. Along a unit quaternion nothing changes, so that its turns
+    are those of the exponential map.
+    """
+    tail, directions = draft.tail, Directions(draft.tail, ("turn", "p_dot", "omega"))
+    inner = adjoint_program(assemble(WORLD_POWER, tail), ("q", "v", "v_dot"), ("power",))
+    inner = tangent_program(inner, ("q", "v"), directions.count)
+    q, sizes = (
+        with_unit_quaternion(draft, arrays["q"]),
+        {"q": tail.nq, "v": tail.nv, "v_dot": tail.nv},
+    )
+    by = {n: draft.wide(f"d_b_{n}", size, directions.count) for n, size in sizes.items()}
+    given = {name: arrays[name] for name in ("v", "v_dot", "multiplier")}
+    given |= {"q": q, "b_power": draft.fixed("one", [1]).array} | directions.tangents(draft, q)
+    draft.call(inner, **given, **{f"d_b_{name}": rows for name, rows in by.items()})
+
+    # in the tangent space of q
+    rows, others = draft.wide("rows", tail.nv, directions.count), draft.array("others", tail.nv**2)
+    draft.fill(block(rows, VELOCITY), 0)
+    reads = {"quaternion": block(q, QUATERNION), "gradient": block(by["q"], QUATERNION)}
+    draft.step(rotations.turn_gradient, reads, turn=block(rows, OMEGA))
+    draft.copy(tail.all_v(rows), tail.all_q(by["q"]))
+    directions.spread(draft, rows, arrays["qq"], arrays["qv"])
+    directions.spread(draft, by["v"], others, arrays["vv"])
+    directions.spread(draft, by["v_dot"], arrays["aq"], others)
+    for H in (arrays["qq"], arrays["vv"]):
+        with draft.loop("k", tail.nv) as k, draft.loop("l", k) as other:
+            draft.copy(H.part(tail.nv * other + k, 1), H.part(tail.nv * k + other, 1))
 
 
 def split_directions(tail: Tail) -> tuple[Directions, Directions]:
@@ -133,74 +164,6 @@ def turned_twice(
     change = {"gradient": d_h[0], "vector": axes.u[0]}
     draft.step(turns.term_by_turn, change, turn=by_turn[0])
     blocks.of_turned_inertia(by_turn)
-
-
-def add_drift(
-    draft: Draft, axes: TorsoAxes, given: dict[str, Array], arrays: dict[str, Array]
-) -> None:
-    """Add what the velocity of B against the air gives: second derivatives by p_dot, and by a turn
-    of the torso, in whose axes it turns back.
-    """
-    tail, nv, first = draft.tail, draft.tail.nv, OMEGA.start
-    directions = Directions(tail, ("turn", "p_dot"), coordinates=False, rates=False)
-    turn, d_v = directions.turn(draft), directions.tangents(draft)["d_v"]
-    move_in_air(draft, given["v"], d_v, axes.R, turn)
-    sizes = {"q": tail.nq, "v": nv, "u": 3}
-    by = {name: draft.wide(f"drift_{name}", size, directions.count) for name, size in sizes.items()}
-    b_v = draft.array("b_v", nv)
-    inner = adjoint_program(assemble(VIRTUAL_POWER, tail), tuple(sizes), ("power",))
-    inner = tangent_program(inner, ("v",), directions.count, kept=("b_v",))
-    arguments = {
-        name: given[name] for name in ("q", "v", "v_dot", "multiplier", "a", "u", "b_power")
-    }
-    outputs = {f"d_b_{name}": array for name, array in by.items()}
-    draft.call(inner, **arguments, d_v=d_v, b_v=b_v, **outputs)
-
-    # by a turn twice: of both velocities, and of that against the air alone
-    both, other = (draft.wide(name, 3, directions.count) for name in ("by_turns", "by_u_turned"))
-    flow = {"gradient": block(by["v"], VELOCITY), "vector": block(given["v"], VELOCITY)}
-    draft.step(turns.term_by_turn, {"gradient": by["u"][0], "vector": axes.u[0]}, turn=other[0])
-    draft.copy(both.whole(), other.whole())
-    draft.step(turns.term_by_turn, flow, turn_=both[0])
-    rows = {
-        f"row_{r}_": arrays["qq"].part(nv * (OMEGA.start + r) + OMEGA.start, 3) for r in range(3)
-    }
-    reads = {"gradient": block(b_v, VELOCITY), "vector": flow["vector"]}
-    draft.step(turns.term_curvature, reads, **rows)
-
-    # the gradient by p_dot is in world axes
-    change = flow["gradient"]
-    reads = {"R": axes.R, "force": block(b_v, VELOCITY), "turn": turn, "change": change}
-    draft.step(turns.turning_force, reads, change=change)
-
-    def add(
-        name: str, row: Index | int, column: Index | int, lanes: Ref, down: bool = False
-    ) -> None:
-        to = arrays[name].part(nv * row + column, 3, nv if down else 1)
-        draft.copy(to, lanes, adds=True)
-
-    with draft.loop("k", 3) as k:
-        add("qq", first + k, first, both.lane(k, 0, 3))
-        add("qq", first, first + k, other.lane(k, 0, 3), down=True)
-        add("qv", first + k, 0, other.lane(k, 3, 3))
-        add("qv", first, k, by["v"].lane(k, 0, 3), down=True)
-        add("vv", k, 0, by["v"].lane(k, 3, 3))
-    with draft.loop("k", nv - first) as number:
-        k = number + first
-        add("qv", first, k, by["v"].lane(k, 0, 3), down=True)
-        add("vv", k, 0, by["v"].lane(k, 3, 3))
-        add("vv", 0, k, by["v"].lane(k, 3, 3), down=True)
-    with draft.loop("k", tail.nt) as number:
-        k = number + TORSO_NV
-        add("qq", k, first, by["q"].lane(number + tail.torso_nq, 0, 3))
-        add("qq", first, k, by["q"].lane(number + tail.torso_nq, 0, 3), down=True)
-        add("qv", k, 0, by["q"].lane(number + tail.torso_nq, 3, 3))
-
-    # the same numbers on both sides of the diagonal
-    for name, at in (("qq", first), ("vv", 0)):
-        with draft.loop("k", 3) as k, draft.loop("l", k) as other:
-            H, row, column = arrays[name], k + at, other + at
-            draft.copy(H.part(nv * column + row, 1), H.part(nv * row + column, 1))
 
 
 def own_tail_mass(draft: Draft) -> dict[str, Ref]:

@@ -101,16 +101,6 @@ def add_drag(
     draft.step(air.link_drag, piece, velocity, joint, widths(draft, place[1]), F_=wrench["F"])
 
 
-def fly_link(
-    draft: Draft, segments: Segments, place: Place, velocity: Vectors, wrench: Vectors
-) -> None:
-    """Carry ``w, u`` over one link and store minus the wrench of the air."""
-    piece, rates = segments.at(*place), segments.motion(place[0])
-    draft.step(link.link_angular_velocity, piece, rates, velocity, w=velocity["w"])
-    draft.fill(wrench["F"], 0)
-    add_drag(draft, segments, place, velocity, wrench)
-
-
 def link_drag_power(
     draft: Draft, segments: Segments, place: Place, virtual_rates: Ref, flow: Vectors, power: Ref
 ) -> None:
@@ -139,7 +129,6 @@ ARTICULATED = Mechanism(
     prepare_samples=prepare_link_samples,
     declare_torques=no_torques,
     move=move_link,
-    fly=fly_link,
     drag_power=link_drag_power,
     momentum=link_momentum,
     pose=link.link_pose,

@@ -174,17 +174,6 @@ def add_drag(
     draft.step(arc.segment_velocity, piece, rates, velocity, u=velocity["u"])
 
 
-def fly_arc(
-    draft: Draft, segments: Segments, place: Place, velocity: Vectors, wrench: Vectors
-) -> None:
-    """Store minus the wrench of the air on one arc, then carry ``w, u`` to its tip."""
-    for ref in wrench.named.values():
-        draft.fill(ref, 0)
-    add_drag(draft, segments, place, velocity, wrench)
-    reads = segments.at(*place), segments.motion(place[0])
-    draft.step(arc.segment_velocity, *reads, velocity, w=velocity["w"])
-
-
 def arc_drag_power(
     draft: Draft, segments: Segments, place: Place, virtual_rates: Ref, flow: Vectors, power: Ref
 ) -> None:
@@ -213,7 +202,6 @@ CONTINUUM = Mechanism(
     prepare_samples=prepare_arc_samples,
     declare_torques=bending_torques,
     move=move_arc,
-    fly=fly_arc,
     drag_power=arc_drag_power,
     momentum=arc_momentum,
     pose=arc.segment_pose,

@@ -87,9 +87,8 @@ class Mechanism:
     ``declare_torques`` declares the array in which ``move`` stores the generalised forces of bends.
     ``move(draft, segments, place, motion, v_dot, wrench, u)`` carries the motion over a piece and
     stores its inertial wrench, less that of the air if ``u``, a velocity against it, is given.
-    ``fly(draft, segments, place, velocity, wrench)`` carries ``w, u`` over a piece and stores minus
-    the wrench of the air; ``drag_power(draft, segments, place, virtual_rates, flow, power)``
-    carries ``u`` of a flow and adds the power of that wrench under a virtual motion.
+    ``drag_power(draft, segments, place, virtual_rates, flow, power)`` carries ``u`` of a flow over
+    a piece and adds the power of minus the wrench of the air under a virtual motion.
     ``momentum(draft, segments, place, velocity, writes)`` carries angular and linear velocity ``w,
     u`` over a piece and gives momentum or kinetic energy.
     A place is a segment and one of its pieces. The other fields are steps.
@@ -102,7 +101,6 @@ class Mechanism:
     prepare_samples: Callable[[Draft, State, Segments | None], Segments]
     declare_torques: Callable[[Draft], Array | None]
     move: Callable[[Draft, Segments, Place, Motion, Array | None, Vectors, Ref | None], None]
-    fly: Callable[[Draft, Segments, Place, Vectors, Vectors], None]
     drag_power: Callable[[Draft, Segments, Place, Ref, Vectors, Ref], None]
     momentum: Callable[[Draft, Segments, Place, Vectors, Mapping[str, Ref]], None]
     pose: StepFunction | Step

@@ -68,8 +68,8 @@ def batch_rollout(
 ) -> BatchRollout | None:
     """Return what advances runs in lanes, of a scene with rollout and a free torso.
 
-    In air there is none. With contacts it needs implicit methods. Trees with damping have none: their damping is not one
-    array.
+    With contacts it needs implicit methods. Models in air have none, and trees with damping: theirs
+    is not one array.
     """
     names = {f.function.name for f in printed}
     if "rollout" not in scene.functions or tail.fixed or tail.widths:
