@@ -21,7 +21,7 @@ from serpentail.building.scene_text import scene_text
 from serpentail.cli import cli
 from serpentail_codegen.scene.parse import parse_scene
 from serpentail_scene.keys import KEYS
-from serpentail_scene.parameters import PARAMETERS, PASSIVE
+from serpentail_scene.parameters import NAMED, PARAMETERS
 from serpentail_scene.signatures.table import NEEDS
 from tests.support import zoo
 from tests.support.scenes import SCENES
@@ -194,7 +194,7 @@ def test_options_are_what_the_generator_knows():
     keys = {"tail" if key == "kind" else key for key in KEYS}
     left = {"description", "parameters", "plan", "simulate", "phase", "identify", "sweep"}
     assert set(SceneKeys.__annotations__) == keys - left
-    names = [parameter.name for parameter in (*PARAMETERS, *PASSIVE)]
+    names = [parameter.name for parameter in NAMED]
     assert list(ParameterOptions.__annotations__) == names
     wanted = {group: [p.name for p in PARAMETERS if p.needs == group] for group in NEEDED}
     assert {group: [*names] for group, names in NEEDED.items()} == wanted

@@ -10,6 +10,7 @@ import pytest
 from serpentail import StateError
 from serpentail.basics.attitude import quaternion_rate
 from serpentail_codegen.ir.interpret import Run
+from tests.references.air import attitude
 from tests.references.metrics import block_error, equilibrated_condition
 from tests.support import zoo
 from tests.support.derivative_models import COMPLEX, STEP, nest_of, of_every_kind, parameters_of
@@ -17,7 +18,7 @@ from tests.support.rows import row
 
 from .compared import model_of
 
-QUICK = ["m1_n3", "loops", "arcs2_loops", "elastic", "mixed"]
+QUICK = ["m1_n3", "loops", "arcs2_loops", "elastic", "mixed", "air"]
 SLOW = ["m3_n4", "straight", "arcs3", "own_links", "own_arcs", "elastic_arcs", "weightless"]
 ROUNDING = 2e-13  # of a derivative, relative to its row; for each unit of the condition number
 every_model = pytest.mark.parametrize(
@@ -26,18 +27,26 @@ every_model = pytest.mark.parametrize(
 
 
 def calls(model):
-    """Names, full states and arguments of calls: B at the origin and at rest, and weights of the
-    order of one over each rate's size.
+    """Names, full states and arguments of calls: B at the origin, without air also at rest, and
+    weights of the order of one over each rate's size.
     """
-    nt = model.nv - 6
-    sizes = np.repeat([1, 10, 500, 20], [4, nt, nt, 3])
+    nt, air = model.nv - 6, drift_of(model)
+    sizes = np.repeat([1, 10, 500, 50, 500, 20], [4, nt, nt, air // 2, air // 2, 3])
     for name, state in of_every_kind(model):
         q, v = state["q"].copy(), state["v"].copy()
-        q[:3], v[:3] = 0, 0
-        given = {"x": np.concatenate([q[3:], v[6:]]), "tau": state["tau"]}
+        q[:3], v[:3] = 0, v[:3] * bool(air)
+        x = [q[3:], v[6:]]
+        if air:
+            x += [attitude(q[3:7]).T @ (v[:3] - model.parameters["wind"]), v[3:6]]
+        given = {"x": np.concatenate(x), "tau": state["tau"]}
         given["angular"] = model.momentum(q, v)[1]
         weights = np.random.default_rng(41).normal(size=len(sizes)) / sizes
         yield name, (q, v, state["tau"]), given | {"weights": weights}
+
+
+def drift_of(model):
+    """How many numbers x has of the torso's velocities."""
+    return 6 if "air_density" in model.parameters else 0
 
 
 def all_three(model, arguments):
@@ -90,12 +99,17 @@ def test_rates_are_those_of_full_dynamics_at_that_momentum(name):
     for at, (q, v, tau), arguments in calls(model):
         (y,), (first, J), (second, same, H) = all_three(model, arguments)
         rows.append((arguments, (y, J, H)))
-        quaternion, rate, acceleration, omega = np.split(y, np.cumsum([4, len(tau), len(tau)]))
+        sizes = [4, len(tau), len(tau), drift_of(model)]
+        quaternion, rate, acceleration, drift, omega = np.split(y, np.cumsum(sizes))
         most = equilibrated_condition(model.mass_matrix(q))
         with row(at):
             assert np.abs(omega - v[3:6]).max() <= 2e-14 * most * max(np.abs(v).max(), 1e-300)
-            expected = model.forward_dynamics(q, v, tau)[6:]
-            assert block_error(acceleration, expected) <= 1e-13 * most
+            v_dot = model.forward_dynamics(q, v, tau)
+            assert block_error(acceleration, v_dot[6:]) <= 1e-13 * most
+            if len(drift):  # a vector of the world in axes that turn
+                swept = np.cross(v[3:6], arguments["x"][-6:-3])
+                own = [attitude(q[3:7]).T @ v_dot[:3] - swept, v_dot[3:6]]
+                assert block_error(drift, np.concatenate(own)) <= 1e-13 * most
             np.testing.assert_array_equal(rate, v[6:])
             turning = np.array(quaternion_rate(q[3:7], omega))
             np.testing.assert_allclose(quaternion, turning, atol=1e-15 * np.abs(turning).max())
@@ -112,8 +126,8 @@ def test_rates_are_those_of_full_dynamics_at_that_momentum(name):
 @every_model
 def test_derivatives_are_those_of_a_complex_step(name):
     model = model_of(name)
-    nt = model.nv - 6
-    by, of = blocks(4, nt, nt, nt), blocks(4, nt, nt, 3)
+    nt, air = model.nv - 6, [3] * (drift_of(model) // 3)
+    by, of = blocks(4, nt, nt, *air, nt), blocks(4, nt, nt, *air, 3)
     for at, (q, _, _), arguments in [*calls(model)][::2]:
         y, J, H = all_three(model, arguments)[2]
         limit = ROUNDING * equilibrated_condition(model.mass_matrix(q))

@@ -21,7 +21,7 @@ from serpentail.scenes.simulate import scenario_of
 from serpentail_codegen.scene.parse import load_scene, parse_scene
 from serpentail_codegen.scene.problems import SceneError
 from serpentail_scene.keys import KEYS
-from serpentail_scene.parameters import NAMES, PARAMETERS, PASSIVE
+from serpentail_scene.parameters import NAMED, NAMES
 from tests.support import zoo
 from tests.support.posed import posed
 from tests.support.rows import row
@@ -176,7 +176,7 @@ def test_editors_show_what_each_parameter_is(capsys):
     schema = json.loads(capsys.readouterr().out)
     shown = schema["properties"]["parameters"]["properties"]
     assert {name: each["description"] for name, each in shown.items()} == {
-        p.name: f"{p.meaning} ({p.unit})" for p in (*PARAMETERS, *PASSIVE)
+        p.name: f"{p.meaning} ({p.unit})" for p in NAMED
     }
 
 
