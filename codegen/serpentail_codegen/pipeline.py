@@ -131,9 +131,9 @@ def _chain_of(scene: Scene) -> Tail:
 def needed(scene: Scene) -> list[str]:
     """Return the functions to derive: those asked for, and those that rollouts and solves call."""
     names = scene.functions
-    flight = ("forward_dynamics", "tracked_dynamics") if "pfl" in names else ("forward_dynamics",)
-    called = ("contact_points", "contact_rates") if scene.contacts else flight
-    called += ("air_force",) if scene.widths else ()
+    flight = ["forward_dynamics", *["tracked_dynamics"] * ("pfl" in names)]
+    called = ["contact_points", "contact_rates"] if scene.contacts else flight
+    called += ["air_force"] * bool(scene.widths)
     parts = {"rollout": called, "implicit": ("implicit_factor", "implicit_solve")}
     wanted = {*names, *(part for name in names for part in parts.get(name, ()))}
     return [name for name in CATALOGUE if name in wanted]

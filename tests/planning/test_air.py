@@ -19,9 +19,8 @@ TASK = {
 
 @pytest.fixture(scope="module")
 def model():
-    return st.build(
-        "righting_m1_n3", air_density=1.2, wind=(0.5, -0.3, 0.2), torso_drag=(5e-4, 3e-4, 6e-4)
-    )
+    drag = {"torso_drag": (5e-4, 3e-4, 6e-4), "wind": (0.5, -0.3, 0.2)}
+    return st.build("righting_m1_n3", air_density=1.2, **drag)
 
 
 @pytest.fixture(scope="module", params=["fatrop", "ipopt"])

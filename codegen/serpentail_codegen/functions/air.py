@@ -23,7 +23,7 @@ MASSES = ("_mass", "_masses", "_inertia", "_inertias")  # how the names of param
 
 def airspeed(draft: Draft, state: State, R: Ref | None) -> Ref | None:
     """Return the velocity of B against the air in torso axes; None without air."""
-    if not draft.tail.widths:
+    if not draft.tail.widths or R is None:
         return None
     reads = {"R": R, "p_dot": state.velocity}
     return draft.store(air.relative_velocity, reads, u=3)["u"]

@@ -50,7 +50,7 @@ def assemble_pfl(draft: Draft, arrays: dict[str, Array]) -> None:
     with draft.loop("k", tail.nt) as k:
         column = {"column": column_of(columns, k)}
         draft.step(translation.coupling_torque, motion, column, torque_=tau.part(k, 1))
-    if "v_dot" in arrays:
+    if R and "v_dot" in arrays:
         reads = {"R": R, "a": motion["a"]}
         draft.step(rotations.world_acceleration, reads, p_ddot=block(v_dot, VELOCITY))
         draft.copy(block(v_dot, OMEGA), motion["w_dot"])

@@ -11,7 +11,7 @@ from ...ir.program import Array, Index, Ref
 from ...ir.step import Step, specialised
 from ...mechanics.lower import derived
 from ..draft import Draft
-from ..scope import Instead, Motion, State, Vectors
+from ..scope import Instead, State, Vectors
 
 StepFunction = Callable[..., dict]  # a function of mechanics, from which a step is derived
 Place = tuple[Index, Index]  # a segment, and a piece
@@ -100,7 +100,7 @@ class Mechanism:
     describe: Callable[[Draft, Vectors], None]
     prepare_samples: Callable[[Draft, State, Segments | None], Segments]
     declare_torques: Callable[[Draft], Array | None]
-    move: Callable[[Draft, Segments, Place, Motion, Array | None, Vectors, Ref | None], None]
+    move: Callable[..., None]
     drag_power: Callable[[Draft, Segments, Place, Ref, Vectors, Ref], None]
     momentum: Callable[[Draft, Segments, Place, Vectors, Mapping[str, Ref]], None]
     pose: StepFunction | Step

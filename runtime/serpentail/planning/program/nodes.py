@@ -48,9 +48,9 @@ class NodeSymbols:
         import casadi as ca
 
         own = ("design", "momentum", "com", "com_velocity", "softening", "numbers", "torque_rate")
-        own += tuple(name for name, _ in DRIFT)
         start = ca.vertcat(self.blocks["com"], self.blocks["com_velocity"])
-        seen = {name: part for name, part in self.blocks.items() if name not in own}
+        hidden = {*own, *dict(DRIFT)}
+        seen = {name: part for name, part in self.blocks.items() if name not in hidden}
         return point_of(self.body, seen, start, problem.legs)
 
 
