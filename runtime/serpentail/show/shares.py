@@ -16,7 +16,8 @@ from ..basics.checks import needed
 from ..basics.errors import UnusualSize
 from ..basics.near_names import NearNames
 from ..model.model import Model
-from ..model.parameters import independent, total_mass
+from ..model.parameters import independent
+from ..model.weight import total_mass
 from ..motion.text import as_text
 from ..motion.trajectory import Trajectory
 
