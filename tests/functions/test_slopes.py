@@ -61,16 +61,6 @@ def test_flights_and_their_books_are_those_of_a_turned_world():
         assert ours[name] == pytest.approx(theirs[name], rel=1e-8)
 
 
-def test_the_ground_carries_and_slides():
-    """Ice pushes uphill by Coulomb's share, rubber by more; books balance on both."""
-    for mu, least, most in ((1.0, 0.15, 0.5), (0.1, 0.09, 0.1)):
-        model = zoo.model("slope").with_parameters(mu=mu)
-        motion = st.simulate(model, model.state(height=0.03), 0.1, controller=st.Damping(1e-4))
-        impulse = np.sum([*motion.info["impulse_N_s"].values()], axis=0)
-        assert impulse[2] > 0 and motion.info["imbalance"]["relative"] < 1e-4
-        assert least * impulse[2] < -impulse[0] < most * impulse[2]
-
-
 def test_plans_fall_along_it():
     """Points of a plan are where its true flight is: the centre of mass on a tilted parabola."""
     model, times = zoo.model("slope"), np.linspace(0, 0.4, 7)

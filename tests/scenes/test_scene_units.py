@@ -157,7 +157,7 @@ def test_all_that_is_wrong_with_a_plan_is_told_at_once():
 
 def test_the_keys_of_a_plan_are_what_plan_takes():
     arguments = {"start", "goal", "duration", "bounds", "design", "free_start", *PROBLEM_SETTINGS}
-    arguments |= PLACES.keys()
+    arguments |= PLACES.keys() | {"design_totals"}
     assert set(PLAN.keys) == arguments - set(CODE_ONLY)
     assert set(GOAL) == {entry.name for entry in fields(st.Goal)}
     assert set(BOUNDS) == {entry.name for entry in fields(st.Bounds)}
