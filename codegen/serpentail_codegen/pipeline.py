@@ -134,6 +134,12 @@ def needed(scene: Scene) -> list[str]:
     flight = ["forward_dynamics", *["tracked_dynamics"] * ("pfl" in names)]
     called = ["contact_points", "contact_rates"] if scene.contacts else flight
     called += ["air_force"] * bool(scene.widths)
-    parts = {"rollout": called, "implicit": ("implicit_factor", "implicit_solve")}
+    margins = ["margins", "margins_vjp"] * bool(scene.contacts)
+    transposed = ["implicit_solve_transposed"] * ("implicit" in names)
+    parts = {
+        "rollout": called,
+        "implicit": ["implicit_factor", "implicit_solve"],
+        "gradients": ["rates_vjp", *margins, *transposed],
+    }
     wanted = {*names, *(part for name in names for part in parts.get(name, ()))}
     return [name for name in CATALOGUE if name in wanted]

@@ -36,12 +36,13 @@ ADDED = "+"  # before a name in `functions`: besides those of the purposes
 def functions_of(tables: Mapping[str, Any]) -> Any:
     """Return the names of a scene's functions; what is wrong stays as it is, for the checks.
 
-    "all" means all that the scene can have, names without "+" exactly these; keys ``purpose`` and
+    "all" means all that the scene can have but gradients, which are added to a model that is asked
+    for them; names without "+" exactly these; keys ``purpose`` and
     names with "+" add to what the scene's tables need.
     """
     chosen = tables.get("functions", ())
     if chosen == "all":
-        return possible(tables, ALL, polar=False)
+        return possible(tables, {*ALL} - {"gradients"}, polar=False)
     if not isinstance(chosen, list | tuple) or ("functions" in tables and not chosen):
         return chosen
     added = [name[1:] for name in chosen if isinstance(name, str) and name.startswith(ADDED)]
@@ -71,7 +72,7 @@ def possible(tables: Mapping[str, Any], names: Collection[str], polar: bool = Tr
     without = {name for name, group in NEEDS.items() if group not in present}
     without -= {name for name, group in NEEDS.items() if group == "contacts" and contacts}
     if polar and tables.get("coordinates") == "polar":
-        without |= {*DERIVATIVES, *AIRBORNE}
+        without |= {*DERIVATIVES, *AIRBORNE, "gradients"}
     if tables.get("base") == "fixed":
         without |= {*ALL} - {*FIXED}
     if tables.get("chain"):

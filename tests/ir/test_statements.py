@@ -28,6 +28,7 @@ from tests.support.rows import row
 
 ROW = 8  # numbers that store a row of a small matrix
 DIFFERENTIATED = {ir.Apply, ir.Copy, ir.Fill, ir.Guard, ir.Loop}
+REVERSED = {ir.Solve, ir.SolvePair}  # also, but not carried along
 TREES = {ir.Loop, ir.When, ir.Call}  # asked of what is in them
 MATRICES = {ir.Factor, ir.Solve, ir.FactorPair, ir.SolvePair}
 
@@ -131,10 +132,10 @@ def test_each_is_differentiated_or_refused_by_its_name():
         program = example(kind)
         for derive, more in ((tangent_program, ()), (adjoint_program, (("x",),))):
             with row(kind):
-                if kind in DIFFERENTIATED:
+                if kind in DIFFERENTIATED or (kind in REVERSED and derive is adjoint_program):
                     assert derive(program, ("a",), *more).body
                 else:
-                    with pytest.raises(TypeError, match=f"^no rule .*{kind.__name__}"):
+                    with pytest.raises((TypeError, ValueError), match=f"{kind.__name__}|is overwr"):
                         derive(program, ("a",), *more)
 
 

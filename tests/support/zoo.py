@@ -24,6 +24,8 @@ GROUND = {"contacts": ["feet", "tail", "torso"]}
 FLYING = [*(name for name in VALUES if name != "air_force"), "rollout"]
 FEW = ["mass_matrix", "forward_dynamics", "energy", "contact_dynamics"]
 FEW += ["pfl", "rollout", "implicit"]
+TAPED = ["forward_dynamics", "energy", "momentum", "contact_points", "contact_dynamics"]
+TAPED += ["rollout", "implicit", "gradients"]
 # what differs from coordinate to coordinate shows an exchange of two of them
 ELASTIC = {
     "tail_stiffness": [0.004, 0.006, 0.005, 0.003],
@@ -227,6 +229,9 @@ ZOO: dict[str, dict[str, Any]] = {
     "small": _links(1, 1, real="float", profile="reproducible", emission="loops", functions=FEW)
     | GROUND,
     # it lacks all that a test wants to miss
+    # whose runs have gradients, which other models get when they are asked for them
+    "taped": _links(1, 3, contacts=["feet"], functions=TAPED),
+    "taped_m2_n2": _links(2, 2, functions=TAPED, **GROUND, parameters={"tail_damping": 1e-3}),
     "bare": _links(1, 1, functions=["forward_dynamics"]),
 }
 

@@ -146,6 +146,37 @@ class _Reversal:
             return [forward], []
         return [forward], [replace(loop, body=tuple(back), downward=not loop.downward)]
 
+    def when(self, when: ir.When, loops: Loops) -> BothWays:
+        """Return what a condition holds, and the reverse of that under the same condition."""
+        if when.scalar.array.name in self.overwritten:
+            raise ValueError(f"the condition {when.scalar.array.name} is overwritten: keep a copy")
+        there, back = self.body(when.body, loops)
+        backward: list[ir.Statement] = [replace(when, body=tuple(back))] if back else []
+        return [replace(when, body=tuple(there))], backward
+
+    def solve_pair(self, solve: ir.SolvePair, loops: Loops) -> BothWays:
+        """Return a solve, and that with the transpose of a matrix that has no adjoints: its two
+        triangles change places.
+        """
+        if self.matters(solve.matrix[0]):
+            raise ValueError(f"{solve.matrix.name}: a factored matrix has no adjoints")
+        half = solve.x.size * ir.padded(solve.x.size)
+        turned = ir.Array(f"turned_{solve.matrix.name}", "local", 2 * half)
+        self.kept.append(turned)
+        swapped = [
+            ir.Copy(turned.part(half - first, half), solve.matrix.part(first, half))
+            for first in (0, half)
+        ]
+        return [solve], [*swapped, ir.SolvePair(turned, self.of(solve.x))]
+
+    def solve(self, solve: ir.Solve, loops: Loops) -> BothWays:
+        """Return a solve and its reverse: the same with the adjoints, the matrix being symmetric
+        and without adjoints.
+        """
+        if self.matters(solve.matrix[0]):
+            raise ValueError(f"{solve.matrix.name}: a factored matrix has no adjoints")
+        return [solve], [ir.Solve(solve.matrix, self.of(solve.x))]
+
     def guard(self, guard: ir.Guard, loops: Loops) -> BothWays:
         """Return a guard, which has no reverse."""
         return [guard], []

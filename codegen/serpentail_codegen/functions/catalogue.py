@@ -6,7 +6,7 @@ from serpentail_scene.signatures.table import SIGNATURES
 
 from . import air, contact, pfl
 from .airborne import curvature as airborne
-from .derivatives import by_parameters, hessian, jacobians
+from .derivatives import by_parameters, hessian, jacobians, rates
 from .derivatives.differentiated import FUNCTIONS
 from .function import Function, signed
 from .implicit import factor, solve
@@ -21,6 +21,7 @@ _FOUND = FUNCTIONS | signed(
     | pfl.ASSEMBLIES
     | {"implicit_factor": factor.assemble_factor, "implicit_solve": solve.assemble_solve}
     | airborne.ASSEMBLIES
+    | rates.ASSEMBLIES
 )
 # A signature without outputs stands for other functions and has no assembly of its own.
 CATALOGUE = {name: _FOUND[name] for name, s in SIGNATURES.items() if s.outputs}

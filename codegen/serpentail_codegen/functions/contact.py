@@ -142,15 +142,18 @@ def assemble_leg_points(draft: Draft, arrays: dict[str, Array]) -> None:
 
 
 def press(draft: Draft, torso: Torso, points: Points, arrays: dict[str, Array]) -> None:
-    """Forces and bristle rates of all points."""
+    """Forces and bristle rates of all points, on given ``branches`` if they are arguments."""
     properties = draft.store(contact.bristle_properties, drag=1, mobility=1)
-    law = derive(contact.contact_force, friction=draft.tail.friction)
+    sided = "branches" in arrays
+    law = derive(contact.contact_force, friction=draft.tail.friction, sided=sided)
     with draft.loop("k", draft.tail.points) as k:
         bristle = {"bristle": arrays["bristles"].part(2 * k, 2)}
         writes = {
             "force": arrays["forces"].part(3 * k, 3),
             "rate": arrays["bristle_rates"].part(2 * k, 2),
         }
+        if sided:
+            bristle["side"] = arrays["branches"].part(2 * k, 2)
         draft.step(law, torso, properties, points.motion(k), bristle, **writes)
 
 

@@ -187,6 +187,18 @@ class Tail(Sizes):
         return 8 if "feet" in self.contacts else 0
 
     @property
+    def rates(self) -> int:
+        """Number of v_dot and the rates of the bristles."""
+        return self.nv + self.bristles
+
+    @property
+    def causes(self) -> int:
+        """Number of all that rates depend on: q in its tangent space, v, tau, bristles, legs,
+        parameters.
+        """
+        return 2 * self.nv + self.nt + self.bristles + self.leg_numbers + self.parameter_numbers
+
+    @property
     def airborne_state(self) -> int:
         """Length of an airborne state: a quaternion, the tail coordinates, their rates; in air also
         the velocity of B against it, and omega.

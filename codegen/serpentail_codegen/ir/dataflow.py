@@ -94,7 +94,7 @@ def read_names(body: ir.Body) -> set[str]:
 def rewritten(body: ir.Body, rewrite: Callable[[ir.Statement], Iterable[ir.Statement]]) -> ir.Body:
     """Return a loop nest with each statement replaced by those that ``rewrite`` returns.
 
-    A condition is rewritten without its body; loops that are empty then vanish.
+    A condition is rewritten without its body; loops and conditions that are empty then vanish.
     """
     out: list[ir.Statement] = []
     for statement in body:
@@ -104,7 +104,7 @@ def rewritten(body: ir.Body, rewrite: Callable[[ir.Statement], Iterable[ir.State
                 out.append(replace(statement, body=inner))
         elif isinstance(statement, ir.When):
             inner = rewritten(statement.body, rewrite)
-            for head in rewrite(replace(statement, body=())):
+            for head in rewrite(replace(statement, body=())) if inner else ():
                 assert isinstance(head, ir.When), "a condition is rewritten as a condition"
                 out.append(replace(head, body=inner))
         else:
@@ -181,7 +181,9 @@ def pruned(program: ir.Program) -> ir.Program:
     needed = backward_slice(program.body, {a.name for a in program.of_role("output")})
 
     def rewrite(statement: ir.Statement) -> Iterator[ir.Statement]:
-        if isinstance(statement, ir.Guard):
+        if isinstance(statement, ir.When):
+            yield with_arrays(statement, array)
+        elif isinstance(statement, ir.Guard):
             protects = tuple(ref for ref in statement.protects if ref.array.name in needed)
             if protects:
                 yield with_arrays(replace(statement, protects=protects), array)

@@ -4,6 +4,8 @@ Points are given by ``arm``, from B in world axes, and ``velocity``, in the worl
 = 0.  A bristle is what the friction spring of a point is stretched by, in the world's x and y.
 """
 
+from functools import partial
+
 from sympy import Matrix, Piecewise, sqrt
 
 from .shapes import M33, V1, V2, V3, V6, V12
@@ -75,19 +77,21 @@ def guarded(let, value, positive):
     return let("safe", Piecewise((value, positive > 0), (1, True)))
 
 
-def normal_force(let, depth, rate, K_n, D_n):
+def normal_force(let, depth, rate, K_n, D_n, side=None):
     """max(K_n z^(3/2) + D_n K_n z^(1/2) z_dot, 0) (Eq. 36); the text's z^3/2 is z^(3/2)."""
     root = let("root", sqrt(guarded(let, depth, depth)))
     push = let("push", K_n[0] * root * (depth + D_n[0] * rate))
-    pressing = let("pressing", Piecewise((0, push < 0), (push, True)))  # a NaN stays one
+    none = push < 0 if side is None else side <= 0
+    pressing = let("pressing", Piecewise((0, none), (push, True)))  # a NaN stays one
     return let("f_n", Piecewise((pressing, depth > 0), (0, True)))
 
 
-def cone(let, trial, limit) -> Matrix:
+def cone(let, trial, limit, side=None) -> Matrix:
     """The trial force, shortened to the limit in any direction: Coulomb's law."""
     length = let("t_t", trial.dot(trial))
-    excess = let("excess", length - limit**2)
-    shorter = let("shorter", limit / let("length", sqrt(guarded(let, length, excess))))
+    excess = let("excess", length - limit**2) if side is None else side
+    present = excess if side is None else length  # where it slides, but the trial force is none
+    shorter = let("shorter", limit / let("length", sqrt(guarded(let, length, present))))
     return trial * let("scale", Piecewise((shorter, excess > 0), (1, True)))
 
 
@@ -131,18 +135,43 @@ def contact_force(
     arm: V3,
     velocity: V3,
     bristle: V2,
+    side: V2,
     friction: str = "cone",
+    sided: bool = False,
 ) -> dict:
     """Force of the ground on one point (Eqs. 35 to 37), world axes, and the rate of its bristle.
 
-    The friction spring restores toward the anchor and opposes slip: Eq. 37 lacks that sign.
+    The friction spring restores toward the anchor and opposes slip: Eq. 37 lacks that sign. sided:
+    ``side`` is positive where the point presses, and where it slides; then nothing has a kink.
     """
     depth, sliding = let("z", -(p[2] + arm[2])), velocity[0:2, :]
-    f_n = normal_force(let, depth, -velocity[2], K_n, D_n)
+    f_n = normal_force(let, depth, -velocity[2], K_n, D_n, side[0] if sided else None)
     trial = let("trial", -(K_f[0] * bristle + drag[0] * sliding))
-    force = let("f_t", FRICTION[friction](let, trial, let("limit", mu[0] * f_n)))
+    law = partial(cone, side=side[1]) if sided and friction == "cone" else FRICTION[friction]
+    force = let("f_t", law(let, trial, let("limit", mu[0] * f_n)))
     rate = bristle_rate(let, K_f, mobility, bristle, sliding, friction, depth, force)
     return {"force": Matrix([force, Matrix([f_n])]), "rate": rate}
+
+
+def point_margins(
+    let,
+    K_n: V1,
+    D_n: V1,
+    K_f: V1,
+    mu: V1,
+    drag: V1,
+    p: V3,
+    arm: V3,
+    velocity: V3,
+    bristle: V2,
+) -> dict:
+    """What changes sign where the force of a point has a kink: its height, where it touches; z +
+    D_n z_dot, where it ceases to press in the ground; |t|^2 - (mu f_n)^2, where it begins to slide.
+    """
+    depth = let("z", -(p[2] + arm[2]))
+    trial = let("trial", K_f[0] * bristle + drag[0] * velocity[0:2, :])
+    limit = let("limit", mu[0] * normal_force(let, depth, -velocity[2], K_n, D_n))
+    return {"margin": [-depth, depth - D_n[0] * velocity[2], trial.dot(trial) - limit**2]}
 
 
 def load_about_torso(let, arm: V3, force: V3) -> dict:
@@ -154,3 +183,13 @@ def load_in_torso(let, R: M33, load: V6) -> dict:
     """Force and moment at B in torso axes."""
     R = R.T
     return {"load_force": R * load[0:3, :], "load_moment": R * load[3:6, :]}
+
+
+def load_power(let, load_force: V3, load_moment: V3, u_virtual: V3, w_virtual: V3) -> dict:
+    """Minus the power of a load at B, all in torso axes."""
+    return {"power": [-load_force.dot(u_virtual) - load_moment.dot(w_virtual)]}
+
+
+def taken_power(let, torque: V2, rate: V2) -> dict:
+    """Minus the power of two torques, or of the rates of a bristle with their weights."""
+    return {"power": [-torque.dot(rate)]}

@@ -31,6 +31,11 @@ def world_vector(let, R: M33, vector: V3) -> dict:
     return {"vector": R * vector}
 
 
+def upward_part(let, R: M33, vector: V3) -> dict:
+    """World z of a vector in torso axes."""
+    return {"part": [R.row(2).dot(vector)]}
+
+
 def world_composite(let, R: M33, h: V3, I: V6) -> dict:
     """First moment and inertia turned from torso axes to world axes (Eq. A14)."""
     half = let("half", R * symmetric(I))

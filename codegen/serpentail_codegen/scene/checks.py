@@ -109,7 +109,7 @@ def polar_problems(
         return []
     problems, parameters = [], parameters_in(table)
     listed = wanted if isinstance(wanted, list | tuple) else ()
-    derivatives = [name for name in listed if name in (*DERIVATIVES, *AIRBORNE)]
+    derivatives = [name for name in listed if name in (*DERIVATIVES, *AIRBORNE, "gradients")]
     if derivatives and "polar" in ONLY[kind].coordinates:
         remedy = f'has no derivatives, such as {derivatives[0]}: use "bend", which has'
         problems.append(Problem("coordinates", "polar", remedy))

@@ -4,7 +4,7 @@ The rules for scenes, the catalogue of assemblies, the manifest, the runtime's l
 documentation of functions follow from this table. Its order is that of the emitted code.
 """
 
-from . import airborne, derivatives, simulation, values
+from . import airborne, derivatives, gradients, simulation, values
 from .signature import DERIVATIVE, PLANNING, VALUE
 
 SIGNATURES = {
@@ -14,6 +14,7 @@ SIGNATURES = {
         *derivatives.SIGNATURES,
         *simulation.SIGNATURES,
         *airborne.SIGNATURES,
+        *gradients.SIGNATURES,
     )
 }
 

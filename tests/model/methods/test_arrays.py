@@ -10,19 +10,19 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import serpentail as st
-from serpentail_scene.signatures.table import ALL, NEEDS
+from serpentail_scene.signatures.table import ALL, NEEDS, SIGNATURES
 from tests.support import zoo
 from tests.support.forms import SOUND, Foreign
 
 from ...support.rows import row
 from .conftest import ARGUMENTS, CALLS, SIZES, assert_same, call, shapes, state, states
 
-ELSEWHERE = {"rollout", "implicit", *NEEDS}  # tested in files of their own
+ELSEWHERE = {"rollout", "implicit", "gradients", *NEEDS}  # tested in files of their own
 ONE = "forward_dynamics_external"  # on which every form and every wrong value is tried
 
 
 def test_every_function_is_called_here(model):
-    assert {*CALLS, *ELSEWHERE} == {*ALL, "contact_rates"}  # which no scene names
+    assert {*CALLS, *ELSEWHERE} == {*ALL, *(name for name in NEEDS if SIGNATURES[name].called)}
     assert repr(model) == "<serpentail.Model m2_n2: 2 x 2 links, nv = 10>"
 
 

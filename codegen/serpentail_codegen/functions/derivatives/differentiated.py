@@ -18,6 +18,7 @@ from ..scope import Motion, State, Vectors
 from ..sweeps.chains import prepared
 from ..sweeps.momentum import gather_moment
 from ..sweeps.wrenches import inertial_forces, virtual_power
+from ..tails.mechanism import Segments
 
 POWER = Argument("power", (1,), "lambda^T (H v_dot + C)")
 A = Argument("a", (3,), "R^T (p_b_ddot + g z), which stands for v_dot[0:3]")
@@ -51,8 +52,10 @@ def assemble_first_moment(draft: Draft, arrays: dict[str, Array]) -> None:
     draft.copy(arrays["moment"][0], moment["h"])
 
 
-def assemble_virtual_power(draft: Draft, arrays: dict[str, Array]) -> None:
-    """lambda^T (H v_dot + C) in torso axes, as one sum over the links from the torso to the tip."""
+def assemble_virtual_power(draft: Draft, arrays: dict[str, Array]) -> list[Segments]:
+    """lambda^T (H v_dot + C) in torso axes, as one sum over the links from the torso to the tip;
+    returns the segments of each chain.
+    """
     v_dot, multiplier = arrays["v_dot"], arrays["multiplier"]
     state = draft.state(arrays["q"], arrays["v"])
     segments = prepared(draft, state)
@@ -64,6 +67,7 @@ def assemble_virtual_power(draft: Draft, arrays: dict[str, Array]) -> None:
         motion["u"] = u
     virtual_power(draft, segments, Vectors(motion | virtual), multiplier, v_dot, arrays["power"][0])
     add_passive_power(draft, state, multiplier, v_dot, arrays["power"][0])
+    return segments
 
 
 def assemble_world_power(draft: Draft, arrays: dict[str, Array]) -> None:
