@@ -13,6 +13,8 @@ _HOME = {
     **dict.fromkeys(["progress", "Progress"], "basics.progress"),
     "simulate": "simulation.simulate",
     "Rollouts": "simulation.rollouts",
+    "gradient": "simulation.gradients.loss",
+    "Gradient": "simulation.gradients.gradient",
     "settle": "simulation.settle",
     "scenario": "scenes.simulate",
     "Scenario": "scenes.scenario",

@@ -9,6 +9,8 @@ from .basics.progress import progress as progress
 from .basics.progress import Progress as Progress
 from .simulation.simulate import simulate as simulate
 from .simulation.rollouts import Rollouts as Rollouts
+from .simulation.gradients.loss import gradient as gradient
+from .simulation.gradients.gradient import Gradient as Gradient
 from .simulation.settle import settle as settle
 from .scenes.simulate import scenario as scenario
 from .scenes.scenario import Scenario as Scenario

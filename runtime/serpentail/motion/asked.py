@@ -94,6 +94,48 @@ class Asked:
             raise ValueError("mount_wrench: this motion has no model: use model.mount_wrench")
         return mount_wrenches(self.model, self)
 
+    def vjp(
+        self,
+        q: ArrayLike | None = None,
+        v: ArrayLike | None = None,
+        bristles: ArrayLike | None = None,
+    ) -> Any:
+        """Return the gradient of a weighted sum of the end of a run by all that it was made of.
+
+        Parameters
+        ----------
+        q, v : array_like, shape (nv,), optional
+            Weights of the last q, in its tangent space, and of the last v; default zeros.
+        bristles : array_like, shape (K, 2), optional
+            Weights of the friction springs at the end; default zeros.
+
+        Returns
+        -------
+        Gradient
+            By start, parameters, damping, torques and legs. ``exists`` and ``doubts`` tell if it
+            is a derivative.
+
+        Raises
+        ------
+        SimulationError
+            An argument is wrong; the run has no derivatives, because of its method (only "tsit5",
+            "ros34pw2" and "switching" have), its controller (only Damping, TorqueTable and
+            TorqueCurve have), an event at which it stopped, or its model.
+        ValueError
+            The motion is not from ``simulate`` with one start.
+
+        Notes
+        -----
+        The first call makes the run again with a tape, at a 20th of its tolerance. Steps are
+        differentiated with J of implicit methods held, on a grid that moves with every touch and
+        with every other kink of the forces. A model that lacks the C for this gets it: that takes
+        as long as compiling the model.
+        """
+        again: Any = vars(self).get(AGAIN)
+        if not hasattr(again, "vjp"):
+            raise ValueError("vjp: only motions of simulate, from one start, have derivatives")
+        return again.vjp(q, v, bristles)
+
     def summary(self, errors: bool = False) -> "Summary":
         """Return the numbers of the motion by name, such as apex, landing, forces and work.
 

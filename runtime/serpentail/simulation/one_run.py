@@ -2,16 +2,20 @@
 
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from ..basics.errors import SimulationError
 from ..basics.progress import Stage
+from ..model.lazy import lazy_property
 from ..motion.trajectory import Trajectory
 from .callback import Watch, Watched
 from .controllers.actuation import RunActuations
 from .controllers.controller import Controller
 from .energies import trajectory_or_error
+from .gradients.gradient import Gradient, refuse, vjp
+from .gradients.tape import Tape
 from .ground import GroundSettings
 from .methods import SCIPY, IntegrationMethod
 from .records import Records
@@ -85,6 +89,16 @@ class RunAgain:
             raise samples.failure
         rows = np.minimum(np.searchsorted(samples.t, wanted), len(samples.t) - 1)
         return samples.q[rows], samples.v[rows]
+
+    @lazy_property
+    def tape(self) -> Tape:
+        """The run made again with a tape, along which derivatives are taken."""
+        refuse(self)
+        return Tape(self)
+
+    def vjp(self, *parts: Any) -> Gradient:
+        """Return a gradient; see ``Trajectory.vjp``."""
+        return vjp(self, parts)
 
     def runs(self, start: Start, ground: GroundSettings, method: IntegrationMethod) -> RunSet:
         """Return a run to make, with the same controller."""

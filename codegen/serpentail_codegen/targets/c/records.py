@@ -8,35 +8,12 @@ manifest.
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
-from textwrap import dedent
 
+from .fields import Field, fields
 from .simulation_features import SimulationFeatures
+from .tape import tape_fields
 
 TYPES = r"\b(real|piecewise|controller|drive|parameters|torque)\b"  # that get the model's prefix
-
-
-@dataclass(frozen=True)
-class Field:
-    """One member of a C record: its name, type and meaning."""
-
-    name: str
-    type: str
-    meaning: str
-
-    @property
-    def kind(self) -> str:
-        """Return what a caller in another language stores in it."""
-        return "pointer" if "*" in self.type or self.type == "torque" else self.type
-
-
-def fields(table: str) -> list[Field]:
-    """Return the members of a record, a line each, such as ``real *q: configuration``.
-
-    A line goes on in lines that are indented more.
-    """
-    rows = re.findall(r"^(\S.*?)(\w+): (.*(?:\n .*)*)", dedent(table), re.MULTILINE)
-    return [Field(name, kind.strip(), " ".join(text.split())) for kind, name, text in rows]
 
 
 def records(has: SimulationFeatures) -> dict[str, list[Field]]:
@@ -52,6 +29,7 @@ def records(has: SimulationFeatures) -> dict[str, list[Field]]:
         + KEPT
         + (CONTACT_KEPT if has.contacts else [])
         + (LANDED if has.legs else []),
+        **({"tape": tape_fields(has)} if has.gradients else {}),
     }
 
 
@@ -64,6 +42,10 @@ DESCRIPTIONS = {
     "run": (
         "A run.  The caller sets all members up to `work`, with contacts up to `event_kinds`, and "
         "the others to zero."
+    ),
+    "tape": (
+        "The states of a run at the ends of all steps, and derivatives along it.  The caller sets "
+        "sizes and arrays, and sums to zero."
     ),
 }
 

@@ -75,6 +75,7 @@ def simulation_context(
     size = tail.nq + tail.nv + 2 * has.contacts + ledger
     slots = SLOTS[has.contacts > 0]
     states = slots * size + tail.nt + table + (12 + 2 * LOOKS) * has.contacts + 4
+    inner, backward = max(works.values()), (9 * size + tail.causes) * has.gradients
     resolution, level, felt = RESOLUTION[scene.real]
     return {
         **{name: name + ("f" if single else "") for name in ("pow", "fabs", "ceil")},
@@ -112,7 +113,9 @@ def simulation_context(
         "macros": MACROS,
         "slots": slots,
         "table": table,
-        "rollout_work": states + has.factors + max(works.values()),
+        "inner": inner,
+        "most_explicit": 0.6,
+        "rollout_work": states + has.factors + inner + backward,
         "descriptions": DESCRIPTIONS,
         "records": record_views(scene.name, has),
         "tsit5": TSIT5,

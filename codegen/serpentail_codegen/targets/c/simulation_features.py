@@ -26,6 +26,7 @@ class SimulationFeatures:
     groups: tuple[tuple[str, int], ...]  # of these points: name and count
     legs: bool
     air: bool
+    gradients: bool  # derivatives of whole runs
 
     @property
     def ledger(self) -> tuple[tuple[str, int], ...]:
@@ -75,5 +76,5 @@ def simulation_features(tail: Tail, names: Collection[str], factors: int) -> Sim
     factors.
     """
     groups, legs = tuple(tail.groups.items()), "feet" in tail.contacts
-    air = tail.widths > 0
-    return SimulationFeatures("pfl" in names, factors, tail.points, groups, legs, air)
+    air, gradients = tail.widths > 0, "rates_vjp" in names
+    return SimulationFeatures("pfl" in names, factors, tail.points, groups, legs, air, gradients)

@@ -1,0 +1,241 @@
+"""The gradient of a number that depends on the end of a run, by all that the run was made of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from serpentail_scene.layout import OMEGA, POSITION, QUATERNION
+
+from ...basics.checks import one_of, refusal
+from ...basics.errors import SimulationError
+from ...basics.short_repr import brief
+from ...model.model import Model
+from ...model.parameters import flat
+from ..controllers.controller import parts_of
+from ..controllers.schedules import Legs
+from .curves import CurveGradient, curve_gradient
+from .nodes import BREAK, LANDING
+from .tape import Swept, Tape
+
+if TYPE_CHECKING:
+    from ..one_run import RunAgain
+
+METHODS = ("tsit5", "ros34pw2", "switching")
+USELESS = 1e6  # condition beyond which a gradient says nothing of a change that one could make
+STEP = 1e-5  # relative, of central differences of tables and parameters
+
+
+@dataclass(frozen=True, eq=False)
+class Gradient:
+    """Gradient of a number that depends on the end of a run.
+
+    Attributes
+    ----------
+    q0, v0 : ndarray, shape (nv,)
+        Gradient by the start: by q0 in its tangent space (per m, rad), and by v0.
+    bristles0 : ndarray, shape (K, 2)
+        Gradient by the friction springs at the start (per m).
+    parameters : ndarray, shape (n,)
+        Gradient by the numbers of ``model.parameter_vector``, each with the others held.
+    damping : ndarray, shape (2m,)
+        Gradient by the damping of the controller (per N m s).
+    torques, legs, landing : CurveGradient or None
+        Gradient by the controller's table of torques, by that of the legs, and by that from their
+        landing on.
+    exists : bool
+        Whether there is a derivative: where a point grazes the ground, there is none.
+    doubts : tuple of str
+        What is wrong or inexact, with times and points.
+    condition : float
+        Largest gradient by q and v along the run, over that at its end. A gradient through many
+        tumbles is exact and useless: beyond 1e6, ``doubts`` says so.
+    """
+
+    model: Model
+    q0: np.ndarray
+    v0: np.ndarray
+    bristles0: np.ndarray
+    parameters: np.ndarray
+    damping: np.ndarray
+    torques: CurveGradient | None
+    legs: CurveGradient | None
+    landing: CurveGradient | None
+    exists: bool
+    doubts: tuple[str, ...]
+    condition: float
+    __repr__ = brief
+
+    def by(self, what: str | Callable[[np.ndarray], Any], x: ArrayLike | None = None) -> np.ndarray:
+        """Return the gradient by a parameter, or by numbers that legs or a controller are made of.
+
+        Parameters
+        ----------
+        what : str or callable
+            Name of a parameter, which changes as by ``Model.with_parameters``; or the function
+            that makes the run's legs or controller of numbers.
+        x : array_like, shape (n,), optional
+            The numbers of the run; only for a function.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            The gradient; of a parameter with one number, shape (1,).
+
+        Raises
+        ------
+        SimulationError
+            An argument is wrong, or tables of other sizes are made of other numbers.
+
+        Examples
+        --------
+        >>> gradient.by("mu")  # doctest: +SKIP
+        >>> gradient.by(lambda x: st.Legs.fixed(*x), [4.0, -0.35])  # doctest: +SKIP
+        """
+        if isinstance(what, str):
+            return self.parameters @ directions(self.model, what)
+        if not callable(what) or x is None:
+            raise refusal("by", what, "a parameter's name, or a function and x", SimulationError)
+        at = np.atleast_1d(np.asarray(x, float))
+        steps = STEP * np.maximum(np.abs(at), STEP)
+        pairs = ([what(at + sign * row) for sign in (1, -1)] for row in np.diag(steps))
+        ends = zip(pairs, steps, strict=True)
+        return np.array([self._along(*pair) / (2 * step) for pair, step in ends])
+
+    def _along(self, late: Any, early: Any) -> float:
+        """Return the change from one pair of legs, or one controller, to another."""
+        if isinstance(late, Legs):
+            legs = self._change(self.legs, late.curve, early.curve)
+            return legs + self._change(self.landing, late.landing, early.landing)
+        nt = len(self.damping)
+        parts, others = parts_of(late, nt), parts_of(early, nt)
+        none = np.zeros(nt)
+        damping = [none if p.damping is None else p.damping for p in (parts, others)]
+        change = self.damping @ (damping[0] - damping[1])
+        return float(change + self._change(self.torques, parts.torques, others.torques))
+
+    @staticmethod
+    def _change(gradient: CurveGradient | None, late: Any, early: Any) -> float:
+        if late is None or gradient is None:
+            return 0.0
+        if late.coefficients.shape != gradient.coefficients.shape:
+            raise SimulationError("by: the function makes a table that the run did not have")
+        return gradient.along(late, early)
+
+
+def directions(model: Model, name: str) -> np.ndarray:
+    """Return how the numbers of the parameter struct (n,) change with those of a parameter (k,)."""
+    one_of("parameter", name, [*model.parameters], SimulationError)
+    value = np.atleast_1d(np.asarray(model.parameters[name], float))
+    steps = STEP * np.where(value == 0, 1.0, np.abs(value))
+    columns = []
+    for row, step in zip(np.diag(steps), steps, strict=True):
+        ends = []
+        for sign in (1, -1):
+            moved = (value + sign * row).tolist()
+            varied = model._varied({name: moved if len(moved) > 1 else moved[0]})
+            ends.append(np.array(flat(model.manifest, varied.parameters)))
+        columns.append((ends[0] - ends[1]) / (2 * step))
+    return np.array(columns).T
+
+
+def refuse(again: RunAgain) -> None:
+    """SimulationError about a run that has no derivatives."""
+    model, parts = again.start.model, parts_of(again.controller, again.start.model.layout.nt)
+    scene = model.manifest["scene"]
+    law = parts.pfl or parts.native or parts.user or parts.state
+    wrong = {
+        f"method {again.method.name!r}": again.method.name not in METHODS,
+        "controller: what is no Damping, TorqueTable or TorqueCurve": law is not None,
+        "stop_at: the end of a run at an event": again.ground.stop_at > 0,
+        'real = "float"': model.parameter_vector.dtype != np.float64,
+        "a fixed base": model.fixed,
+        "chains besides the tail": len(model.layout.chains) > 1,
+        "polar coordinates": scene["coordinates"] == "polar",
+    }
+    for what, is_wrong in wrong.items():
+        if is_wrong:
+            raise SimulationError(f"{what}: has no derivatives: see docs/simulation.md")
+
+
+def _numbers(name: str, value: ArrayLike | None, size: int) -> np.ndarray:
+    """Return a checked vector; zeros if it is left out."""
+    if value is None:
+        return np.zeros(size)
+    array = np.asarray(value, float)
+    if array.size != size or not np.isfinite(array).all():
+        raise refusal(name, value, f"{size} finite numbers", SimulationError)
+    return array.ravel()
+
+
+def vjp(again: RunAgain, parts: tuple[Any, Any, Any]) -> Gradient:
+    """Return the gradient of a weighted sum of the end of a run: weights of q, v and bristles."""
+    tape, model, points = again.tape, again.tape.model, again.ground.points
+    start, end = (tape.nodes["states"][k][QUATERNION] for k in (0, -1))
+    sizes = {"q": model.nv, "v": model.nv, "bristles": 2 * points}
+    dq, v, bristles = map(_numbers, sizes, parts, sizes.values())
+
+    # a turn moves the numbers of a quaternion by E turn / 2, and E^T E is 1
+    numbers = 2 * _turns(end) @ dq[OMEGA]
+    weights = np.concatenate([dq[POSITION], numbers, dq[OMEGA.stop :], v, bristles])
+    swept = tape.swept(weights)
+    dq, v, bristles = np.split(swept.state, np.cumsum([model.nq, model.nv]))
+    turn = _turns(start).T @ dq[QUATERNION] / 2
+
+    size, doubts = np.abs(weights[: -2 * points or None]).max(), tape.moves.grazes
+    condition = float(swept.largest / size) if size else 1.0
+    doubts += tape.moves.doubts
+    if condition > USELESS:
+        doubts += (f"condition {condition:.1g}: the motion is so sensitive that nothing follows",)
+    return Gradient(
+        model,
+        np.concatenate([dq[POSITION], turn, dq[QUATERNION.stop :]]),
+        v,
+        bristles.reshape(-1, 2),
+        swept.by_parameters,
+        **_by_tables(again, tape, swept),
+        exists=not tape.moves.grazes,
+        doubts=doubts,
+        condition=condition,
+    )
+
+
+def _turns(quaternion: np.ndarray) -> np.ndarray:
+    """Return E (4, 3): a unit quaternion moves by E turn / 2 when the torso turns in body axes."""
+    w, x, y, z = quaternion
+    return np.array([[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]])
+
+
+def _by_tables(again: RunAgain, tape: Tape, swept: Swept) -> dict[str, Any]:
+    """Return the gradients by damping, and by the tables of torques, legs and landing."""
+    nt, legs = tape.model.layout.nt, again.ground.legs
+    parts = np.split(swept.rows, np.cumsum([1, 1, nt, nt]), axis=1)
+    (t, until), (rates, by_tau, by_legs) = (part[:, 0] for part in parts[:2]), parts[2:]
+    found: dict[str, Any] = dict.fromkeys(("torques", "legs", "landing"))
+    curves = {"torques": parts_of(again.controller, nt).torques, "legs": legs and legs.curve}
+    if curves["torques"]:
+        found["torques"] = curve_gradient(curves["torques"], (t, until), by_tau, 0 * by_tau)
+    if legs:
+        late, begin = by_legs[:, 8] > 0, tape.landed_at
+        values, slopes = by_legs[:, :4], by_legs[:, 4:8]
+        for name, curve, chosen, since in (
+            ("legs", legs.curve, ~late, 0.0),
+            ("landing", legs.landing, late, begin),
+        ):
+            if curve:
+                at = t[chosen] - since, until[chosen] - since
+                found[name] = curve_gradient(curve, at, values[chosen], slopes[chosen])
+
+    # nodes at breaks move with these; of two tables that break at once, neither can move alone
+    for node in np.flatnonzero(tape.moves.kinds == BREAK):
+        here = {name: curve.times == tape.times[node] for name, curve in curves.items() if curve}
+        alone = sum(at.any() for at in here.values()) == 1
+        for name, at in here.items():
+            found[name].times[at] += swept.by_times[node] if alone else np.nan
+    if found["landing"]:
+        found["landing"].times[1] += swept.by_times[tape.moves.kinds == LANDING].sum()
+    return {"damping": -(rates * by_tau).sum(axis=0)} | found
