@@ -150,7 +150,9 @@ class Trajectory(Asked, Exports, Showable):
     @property
     def layout(self) -> Layout:
         """Where the parts of q, v and tau are."""
-        return self.model.layout if self.model else layout_of(self.q, self.v)
+        own: Layout | None = getattr(self.model, "layout", None)
+        found = layout_of(self.q, self.v)
+        return own if own is not None and (own.nq, own.nv) == (found.nq, found.nv) else found
 
     @property
     def pose(self) -> Array:
