@@ -1,6 +1,7 @@
 """A limb: hinge by hinge, each about an axis of its own, with a body or without."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache, partial
 
 from ...ir.program import Array, Ref
@@ -19,8 +20,11 @@ BARE = "bare"  # ends the kind of hinges without bodies
 def prepare_hinges(draft: Draft, state: State, doubled: bool = False) -> Segments:
     """Bodies and rotors, and the trigonometry of every hinge."""
     tail, bodies, fill = draft.tail, 0, BODIES[draft.tail.kind]
-    sizes = {"joint": 2, "rotor": 1, "body": 13} | ({"twice": 5} if doubled else {})
+    sizes = {"joint": 2, "body": 13} | ({"twice": 5} if doubled else {})
     arrays = {name: draft.array(name, size, tail.segments) for name, size in sizes.items()}
+    if tail.shape.rotors:  # the parameter, number by number
+        rotors = draft.parameters["rotors"].array
+        arrays["rotor"] = replace(rotors, size=1, count=tail.segments)
     segments = Segments(state, arrays)
     for stretch in tail.stretches:
         with draft.loop("i", stretch.stop, start=stretch.first) as i:
@@ -32,8 +36,6 @@ def prepare_hinges(draft: Draft, state: State, doubled: bool = False) -> Segment
             draft.step(hinge.hinge_trigonometry, own, joint=own["joint"])
             if doubled:
                 draft.step(hinge.hinge_double_angle, own, twice=own["twice"])
-            if tail.shape.rotors:
-                draft.copy(own["rotor"], draft.entry("rotors", i, 1))
         bodies += 0 if stretch.kind.endswith(BARE) else stretch.stop - stretch.first
     return segments
 
