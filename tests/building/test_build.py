@@ -202,9 +202,10 @@ def test_options_are_what_the_generator_knows():
 
 
 def test_a_robot_file_serves_with_fewer_contacts():
+    others = "contact_rates", "air_force"
     path = SCENES / "contact_m1_n3.toml"
     tables = tomllib.loads(path.read_text())
-    tables["functions"] = [name for name in (*NEEDS, "energy") if name != "contact_rates"]
+    tables["functions"] = [name for name in (*NEEDS, "energy") if name not in others]
     for contacts in ([], ["feet"], ["tail"], ["torso"], ["feet", "tail", "torso"]):
         with row(contacts):
             scene = parse_scene(with_contacts(tables, contacts), "robot")

@@ -30,6 +30,8 @@ SHIFTS = [
     *(("1/s", "1/s", 0), ("1/s2", "1/s^2", 0), ("deg", "deg", 0), ("rad", "rad", 0)),
     *(("rad/s", "rad/s", 0), ("kg cm2", "kg m^2", -4), ("N cm", "N m", -2)),
     *(("W", "W", 0), ("mW", "W", -3)),
+    *(("m2", "m^2", 0), ("cm2", "m^2", -4), ("mm2", "m^2", -6)),
+    *(("m5", "m^5", 0), ("cm5", "m^5", -10), ("mm5", "m^5", -15)),
     *(("N cm/rad", "N m/rad", -2), ("mNm", "N m", -3), ("Hz", "1/s", 0), ("kHz", "1/s", 3)),
 ]
 ODD = [  # a unit, that of the field, a number of them, and what they are

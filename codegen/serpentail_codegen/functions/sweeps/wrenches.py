@@ -29,11 +29,11 @@ def forward_wrenches(
     draft.copy(motion.w, start.w)
     draft.copy(motion.w_dot, start.w_dot)
     draft.step(torso.mount_acceleration, start, a_mount=motion.a)
-    u = against_air(draft, start) if start.u else None
+    flow = [against_air(draft, start)] if start.u else []
     across(draft, mount.motion_at_root, motion.vectors())
     wrenches = Wrenches(wrench, mechanism(draft).declare_torques(draft))
     for i, g in each_piece(draft):
-        mechanism(draft).move(draft, segments, (i, g), motion, v_dot, wrenches.at(i, g), u)
+        mechanism(draft).move(draft, segments, (i, g), motion, v_dot, wrenches.at(i, g), *flow)
     return wrenches
 
 
