@@ -74,7 +74,7 @@ def assemble_air_force(draft: Draft, arrays: dict[str, Array]) -> None:
         draft.step(rotations.world_vector, {"R": R, "vector": at_B}, vector=at_B)
     with draft.loop("k", tail.nv) as k:
         number = force.part(k, 1)
-        draft.step(air.opposite, {"minus": number}, force=number)
+        draft.step(air.negated, {"minus": number}, force=number)
 
 
 ASSEMBLIES = {"air_force": assemble_air_force}

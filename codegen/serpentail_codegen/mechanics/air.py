@@ -69,7 +69,7 @@ def relative_velocity(let, R: M33, p_dot: V3, wind: V3) -> dict:
     return {"u": R.T * let("against", p_dot - wind)}
 
 
-def opposite(let, minus: V1) -> dict:
+def negated(let, minus: V1) -> dict:
     """A number of the opposite sign."""
     return {"force": -minus}
 
