@@ -44,6 +44,8 @@ def _from_root(target: str) -> str:
     """Return where a link of the root leads, seen from docs/."""
     if target in PAGES:
         return PAGES[target]
+    if target.startswith("examples/gallery/plot_"):
+        return f"gallery/{Path(target).stem}.rst"
     if target.startswith("docs/"):
         return target.removeprefix("docs/")
     if (ROOT / target).is_dir():  # a page can offer a file for download, but no folder

@@ -39,7 +39,7 @@ def checked_duration(model: Model, duration: Any) -> tuple[float, float]:
     least, most = (number("duration", value, PlanningError, unit="s", above=0) for value in pair)
     if most < least:
         raise PlanningError(f"duration: value {shown(duration)}: needs least <= most, in s")
-    height = float(np.linalg.norm(fall(model.parameters)) * most * most / 2)  # may overflow
+    height = float(np.linalg.norm(fall(model.parameters))) * most * most / 2  # may overflow
     told = f"duration: value {most:.6g} s: a body falls {height:.2g} m in this time: did you mean "
     told += f'"{most:.6g} ms"?'
     if height > HIGHEST:

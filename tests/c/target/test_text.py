@@ -166,7 +166,7 @@ def test_numbers_are_shortest_decimals_of_the_right_type_and_lines_are_clean(mod
 
 
 def test_text_of_a_long_tail_is_bounded():
-    """Under 100 kB for all functions of values, 45 kB more for the Jacobians of forward dynamics;
+    """Under 102 kB for all functions of values, 45 kB more for the Jacobians of forward dynamics;
     sizes are the point.
     """
     values = [name for name in NAMES if name not in DERIVATIVES]
@@ -175,7 +175,7 @@ def test_text_of_a_long_tail_is_bounded():
         options = {"name": "tail", "emission": "loops", "functions": functions}
         return Model(model_folder(segments, links, **options)).source.stat().st_size
 
-    assert size(8, 16, values) < 100_000
+    assert size(8, 16, values) < 102_000
     assert size(8, 16, NAMES) < size(8, 16, values) + 45_000
     assert size(8, 16, NAMES) < 1.02 * size(3, 4, NAMES)
 

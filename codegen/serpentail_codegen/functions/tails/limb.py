@@ -58,12 +58,8 @@ def move_hinge(
     motion: Motion,
     v_dot: Array | None,
     wrench: Vectors,
-    u: Ref | None,
 ) -> None:
-    """Carry ``w, w_dot, a`` over one hinge and store the inertial wrench of its body; trees are in
-    no air.
-    """
-    assert u is None
+    """Carry ``w, w_dot, a`` over one hinge and store the inertial wrench of its body."""
     simple = simplified(step, segments.state, v_dot is not None)
     moving = segments.motion(place[0], v_dot)
     draft.step(simple, segments.at(*place), moving, motion, **wrench, **motion)
