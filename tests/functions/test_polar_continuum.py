@@ -178,7 +178,7 @@ def test_casadi_and_c_agree():
     polar, state = zoo.model("polar"), polar_state(1, 1.3)
     given = dict(zip(("q", "v", "v_dot", "tau"), state, strict=True))
     given["f_ext"] = polar.external_force(force=(1.0, 2.0, 3.0))
-    for name in VALUES:
+    for name in {*VALUES} & {*polar.generated}:
         arguments = [given[a["name"]] for a in polar.manifest["functions"][name]["inputs"]]
         found, graphs = polar.kernel(name)(*arguments), getattr(polar.casadi, name)(*arguments)
         if not isinstance(found, tuple):

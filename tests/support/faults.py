@@ -6,11 +6,12 @@ import numpy as np
 
 from serpentail.verification import report as verify
 from serpentail.verification import states
-from serpentail_scene.signatures.signature import IMPLICIT
+from serpentail_scene.signatures.signature import IMPLICIT, SIMULATION
 from serpentail_scene.signatures.table import NEEDS, in_group
 
 SLIGHT_FAULT = 1e-9
-TAKING_MORE = (*NEEDS, *in_group(IMPLICIT))  # functions of more than a state
+# functions of more than a state
+TAKING_MORE = (*NEEDS, *in_group(IMPLICIT), *in_group(SIMULATION))
 
 
 def failed(checks):

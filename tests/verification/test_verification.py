@@ -22,7 +22,8 @@ from tests.verification import verify_model
 
 SOUND = ("m1_n1", "arcs1", "elastic", "single_ground", "baked")
 OTHERS = [name for name in zoo.ZOO if name not in (*SOUND, "polar")]  # polar ones have no states
-REASONS = {f"only for {kind} models" for kind in ("double", "articulated", "contact", "passive")}
+KINDS = ("double", "articulated", "contact", "passive", "air")
+REASONS = {f"only for {kind} models" for kind in KINDS}
 REASONS |= {"no even m or n of links", "only for a torso that moves", verify_model.PLAIN}
 REASONS |= {"it says nothing about this model"}
 REASONS |= {"the passive tail cannot be left out: parameters are baked"}

@@ -42,7 +42,8 @@ def shapes(t: Array, q: Array, like: tuple[Array, ...]) -> dict[str, tuple[int, 
     samples = len(t) if t.ndim == 1 else 0
     if not samples:
         raise ValueError(f"t has shape {t.shape}: give one row of at least one time")
-    layout = Layout.of_width(q.shape[1], like[0].shape[-1]) if q.ndim == 2 else None
+    wide = q.ndim == like[0].ndim == 2
+    layout = Layout.of_width(q.shape[1], like[0].shape[1]) if wide else None
     if layout is None or (layout.fixed and any(each.shape != q.shape for each in like)):
         raise ValueError(
             f"q has shape {q.shape}: give ({samples}, 7 + nt), position, quaternion and tail "

@@ -161,7 +161,7 @@ def checked_goal(goal: Any, tail: int) -> Goal:
 
 def _rates(field: str, value: Any) -> np.ndarray:
     """Return numbers (3,), or least and most (2, 3) if one of them is a range."""
-    entries = [*value] if isinstance(value, tuple | list | np.ndarray) else []
+    entries = value if isinstance(value, tuple | list) or np.ndim(value) else []
     if not any(np.ndim(entry) for entry in entries):
         return _vector(field, value, 3)
     pairs = [numbers_in(entry if np.ndim(entry) else (entry, entry)) for entry in entries]

@@ -21,9 +21,14 @@ def the_air_pushes_the_animal_itself(model: Model, s: Case) -> Errors:
 
 @law("air_force", VALUE_LIMIT, only="air")
 def air_that_rests_takes_energy(model: Model, s: Case) -> Errors:
-    """Without wind the power of the air is not positive."""
-    force = model.with_parameters(wind=(0, 0, 0)).air_force(s.q, s.v).astype(float)
-    return max(float(force @ s.v), 0.0) / max(float(np.abs(force) @ np.abs(s.v)), 1e-300)
+    """Seen from the air, its power is not positive."""
+    v = s.v.astype(float)
+    if model.fixed:
+        model = model.with_parameters(wind=(0, 0, 0))
+    else:
+        v[VELOCITY] -= model.parameters["wind"]
+    force = model.air_force(s.q, s.v).astype(float)
+    return max(float(force @ v), 0.0) / max(float(np.abs(force) @ np.abs(v)), 1e-300)
 
 
 @law("air_force", VALUE_LIMIT, only="air")
