@@ -43,15 +43,15 @@ def assemble_pfl(draft: Draft, arrays: dict[str, Array]) -> None:
     # torques for a torso at rest, then the torso's acceleration, and the torques that it adds
     with draft.loop("k", tail.nt) as k:
         draft.copy(tail.coordinate_v(v_dot, k), arrays["accelerations"].part(k, 1))
-    R = attitude(draft, state) if "v_dot" in arrays or tail.widths else None
+    R = attitude(draft, state) if tail.widths else None
     wrench = tail_alone(draft, segments, v_dot, tau, airspeed(draft, state, R))
     motion = free_torso(draft, composite, wrench)
     add_passive_forces(draft, state, lambda i: draft.tail.segment_tau(tau, i), v_dot)
     with draft.loop("k", tail.nt) as k:
         column = {"column": column_of(columns, k)}
         draft.step(translation.coupling_torque, motion, column, torque_=tau.part(k, 1))
-    if R and "v_dot" in arrays:
-        reads = {"R": R, "a": motion["a"]}
+    if "v_dot" in arrays:
+        reads = {"R": R or attitude(draft, state), "a": motion["a"]}
         draft.step(rotations.world_acceleration, reads, p_ddot=block(v_dot, VELOCITY))
         draft.copy(block(v_dot, OMEGA), motion["w_dot"])
 

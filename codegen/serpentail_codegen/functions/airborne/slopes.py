@@ -142,19 +142,18 @@ def store_jacobian(draft: Draft, b: Balance, slopes: AirborneSlopes, J: Array) -
         (slopes.d_v_dot, TORSO_NV, second, nt),
         (slopes.d_v, OMEGA.start, count, TURN),
     ]
-    responding = [(second, TORSO_NV, nt)]  # to torques: rows from, of v_dot from, how many
     if tail.widths:
         first = at_drift(tail)
         sources.append((drift_slopes(draft, b, slopes), 0, first, 3))
         sources.append((slopes.d_v_dot, OMEGA.start, first + 3, TURN))
-        responding.append((first, 0, TORSO_NV))
     for source, first, row, rows in sources:
         with draft.loop("row", rows) as r:
             for lane, at, some in placed(tail):
                 draft.copy(J.part((r + row) * size + at, some), source.lane(r + first, lane, some))
     with draft.loop("k", nt) as k:
         draft.fill(J.part((k + at_coordinates(tail)) * size + k + second, 1), 1)
-    for row, first, rows in responding:
-        with draft.loop("row", rows) as r:
-            to = J.part((r + row) * size + count, nt)
-            draft.copy(to, slopes.by_torque.lane(r + first, 0, nt))
+        to = J.part((k + second) * size + count, nt)
+        draft.copy(to, slopes.by_torque.lane(k + TORSO_NV, 0, nt))
+    with draft.loop("row", TORSO_NV if tail.widths else 0) as r:
+        to = J.part((r + at_drift(tail)) * size + count, nt)
+        draft.copy(to, slopes.by_torque.lane(r, 0, nt))
