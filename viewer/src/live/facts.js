@@ -28,6 +28,7 @@ export class Facts {
     this.kinetic = array("energy.kinetic").data;
     this.potential = array("energy.potential").data;
     this.linear = array("momentum.linear");
+    this.angular = array("momentum.angular");
     this.tail = array("tail_points.points");
     this.legs = array("leg_points.joints");
     this.com = array("center_of_mass.position");

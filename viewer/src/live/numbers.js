@@ -1,5 +1,5 @@
 // The numbers of a computed run, by the definitions of docs/simulation.md.
-import { largest, norm, of, range, three } from "./facts.js";
+import { largest, norm, of, range, sum, three } from "./facts.js";
 import { asWord } from "./words.js";
 
 // Begin and end of the flight about the apex; undefined where they are not in the run.
@@ -20,6 +20,24 @@ function flightOf(facts) {
   const apex = t[largest(rows, (k) => facts.place(k)[2])[1]];
   const [from, to] = spans.find(([a, b]) => a <= apex && (b === undefined || apex <= b)) ?? [];
   return [from === -Infinity ? undefined : from, to];
+}
+
+// The torso's rate at the landing, by the cubic through the last samples of the flight, and the
+// angular momentum of the flight.
+function spinOf({ live, angular, v, t, rows }, [begin, end]) {
+  const slack = 1e-12 * Math.abs(t[rows - 1]);
+  const flying = range(rows).filter((k) => !(t[k] < begin - slack) && !(t[k] > end + slack));
+  if (live.fixed || !flying.length) return {};
+  const nodes = flying.slice(-4);
+  const weights = nodes.map((k) =>
+    nodes.reduce((all, i) => (i === k ? all : (all * (end - t[i])) / (t[k] - t[i])), 1),
+  );
+  const rates = nodes.map((k) => three(v, k, 3));
+  const rate = [0, 1, 2].map((axis) => sum(weights.map((w, i) => w * rates[i][axis])));
+  return {
+    torso_rate_at_touch_down: end === undefined ? undefined : { "": rate },
+    angular_momentum_at_take_off: begin === undefined ? undefined : { "": three(angular, flying[0]) },
+  };
 }
 
 // How it lands: the least upright it is, how far it turns, and whether it stands at the end.
@@ -61,7 +79,7 @@ export function numbersOf(facts) {
   const { least, turned, landed } = landingOf(facts, end);
   const { all, ...peaks } = facts.peaks;
   const parts = Object.entries(peaks).map(([name, [force]]) => [name, force]);
-  return Object.assign(numbers, {
+  return Object.assign(numbers, spinOf(facts, [begin, end]), {
     take_off_s: begin,
     recontact_s: end,
     least_upright_landing: least,
