@@ -120,7 +120,9 @@ def test_the_site_has_every_name_fetches_nothing_from_elsewhere_and_leads_somewh
         members = inspect.getmembers(each, of_class)
         wanted |= {f"serpentail.{each.__name__}.{name}" for name, _ in members if name[0] != "_"}
     assert wanted - names == set()
-    pages = {path: parts(path) for path in site.rglob("*.html")}
+    # a page of motions, which a frame shows, leads nowhere
+    shown = [path for path in site.rglob("*.html") if path.name != "rat.html"]
+    pages = {path: parts(path) for path in shown}
     for path, (fetched, links, _) in pages.items():
         with row(path):
             assert fetched and links

@@ -42,7 +42,7 @@ COMPARED = (
     "momentum",
     "center_of_mass",
 )
-PLAIN = "only for equal segments without rotors on a torso that moves, on level ground"
+PLAIN = "only for equal segments without rotors and air on a torso that moves, on level ground"
 POINTS = ("tail_points", "tail_point_jacobians")
 
 
@@ -81,7 +81,7 @@ class Reference:
 
 def plain(model: st.Model) -> bool:
     """Tell if segments are equal, on a torso that moves: what the references know."""
-    more = {"gravity_vector", "tail_rotor"} & model.parameters.keys()
+    more = {"gravity_vector", "tail_rotor", "air_density"} & model.parameters.keys()
     return isinstance(model.manifest["scene"]["segments"], int) and not model.fixed and not more
 
 

@@ -58,7 +58,7 @@ def stored_energy_changes_by_its_forces(model: Model, s: Case) -> Errors:
     return relative(gradient, expected, size)
 
 
-@law("forward_dynamics", VALUE_LIMIT, only="passive")
+@law("forward_dynamics inverse_dynamics", VALUE_LIMIT, only="passive")
 def torques_that_make_up_for_it_rid_a_tail_of_it(model: Model, s: Case) -> Errors:
     """With torques that compensate the passive tail, v_dot is that of a tail without it."""
     bare = rid_of(model, PARTS)

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 
 from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V
+from serpentail_scene.signatures.signature import SIMULATION
+from serpentail_scene.signatures.table import in_group
 
 from ..basics.errors import ModelError
 from ..model.chains import bend_ranges
@@ -164,10 +166,11 @@ def called_functions(model: Model) -> list[str]:
 
 
 def functions_of(model: Model, *known: str) -> list[str]:
-    """Return the functions that take exactly these arguments."""
+    """Return the functions that take exactly these arguments, but for those of simulations."""
     functions = model.manifest["functions"]
-    inputs = {name: {a["name"] for a in functions[name]["inputs"]} for name in model.kernels}
-    return [name for name in model.kernels if inputs[name] <= {*known}]
+    names = [name for name in model.kernels if name not in in_group(SIMULATION)]
+    inputs = {name: {a["name"] for a in functions[name]["inputs"]} for name in names}
+    return [name for name in names if inputs[name] <= {*known}]
 
 
 def outputs(model: Model, name: str, state: Case) -> dict[str, np.ndarray]:
