@@ -24,8 +24,8 @@ GROUND = {"contacts": ["feet", "tail", "torso"]}
 FLYING = [*(name for name in VALUES if name != "air_force"), "rollout"]
 FEW = ["mass_matrix", "forward_dynamics", "energy", "contact_dynamics"]
 FEW += ["pfl", "rollout", "implicit"]
-TAPED = ["mass_matrix", "inverse_dynamics", "forward_dynamics", "energy", "momentum"]
-TAPED += ["contact_points", "contact_dynamics", "rollout", "implicit", "gradients"]
+TAPED = ["mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics", "energy"]
+TAPED += ["momentum", "contact_points", "contact_dynamics", "rollout", "implicit", "gradients"]
 # what differs from coordinate to coordinate shows an exchange of two of them
 ELASTIC = {
     "tail_stiffness": [0.004, 0.006, 0.005, 0.003],
