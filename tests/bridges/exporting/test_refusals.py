@@ -79,6 +79,8 @@ def test_what_no_file_would_say_is_refused(here, monkeypatch):
             ("polar", "kind.*articulated tail"),
             ("mixed", "kind.*articulated tail"),
             ("fixed", "kind.*torso that moves"),
+            ("motors", "kind.*without rotors.*fmu"),
+            ("air", "kind.*without air.*air_density.*fmu"),
         ):
             with row(kind, name), pytest.raises(st.ExportError, match=words):
                 st.export(zoo.model(name), kind)

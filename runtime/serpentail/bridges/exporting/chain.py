@@ -108,6 +108,8 @@ def _refuse_other(model: Model, kind: str) -> None:
         needs, remedy = "a torso that moves", 'generate the scene with base = "free"'
     elif "tail_rotor" in model.parameters:
         needs, remedy = "a tail without rotors", 'leave out tail_rotor, or export an "fmu"'
+    elif "air_density" in model.parameters:
+        needs, remedy = "a model without air", 'leave out air_density, or export an "fmu"'
     else:
         return
     raise ExportError(f"kind: value {kind!r}: needs {needs} ({model.name}): {remedy}")
