@@ -214,6 +214,7 @@ FAULTS = [
     ("forward_dynamics_external", unloaded, "loads accelerate by their generalised force"),
     ("leg_points", bent, "legs have their lengths"),
     ("air_force", times(-1), "air that rests takes energy"),
+    ("forward_dynamics", times(1 + SLIGHT_FAULT), "torques that make up for it rid a tail of it"),
     ("air_force", gusty, "air that moves along does nothing"),
     ("contact_points", ajar, "velocities are the rates of the points"),
     ("contact_dynamics", pulling, "the ground never pulls nor holds by more than friction"),
