@@ -34,9 +34,10 @@ function spinOf({ live, angular, v, t, rows }, [begin, end]) {
   );
   const rates = nodes.map((k) => three(v, k, 3));
   const rate = [0, 1, 2].map((axis) => sum(weights.map((w, i) => w * rates[i][axis])));
+  const momentum = three(angular, flying[0]);
   return {
     torso_rate_at_touch_down: end === undefined ? undefined : { "": rate },
-    angular_momentum_at_take_off: begin === undefined ? undefined : { "": three(angular, flying[0]) },
+    angular_momentum_at_take_off: begin === undefined ? undefined : { "": momentum },
   };
 }
 
