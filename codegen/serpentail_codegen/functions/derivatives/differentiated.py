@@ -6,7 +6,7 @@ In torso axes nothing depends on attitude or gravity: R^T (p_b_ddot + g z) stand
 from serpentail_scene.layout import OMEGA
 from serpentail_scene.signatures.arguments import FORCE, MULTIPLIER, V_DOT, Argument, Q, V
 
-from ...ir.program import Array, Ref
+from ...ir.program import Array
 from ...mechanics import airborne
 from .. import dynamics, kinematics
 from ..air import core_airspeed
@@ -14,7 +14,7 @@ from ..draft import Draft
 from ..function import Function, signed
 from ..layout import block
 from ..passive import add_passive_forces, add_passive_power
-from ..scope import Motion, State, Vectors
+from ..scope import Motion, Vectors
 from ..sweeps.chains import prepared
 from ..sweeps.momentum import gather_moment
 from ..sweeps.wrenches import inertial_forces, virtual_power
@@ -30,20 +30,12 @@ def assemble_core(draft: Draft, arrays: dict[str, Array]) -> None:
     """H v_dot + C with all vectors in torso axes: it depends on no attitude and no gravity; in air,
     v begins with the velocity of B against it.
     """
-    state = draft.state(arrays["q"], arrays["v"])
-    core_forces(draft, state, state.omega, arrays, core_airspeed(draft, state))
-    force, v_dot = arrays["force"], arrays["v_dot"]
-    add_passive_forces(draft, state, lambda i: draft.tail.segment_v(force, i), v_dot)
-
-
-def core_forces(
-    draft: Draft, state: State, omega: Ref, arrays: dict[str, Array], u: Ref | None = None
-) -> None:
-    """Store H v_dot + C in torso axes; u: the velocity of B against the air."""
-    v_dot = arrays["v_dot"]
+    state, force, v_dot = draft.state(arrays["q"], arrays["v"]), arrays["force"], arrays["v_dot"]
+    u = core_airspeed(draft, state)
     segments = prepared(draft, state)
-    motion = Motion(omega, draft.of_torso(v_dot, OMEGA), arrays["a"][0], u)
-    inertial_forces(draft, segments, motion, v_dot, arrays["force"])
+    motion = Motion(state.omega, draft.of_torso(v_dot, OMEGA), arrays["a"][0], u)
+    inertial_forces(draft, segments, motion, v_dot, force)
+    add_passive_forces(draft, state, lambda i: draft.tail.segment_v(force, i), v_dot)
 
 
 def assemble_first_moment(draft: Draft, arrays: dict[str, Array]) -> None:
