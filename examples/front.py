@@ -7,7 +7,7 @@ mistakes are answered at once.
 import argparse
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 
 import serpentail as st
@@ -43,6 +43,17 @@ def usable(folder: str) -> Path:
             f"{folder!r}: {reason}: give a folder that can be written to, or made"
         ) from None
     return place
+
+
+def one_of(known: Collection[str]) -> Callable[[str], str]:
+    """Return what takes one of these names; it raises ArgumentTypeError where it is none."""
+
+    def name(text: str) -> str:
+        if text not in known:
+            raise argparse.ArgumentTypeError(f"{text!r}: needs one of {', '.join(known)}")
+        return text
+
+    return name
 
 
 def count(text: str) -> int:

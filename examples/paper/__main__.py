@@ -6,7 +6,6 @@ docs/paper.md. Pictures and pages that move go to output/paper. What is computed
 interrupted run resumes.
 """
 
-from argparse import ArgumentTypeError
 from functools import partial
 from pathlib import Path
 
@@ -66,15 +65,8 @@ def computed(folder: Path, names: set[str]) -> dict[str, dict]:
     return {name: rows for part in found.values() for name, rows in part.items() if name in names}
 
 
-def figure(text: str) -> str:
-    """Return the name of a figure or table; ArgumentTypeError where it is none."""
-    known = [name for _, _, figures in PARTS.values() for name in figures]
-    if text not in known:
-        raise ArgumentTypeError(f"{text!r}: needs one of {', '.join(known)}")
-    return text
-
-
 if __name__ == "__main__":
     parser = front.parser(__doc__)
-    parser.add_argument("names", nargs="*", metavar="NAME", type=figure, help="fig8, table2")
+    figures = front.one_of([name for _, _, names in PARTS.values() for name in names])
+    parser.add_argument("names", nargs="*", metavar="NAME", type=figures, help="fig8, table2")
     front.run(main, parser.parse_args().names, FOLDER, after=front.GOES_ON)
