@@ -12,7 +12,7 @@ from pathlib import Path
 from examples.front import GOES_ON, run
 from examples.studies.parts import Part, made
 
-PARTS, TAKES = 8, 0.15  # s a part
+PARTS, TAKES = 8, 0.6  # s a part
 
 
 def square(number: int, folder: Path) -> dict:
