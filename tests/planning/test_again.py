@@ -32,7 +32,7 @@ from tests.support.told import besides_progress
 from tests.support.tumbling import AGAIN, DURATION, keyed, planned, rat, start
 
 ENDLESS = {
-    "ipopt": {"ipopt.tol": 1e-300, "ipopt.acceptable_iter": 0, "ipopt.max_iter": 10**6},
+    "ipopt": {"ipopt.tol": 1e-300, "ipopt.acceptable_tol": 1e-300, "ipopt.max_iter": 10**6},
     "fatrop": {"fatrop.tolerance": 1e-300, "fatrop.max_iter": 10**6, "fatrop.print_level": 0},
 }
 
