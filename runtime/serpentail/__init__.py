@@ -37,6 +37,7 @@ _HOME = {
     **dict.fromkeys(["Goal", "Bounds"], "planning.goal"),
     **dict.fromkeys(["Mesh", "Tolerances", "Solver", "Guess"], "planning.settings"),
     "Plan": "planning.result.plan",
+    "planned": "scenes.plan",
     "Gains": "planning.gains.gains",
     "Mpc": "mpc.mpc",
     "MpcFlag": "mpc.mpc",

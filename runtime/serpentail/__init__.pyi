@@ -42,6 +42,7 @@ from .planning.settings import Tolerances as Tolerances
 from .planning.settings import Solver as Solver
 from .planning.settings import Guess as Guess
 from .planning.result.plan import Plan as Plan
+from .scenes.plan import planned as planned
 from .planning.gains.gains import Gains as Gains
 from .mpc.mpc import Mpc as Mpc
 from .mpc.mpc import MpcFlag as MpcFlag

@@ -25,7 +25,6 @@ from serpentail.planning.program import nodes
 from serpentail.planning.result import report as result_report
 from serpentail.planning.search import Search
 from serpentail.scenes.plan import arguments_for, plan_arguments
-from serpentail.scenes.plan import planned as planned_by
 from tests.support import zoo
 from tests.support.rows import row
 from tests.support.told import besides_progress
@@ -190,7 +189,18 @@ def test_scene_has_the_arguments_of_plan_and_errors_name_the_key(tmp_path):
     for text, words in (("kind = ", "scene file"), ('kind = "articulated"\n', "has no table")):
         (tmp_path / "scene.toml").write_text(text)
         with row(words), pytest.raises(st.PlanningError, match=words):
-            planned_by(str(tmp_path / "scene.toml"))
+            st.planned(str(tmp_path / "scene.toml"))
+
+    few = {"intervals": 4, "plan.tolerance": "free", "duration": "0.5 s", "tail_mass": "4 g"}
+    plan = st.planned("righting_m1_n3", changes=few)
+    assert (plan.report["intervals"], plan.duration, plan.model.parameters["tail_mass"]) == (
+        4,
+        0.5,
+        0.004,
+    )
+    for wrong in ("duraton", "plan.tail_mass", "phase.a", "tail_mass.b"):
+        with row(wrong), pytest.raises(st.SerpentailError, match=wrong.split(".")[0]):
+            st.planned("righting_m1_n3", changes={wrong: 1})
 
 
 def test_a_scaled_scene_scales_its_ranges():

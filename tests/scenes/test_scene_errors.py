@@ -216,7 +216,7 @@ def test_one_command_makes_the_landing_and_phases_can_be_changed(capsys):
     assert list(told["phases"]) == ["kick", "right", "land"]
     assert told["phases"]["right"]["plan_is_true"]
     assert told["phases"]["land"]["ended_by"] == "duration"
-    changes = {"phase.0.duration": "0.1 s", "phase.0.moves": []}
+    changes = {"phase.0.duration": "0.1 s", "phase.kick.moves": []}
     scene = st.scenario(KICK, zoo.folder("ground"), changes)
     run = scene.sequence()
     assert not run.complete and run.trajectory.t[-1] == pytest.approx(0.1)

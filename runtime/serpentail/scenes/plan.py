@@ -19,6 +19,7 @@ from ..planning.result.plan import Plan
 from ..planning.settings import SOLVERS, WHOLE_NUMBERS, joined
 from .file import UNSIZED, model_of, read_scene, size_of, subtable, values_of
 from .keys import sized
+from .overrides import changed, split_changes
 
 FREE = "free"  # TOML has no None
 WORK = Key("N m s")
@@ -101,18 +102,39 @@ ELSEWHERE = "programs can give others, to serpentail.plan"
 CODE_ONLY = ("guess", "path", "legs", "watch")  # values that no file can hold
 
 
-def planned(path: str, folder: str | None = None) -> Plan:
-    """Return the plan that a scene file describes.
+def planned(path: str, folder: str | None = None, changes: Mapping | None = None) -> Plan:
+    """Plan the motion that a scene file describes in [plan].
 
-    path: a scene file, or the name of an example; folder: the model's generated folder; None: the
-    model is built, or taken from the cache. Raises PlanningError with field, value and remedy,
-    ModelError if the folder belongs to another scene, ExtraMissing without the extra "plan".
+    Parameters
+    ----------
+    path : str or path
+        A scene file, or the name of an example (see ``examples``).
+    folder : str or path, optional
+        Generated folder of its model. Default: the model is built, or taken from the cache.
+    changes : mapping, optional
+        New values by name: of keys of [plan], such as "duration" or "bounds.torque"; others are
+        parameters of the model.
+
+    Returns
+    -------
+    Plan
+        The plan.
+
+    Raises
+    ------
+    PlanningError
+        A key is wrong; the message names field, value and remedy. Or as of ``plan``.
+    ModelError
+        A parameter is wrong, or the folder belongs to another scene.
+    ExtraMissing
+        The extra "plan" is not installed.
     """
     extras.needed("casadi", "plan")  # before the model is built
     tables, place = read_scene(path, PlanningError)
-    table = subtable(tables, "plan", place, PlanningError)
+    parts = split_changes(changes, {"plan": PLAN.keys}, PlanningError)
+    table = changed(subtable(tables, "plan", place, PlanningError), parts["plan"])
     plan_arguments(table)  # errors are raised before a model is built
-    model = model_of(tables, place, folder, {})
+    model = model_of(tables, place, folder, parts["parameters"])
     return plan(model, **arguments_for(model, table))
 
 

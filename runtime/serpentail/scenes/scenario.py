@@ -87,7 +87,7 @@ class Scenario(NearNames):
         if self.phases:
             for name in changes:
                 if name not in OF_PHASES:
-                    remedy = 'give st.scenario changes such as {"phase.0.duration": 0.5}'
+                    remedy = 'give st.scenario changes such as {"phase.push.duration": 0.5}'
                     raise SimulationError(f"{name}: this scene has phases: {remedy}")
             return replace(self, settings=self.settings | changes).sequence().trajectory
         arguments = {"controller": self.controller, "t_span": self.duration} | self.settings

@@ -8,11 +8,9 @@ import numpy as np
 
 from ..basics.checks import (
     Refusals,
-    did_you_mean,
     number,
     one_of,
     refusal,
-    shown,
 )
 from ..basics.errors import SimulationError
 from ..model.model import Model
@@ -22,7 +20,7 @@ from ..simulation.methods import SETTINGS
 from ..simulation.settle import check_settling, refuse_moving, settle
 from .controllers import controller_of, legs_of, reference_of
 from .file import model_of, read_scene, size_of, subtable, values_of
-from .overrides import changed
+from .overrides import changed, split_changes
 from .phases import phases_of, refuse_beside_phases
 from .scenario import Scenario
 from .simulate_keys import NUMBERS, SIMULATE
@@ -42,7 +40,7 @@ def scenario(
     changes : mapping, optional
         New values by name: of the model's parameters; of keys of [simulate], such as "duration",
         "start.pitch", "simulate.output_step" or "legs.moves.0.rate"; of phases, such as
-        "phase.0.duration".
+        "phase.push.duration".
 
     Returns
     -------
@@ -67,29 +65,10 @@ def scenario(
     scene, path = read_scene(path, SimulationError)
     table = subtable(scene, "simulate", path, SimulationError)
 
-    # a change is of a key below [simulate], of a phase, or of a parameter
-    parts: dict[str, dict[str, Any]] = {"simulate": {}, "phase": {}, "parameters": {}}
-    for given, value in (changes or {}).items():
-        name = given.removeprefix("simulate.")
-        first = name.split(".")[0]
-        part = "simulate" if first in SIMULATE.keys else "parameters"
-        parts["phase" if first == "phase" else part][name] = value
-    _check_changes(parts["parameters"])
+    parts = split_changes(changes, {"simulate": SIMULATE.keys, "phase": ["phase"]}, SimulationError)
     model = model_of(scene, path, folder, parts["parameters"])
     phases = changed({"phase": scene.get("phase", [])}, parts["phase"])["phase"]
     return scenario_of(model, changed(table, parts["simulate"]), path.parent, phases)
-
-
-def _check_changes(parameters: Mapping) -> None:
-    """Refuse names that cannot be parameters, before a model is made."""
-    refused = Refusals(SimulationError)
-    for name in parameters:
-        # no parameter is called like these
-        near = did_you_mean(name.split(".")[0], [*SIMULATE.keys, "phase"])
-        if near or "." in name:
-            remedy = near or "needs a parameter, or a key below [simulate]"
-            refused.add(name, f"change {shown(name)}: unknown; {remedy}")
-    refused.tell()
 
 
 def scenario_of(model: Model, table: Mapping, parent: Path, phases: Any = ()) -> Scenario:
