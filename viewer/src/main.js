@@ -5,6 +5,7 @@ import { LiveRun } from "./live/run.js";
 import { addSwitches, tellNotes, tellNumbers, tellWarnings } from "./panel.js";
 import { Player } from "./player.js";
 import { Plots } from "./plots.js";
+import { addSaving } from "./save.js";
 import { Stage } from "./stage.js";
 
 const find = (id) => document.getElementById(id);
@@ -12,7 +13,7 @@ const page = (window.serpentail = { ready: false, seek: null, error: null });
 const notes = []; // that stay, whatever is computed
 
 function addNote(note) {
-  notes.push(note);
+  if (!notes.includes(note)) notes.push(note);
   tellNotes(find("notes"), notes);
 }
 
@@ -42,6 +43,8 @@ async function open() {
     parts.forEach((part) => part.switchRun(k, on)),
   );
 
+  const shown = (k) => switches[k].checked;
+  addSaving(find("save"), { runs, plots: meta.plots, player, stage, shown, told: addNote });
   const resize = () => {
     for (const part of parts) part.resize();
     plots.show(player.time);

@@ -4,6 +4,7 @@ const SPEEDS = [0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 1, 2, 5];
 const WATCHED = 8; // s that a run takes at the initial speed
 const PRESSED = "button, input[type=checkbox], summary"; // controls that the space bar presses
 const MOST_MARKS = 200;
+const LONGEST = 50; // ms between frames of a video: a slow computer skips none
 
 export class Player {
   constructor(find, runs, show) {
@@ -69,12 +70,27 @@ export class Player {
     this.playing = on && this.end > this.begin;
     this.button.textContent = this.playing ? "Pause" : "Play";
     this.before = undefined;
+    if (!this.playing) this.finish();
     if (this.playing) requestAnimationFrame((now) => this.frame(now));
+  }
+
+  // Plays until the end or a pause, and then calls a function.
+  playOnce(done) {
+    this.done = done;
+    this.toggle(true);
+  }
+
+  finish() {
+    const { done } = this;
+    this.done = undefined;
+    done?.();
   }
 
   frame(now) {
     if (!this.playing) return;
-    const next = this.time + (Number(this.speed.value) * (now - (this.before ?? now))) / 1000;
+    if (this.done && this.time >= this.end) return this.toggle(false);
+    const passed = Math.min(now - (this.before ?? now), this.done ? LONGEST : Infinity);
+    const next = this.time + (Number(this.speed.value) * passed) / 1000;
     this.before = now;
     this.seek(this.time >= this.end ? this.begin : next);
     requestAnimationFrame((later) => this.frame(later));

@@ -182,6 +182,12 @@ export class Stage {
     this.render();
   }
 
+  // Passes the view to a function, as a PNG.
+  picture(take) {
+    this.render();
+    this.canvas.toBlob(take);
+  }
+
   render() {
     this.renderer.render(this.scene, this.camera);
   }

@@ -15,6 +15,14 @@ def built():
     page.need(page.need_page)
 
 
+@pytest.fixture(scope="module")
+def browser():
+    chromium = pytest.importorskip("tests.support.chromium")
+    page.need(chromium.need_chromium)
+    with chromium.chromium() as driver:
+        yield driver
+
+
 @pytest.fixture
 def kick():
     return simulated("kick")

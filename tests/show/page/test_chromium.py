@@ -18,18 +18,10 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import WebDriverWait
 
 from tests.support import chromium
-from tests.support.chromium import opened, requests
+from tests.support.chromium import SETTLED, opened, picture, press, requests, seek, text
 
 pytestmark = pytest.mark.slow  # Chromium is no part of a newcomer's installation
 PHONE = (375, 740)
-SETTLED = 0.1  # s, for what is drawn when a frame comes
-
-
-@pytest.fixture(scope="module")
-def browser():
-    need(chromium.need_chromium)
-    with chromium.chromium() as driver:
-        yield driver
 
 
 @pytest.fixture(scope="module")
@@ -41,24 +33,6 @@ def pages(tmp_path_factory):
         "kick": kick.view(folder / "kick & more.html"),
         "two": st.view([kick, slow], folder / "two.html", names=["whole", "begin"]),
     }
-
-
-def text(driver, name):
-    return driver.execute_script(f"return document.getElementById('{name}').textContent")
-
-
-def seek(driver, t):
-    driver.execute_script(f"serpentail.seek({t})")
-
-
-def picture(driver):
-    """What the stage shows, as a drawn image."""
-    time.sleep(SETTLED)
-    return driver.find_element("id", "view").screenshot_as_png
-
-
-def press(driver, *keys, on="body"):
-    driver.find_element("css selector", on).send_keys(*keys)
 
 
 def value(driver):

@@ -10,13 +10,12 @@ import serpentail as st
 from serpentail.cli import cli
 from serpentail.motion.derived import AGAIN
 from tests.support import zoo
-from tests.support.page import data_of, need
+from tests.support.page import data_of
 from tests.support.rows import row
 from tests.support.scenes import SCENES
 
 pytest.importorskip("ziglang")
 pytest.importorskip("selenium")
-from tests.support import chromium
 from tests.support.chromium import opened, requests
 
 pytestmark = pytest.mark.slow
@@ -25,13 +24,6 @@ NUMBERS = """return [...document.querySelectorAll("#numbers tr")].map((row) =>
   [...row.children].map((cell) => cell.textContent))"""
 WARNINGS = "return [...document.querySelectorAll('#warnings p')].map((each) => each.textContent)"
 SAMPLES = "return [...serpentail.samples().q]"
-
-
-@pytest.fixture(scope="module")
-def browser():
-    need(chromium.need_chromium)
-    with chromium.chromium() as driver:
-        yield driver
 
 
 def flown(name, law=None, span=0.3, **words):

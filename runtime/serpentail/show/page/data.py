@@ -147,7 +147,7 @@ def _plots(
         curves = []
         for run, (name, motion) in enumerate(zip(names, motions, strict=True)):
             for column, label in enumerate(_columns(array, motion)):
-                words = label if len(motions) == 1 else f"{name} {label}".strip()
+                words = label if len(motions) == 1 else f"{name} {label}".rstrip()
                 curves.append({"run": run, "array": array, "column": column, "label": words})
         if curves:
             compressed = weight if array == "force" else 0
