@@ -13,6 +13,7 @@ import {
 } from "three";
 import { BALL, Balls, Heads, Rods } from "./shapes.js";
 import { colour, series } from "./theme.js";
+import { Torques } from "./torques.js";
 import { Torso } from "./torso.js";
 
 const GHOST = 0.5; // opacity of all runs but the first
@@ -36,7 +37,8 @@ export class Animal {
     const look = k === 0 ? {} : ghost(k);
     const lambert = () => new MeshLambertMaterial(look);
     this.torso = new Torso(run.body, look);
-    this.materials = { tail: lambert(), joint: lambert(), leg: lambert(), force: lambert() };
+    const names = ["tail", "joint", "leg", "force", "torque"];
+    this.materials = Object.fromEntries(names.map((name) => [name, lambert()]));
 
     const links = Math.max(run.points - 1, 0);
     this.tail = new Rods(this.materials.tail, links);
@@ -48,6 +50,8 @@ export class Animal {
     this.group.add(this.torso.group);
     for (const parts of [this.tail, this.joints, this.legs, this.knees, this.shafts, this.tips])
       this.group.add(parts.mesh);
+    this.torques = new Torques(run, this.materials.torque);
+    this.group.add(this.torques.group);
     this.addMarkers();
     this.addCentre();
     this.addShadow();
@@ -67,19 +71,23 @@ export class Animal {
     this.centre = new Mesh(BALL, new MeshBasicMaterial({ depthTest: false, transparent: true }));
     this.centre.scale.setScalar(0.065 * Math.max(...this.run.body.semi_axes));
     this.centre.renderOrder = 2;
-    this.path = new Line(new BufferGeometry(), new LineBasicMaterial());
-    this.path.frustumCulled = false;
-    this.group.add(this.centre, this.path);
+    const line = () => new Line(new BufferGeometry(), new LineBasicMaterial());
+    [this.path, this.trail] = [line(), line()];
+    this.path.frustumCulled = this.trail.frustumCulled = this.trail.visible = false;
+    this.group.add(this.centre, this.path, this.trail);
     this.trace();
   }
 
-  // Draws the path of the centre of mass.
+  // Draws the paths of the centre of mass and of the tail's tip.
   trace() {
-    const places = new Float32Array(3 * this.run.rows);
-    for (let row = 0; row < this.run.rows; row++)
-      this.run.point("com", row, 0, to).toArray(places, 3 * row);
-    this.path.geometry.dispose();
-    this.path.geometry.setAttribute("position", new BufferAttribute(places, 3));
+    const { run } = this;
+    this.torques.renew();
+    for (const [line, name, i] of [[this.path, "com", 0], [this.trail, "tail", run.tip]]) {
+      const places = new Float32Array(3 * run.rows);
+      for (let row = 0; row < run.rows; row++) run.point(name, row, i, to).toArray(places, 3 * row);
+      line.geometry.dispose();
+      line.geometry.setAttribute("position", new BufferAttribute(places, 3));
+    }
   }
 
   // The shadow lies on the ground straight below the torso and shows how high the torso is.
@@ -92,7 +100,7 @@ export class Animal {
 
   paint() {
     const own = series(this.k);
-    this.torso.paint(this.alone ? colour("fur") : own, colour("belly"), colour("eye"));
+    this.torso.paint(this.alone ? colour(this.run.body.box ? "shell" : "fur") : own, colour("belly"), colour("eye"));
     this.materials.tail.color.set(this.alone ? colour("tail") : own);
     this.materials.joint.color.set(colour("eye"));
     this.materials.leg.color.set(this.alone ? colour("leg") : own);
@@ -100,6 +108,8 @@ export class Animal {
     this.materials.marker.color.set(colour("marker"));
     this.centre.material.color.set(colour("centre"));
     this.path.material.color.set(this.alone ? colour("path") : own);
+    this.trail.material.color.set(this.alone ? colour("trail") : own);
+    this.materials.torque.color.set(colour("torque"));
   }
 
   // Moves all by k steps; a run that stands apart is not seen through.
@@ -121,6 +131,7 @@ export class Animal {
     this.shadow.position.set(pose(0), pose(1), 1e-3 * b);
     this.shadow.scale.set(a, b, 1);
     this.showTail(row);
+    this.torques.show(row, this.torso.group.quaternion);
     this.showLegs(row);
     this.showForces(row);
     this.showMarkers(row);

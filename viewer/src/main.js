@@ -61,6 +61,14 @@ async function open() {
   views.addEventListener("change", look);
   find("follow").addEventListener("change", () => stage?.follow(find("follow").checked));
   look();
+  for (const name of ["trail", "torques"]) {
+    const switchPart = ({ target }) => {
+      stage?.switchPart(name, target.checked);
+      player.seek(player.time);
+    };
+    find(name).addEventListener("change", switchPart);
+  }
+  find("torques").parentElement.hidden = runs.every((run) => !run.bases.length);
   document.addEventListener("keydown", (event) => obey(event, player, switches, look));
   if (meta.live) await enliven(meta, runs, player, parts);
   return player;
@@ -99,8 +107,9 @@ async function enliven(meta, runs, player, parts) {
 function obey(event, player, switches, look) {
   if (event.ctrlKey || event.altKey || event.metaKey) return;
   if (event.target.matches("select, #knobs input")) return;
-  const own = { f: () => find("follow").click(), s: () => find("apart").click(), r: look };
-  const action = player.action(event) ?? own[event.key] ?? switched(switches, event.key);
+  const box = find({ f: "follow", s: "apart", t: "trail", m: "torques" }[event.key]);
+  const own = event.key === "r" ? look : box && (() => box.click());
+  const action = player.action(event) ?? own ?? switched(switches, event.key);
   if (!action) return;
   event.preventDefault();
   action();

@@ -149,6 +149,11 @@ export class Stage {
     this.at.copy(this.followed());
   }
 
+  // Shows or hides a part of all animals: "trail" of the tail's tip, or "torques".
+  switchPart(name, on) {
+    for (const animal of this.animals) (animal[name].group ?? animal[name]).visible = on;
+  }
+
   // Takes other samples of a run.
   renew(k) {
     this.animals[k].trace();

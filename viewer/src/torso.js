@@ -1,5 +1,7 @@
-// The torso: a pale belly and a head with snout, ears and eyes show which way it faces.
+// The torso: a pale belly and a head with snout, ears and eyes show which way it faces; a box has a
+// visor for a head.
 import {
+  BoxGeometry,
   BufferAttribute,
   Color,
   Group,
@@ -10,6 +12,9 @@ import {
 } from "three";
 import { BALL } from "./shapes.js";
 
+const BOX = new BoxGeometry(2, 2, 2, 1, 1, 24);
+const VISOR = { place: [0, 1, 0.35], size: [0.7, 0.04, 0.22] }; // at a box's front, in half sides
+
 export class Torso {
   // body: sizes and places in m, as the page's data has them
   constructor(body, look) {
@@ -18,9 +23,15 @@ export class Torso {
     this.materials = { fur: new MeshLambertMaterial(look), eye: new MeshLambertMaterial(look) };
     this.group = new Group();
 
-    this.ball = new Mesh(new SphereGeometry(1, 48, 32), this.coat);
-    this.ball.scale.set(...body.semi_axes);
-    this.group.add(this.ball);
+    this.trunk = new Mesh(body.box ? BOX.clone() : new SphereGeometry(1, 48, 32), this.coat);
+    this.trunk.scale.set(...body.semi_axes);
+    this.group.add(this.trunk);
+    if (body.box) {
+      const visor = new Mesh(BOX, this.materials.eye);
+      visor.position.set(...VISOR.place);
+      visor.scale.set(...VISOR.size);
+      this.trunk.add(visor);
+    }
     for (const { colour, place, semi_axes } of body.head) {
       const part = new Mesh(BALL, this.materials[colour]);
       part.position.set(...place);
@@ -31,13 +42,13 @@ export class Torso {
 
   paint(fur, belly, eye) {
     const [back, below, shade] = [new Color(fur), new Color(belly), new Color()];
-    const places = this.ball.geometry.attributes.position;
+    const places = this.trunk.geometry.attributes.position;
     const colours = new Float32Array(3 * places.count);
     for (let i = 0; i < places.count; i++) {
       const part = MathUtils.smoothstep(places.getZ(i), ...this.belly);
       shade.lerpColors(below, back, part).toArray(colours, 3 * i);
     }
-    this.ball.geometry.setAttribute("color", new BufferAttribute(colours, 3));
+    this.trunk.geometry.setAttribute("color", new BufferAttribute(colours, 3));
     this.materials.fur.color.set(fur);
     this.materials.eye.color.set(eye);
   }

@@ -15,7 +15,7 @@ from tests.support import page, zoo
 from tests.support.page import data_of
 from tests.support.rows import row
 
-from .conftest import plan
+from .conftest import flown, plan
 
 WEIGHT = 9.8 * (0.10572 + 0.00351)
 RADIUS = 0.0029  # m: the rat's usual one
@@ -58,6 +58,7 @@ def test_the_kick_is_whole_and_below_1_mb(tmp_path, kick):
         "force": np.linalg.norm(kick.contact.forces.sum(axis=1), axis=1),
         "height": kick.q[:, 2],
         "torque": kick.tau,
+        "momentum": kick.angular_momentum,
     }
     for name, array in expected.items():
         flat = np.asarray(array).reshape(1201, -1).astype(np.float32)
@@ -85,14 +86,17 @@ def check_words(data, run, kick):
     forces = np.linalg.norm(kick.contact.forces, axis=2)
     assert data["force_scale"] == pytest.approx(np.percentile(forces[forces > 0], 95))
     shown = [plot["curves"][0]["array"] for plot in data["plots"]]
-    assert shown == ["height", "tilt", "bends", "torque", "force", "energy"]
-    assert [plot["compressed"] for plot in data["plots"]] == pytest.approx([0] * 4 + [WEIGHT, 0])
-    assert [plot["least"] for plot in data["plots"]] == [1e-3, 0.1, 0.1, 0, 0, 0]
+    assert shown == ["height", "tilt", "bends", "torque", "force", "momentum", "energy"]
+    assert [plot["compressed"] for plot in data["plots"]] == pytest.approx([0] * 4 + [WEIGHT, 0, 0])
+    assert [plot["least"] for plot in data["plots"]] == [1e-3, 0.1, 0.1, 0, 0, 1e-9, 0]
 
 
-def test_a_flight_has_no_ground_and_no_legs(tmp_path, flight):
-    data, run = single_run(flight.view(tmp_path / "run.html"))
+def test_a_flight_has_ground_if_it_stays_above_it_and_no_legs(tmp_path, flight):
+    low = dataclasses.replace(flight, q=flight.q - 0.3 * np.eye(1, flight.q.shape[1], 2))
+    data, run = single_run(low.view(tmp_path / "run.html"))
     assert (run["grounded"], run["legs"], run["contacts"]) == (False, 0, 0)
+    data, run = single_run(flight.view(tmp_path / "run.html"))
+    assert run["grounded"] and (run["bases"], run["tip"]) == ([0, 5], 10)
     assert not {"legs", "forces", "touching", "force"} & set(run["arrays"])
     assert not run["body"]["jointed"]
     assert not any("force" in plot["title"] for plot in data["plots"])
@@ -195,7 +199,7 @@ def test_links_and_arcs_are_drawn_as_thick_as_they_are():
             np.testing.assert_allclose(scales[len(radii) :, 1], radii)
 
 
-def test_equal_links_have_one_thickness_and_thin_torsos_and_fixed_bases_are_seen():
+def test_equal_links_have_one_thickness_and_thin_torsos_boxes_and_fixed_bases_are_seen(tmp_path):
     model = zoo.model("m2_n2")
     animal = animal_of(model)
     np.testing.assert_allclose(animal.tail_radii, RADIUS * (1.15 - 0.5 * np.arange(4) / 5))
@@ -203,6 +207,11 @@ def test_equal_links_have_one_thickness_and_thin_torsos_and_fixed_bases_are_seen
     flat = model.with_parameters(torso_inertia=(8e-5, 8e-5, 1.6e-4))  # a disc
     least, most, _ = np.sort(animal_of(flat).semi_axes)
     assert least == 0.15 * most
+    # a robot is the box of its scene, without a head
+    robot = flown(st.build("tailed_robot"), 3).view(tmp_path / "robot.html")
+    body = single_run(robot)[1]["body"]
+    assert body["semi_axes"] == pytest.approx([0.04, 0.06, 0.015])
+    assert body["box"] and not body["head"]
     # a fixed base is a ball at the mount
     model = zoo.model("fixed")
     reach = np.linalg.norm(model.parameters["tail_mount"])

@@ -15,6 +15,7 @@ from selenium.webdriver.support.ui import WebDriverWait
 from tests.support.chromium import opened, picture, press, seek, text
 
 pytestmark = pytest.mark.slow
+TRAIL = (0xA8, 0x56, 0x1C)  # colour of the path of the tip
 HOSTILE = ['=1+1,"a"', "</script>"]
 CHOOSE = """const menu = document.getElementById("save"); menu.value = arguments[0];
   document.getElementById("speed").value = "5";
@@ -28,6 +29,19 @@ def saved(driver, folder, kind):
     driver.execute_script(CHOOSE, kind)
     (path,) = WebDriverWait(driver, 60).until(lambda _: list(folder.glob(f"*.{kind}")))
     return path.read_bytes()
+
+
+def test_paths_of_the_tip_and_torques_are_seen_by_a_key(browser, tmp_path, flight):
+    driver = opened(browser, flight.view(tmp_path / "page.html"))
+    seek(driver, 0.1)
+    counts = []
+    for key in "mmtt":
+        shown = np.asarray(Image.open(BytesIO(picture(driver))).convert("RGB"), int)
+        violet = (shown[..., 2] > shown[..., 1] + 60).sum()  # blue more than green
+        counts.append((violet, (np.abs(shown - TRAIL).max(axis=2) < 40).sum()))
+        press(driver, key)
+    assert counts[1][0] > 20 > counts[0][0] == counts[2][0]
+    assert counts[3][1] > counts[2][1] + 50
 
 
 def test_what_is_shown_is_saved(browser, tmp_path, kick, flight):

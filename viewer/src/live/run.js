@@ -110,6 +110,7 @@ export class LiveRun {
       tilt: table(1, (k) => (live.fixed ? 0 : facts.tilt(k))),
       bends: table(live.nt, (k, i) => DEG * (live.polar ? polar : jointed)(facts, k, i)),
       torque: facts.tau,
+      momentum: facts.angular,
       energy: table(3, (k, i) => energies[i](k)),
       ...(legs && { legs }),
       ...(forces && { touching: points, forces }),

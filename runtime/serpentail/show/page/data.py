@@ -45,9 +45,10 @@ TITLES = {
     "bends": "bends of the tail's segments (deg)",
     "torque": "joint torques (N m)",
     "force": "force of the ground (N), scale compressed",
+    "momentum": "angular momentum about the centre of mass (kg m^2/s)",
     "energy": "energy (J)",
 }
-LEAST = {"height": 1e-3, "tilt": 0.1, "bends": 0.1}
+LEAST = {"height": 1e-3, "tilt": 0.1, "bends": 0.1, "momentum": 1e-9}
 
 
 def page_data(
@@ -79,16 +80,21 @@ def page_data(
 def _run(motion: Trajectory, model: Model, animal: Animal) -> dict[str, Any]:
     """A run as the page reads it: sizes, and arrays as text."""
     arrays = samples(model, motion)
+    box = _box(model)
+    lowest = min(arrays["tail"][..., 2].min(), arrays["height"].min() - max(animal.semi_axes))
     return {
         "rows": len(motion.t),
         "points": arrays["tail"].shape[1],
+        "bases": _bases(model),
+        "tip": model.layout.chains[0].points.stop - 1,
         "legs": 2 if "legs" in arrays else 0,
         "contacts": sum(motion.contact.groups.values()) if motion.contact else 0,
-        "grounded": motion.contact is not None,
+        "grounded": motion.contact is not None or bool(lowest > 0),
         "body": {
-            "semi_axes": animal.semi_axes,
+            "semi_axes": box or animal.semi_axes,
             "belly": BELLY,
-            "head": [asdict(ball) for ball in animal.head],
+            "box": box is not None,
+            "head": [] if box else [asdict(ball) for ball in animal.head],
             "tail_radii": animal.tail_radii,
             "joint": JOINT if animal.jointed else 1,
             "jointed": animal.jointed,
@@ -96,6 +102,24 @@ def _run(motion: Trajectory, model: Model, animal: Animal) -> dict[str, Any]:
         },
         "arrays": {name: packed(array) for name, array in arrays.items()},
     }
+
+
+def _box(model: Model) -> list[float] | None:
+    """Half the sides (3,), m, of a torso that its scene makes a box."""
+    if model.manifest["scene"].get("body", {}).get("torso", {}).get("shape") != "box":
+        return None
+    inertia = np.array(model.parameters["torso_inertia"])
+    sides = 6 / model.parameters["torso_mass"] * (inertia.sum() - 2 * inertia)  # squared
+    return (np.sqrt(sides) / 2).tolist()
+
+
+def _bases(model: Model) -> list[int]:
+    """The tail's points where its segments begin, if these bend in pitch and yaw."""
+    first = model.layout.chains[0]
+    if model.layout.hinges or model.manifest["scene"]["coordinates"] == "polar":
+        return []
+    counts = np.broadcast_to(model.manifest["dimensions"]["links"], model.segments)[first.segments]
+    return [0, *np.cumsum(counts)[:-1].tolist()]
 
 
 def _notes(motion: Trajectory, step: int) -> list[str]:
@@ -158,8 +182,8 @@ def _plots(
 
 def _columns(array: str, motion: Trajectory) -> Sequence[str]:
     """The names of an array's columns; none if a motion does not have it."""
-    if array in ("height", "tilt"):
-        return [] if motion.layout.fixed else [""]
+    if array in ("height", "tilt", "momentum"):
+        return [] if motion.layout.fixed else "xyz" if array == "momentum" else [""]
     if array in ("bends", "torque") and motion.layout.hinges:
         return motion.names.tail
     if array in ("bends", "torque"):

@@ -51,6 +51,7 @@ def samples(model: Model, motion: Trajectory) -> dict[str, Array]:
         "tilt": tilt_deg(motion.attitude),
         "bends": np.degrees(bends(model, motion.tail)),
         "torque": motion.tau,
+        "momentum": motion.angular_momentum,
         "energy": np.stack([motion.energy, motion.kinetic, motion.potential], axis=1),
     }
     if contact is not None:
