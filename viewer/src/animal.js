@@ -82,9 +82,13 @@ export class Animal {
   trace() {
     const { run } = this;
     this.torques.renew();
-    for (const [line, name, i] of [[this.path, "com", 0], [this.trail, "tail", run.tip]]) {
+    for (const [line, name, point] of [
+      [this.path, "com", 0],
+      [this.trail, "tail", run.tip],
+    ]) {
       const places = new Float32Array(3 * run.rows);
-      for (let row = 0; row < run.rows; row++) run.point(name, row, i, to).toArray(places, 3 * row);
+      for (let row = 0; row < run.rows; row++)
+        run.point(name, row, point, to).toArray(places, 3 * row);
       line.geometry.dispose();
       line.geometry.setAttribute("position", new BufferAttribute(places, 3));
     }
@@ -100,7 +104,8 @@ export class Animal {
 
   paint() {
     const own = series(this.k);
-    this.torso.paint(this.alone ? colour(this.run.body.box ? "shell" : "fur") : own, colour("belly"), colour("eye"));
+    const coat = colour(this.run.body.box ? "shell" : "fur");
+    this.torso.paint(this.alone ? coat : own, colour("belly"), colour("eye"));
     this.materials.tail.color.set(this.alone ? colour("tail") : own);
     this.materials.joint.color.set(colour("eye"));
     this.materials.leg.color.set(this.alone ? colour("leg") : own);

@@ -1,6 +1,7 @@
 // The page of runs: reads its data, assembles stage, plots and numbers, and handles the keyboard.
 import { Run } from "./data.js";
 import { Knobs } from "./live/knobs.js";
+import { Pusher } from "./live/pusher.js";
 import { LiveRun } from "./live/run.js";
 import { addSwitches, tellNotes, tellNumbers, tellWarnings } from "./panel.js";
 import { Player } from "./player.js";
@@ -85,9 +86,9 @@ async function enliven(meta, runs, player, parts) {
     return;
   }
   const others = meta.warnings.slice(meta.live.told);
-  const compute = (values) => {
+  const compute = (values, push) => {
     try {
-      const told = live.compute(values);
+      const told = live.compute(values, push);
       tellNotes(find("notes"), [...notes, ...told.notes]);
       tellWarnings(find("warnings"), [...told.warnings, ...others]);
     } catch (error) {
@@ -100,7 +101,12 @@ async function enliven(meta, runs, player, parts) {
     return "";
   };
   const knobs = new Knobs(find("knobs"), meta.live.knobs, compute);
-  page.change = (values) => knobs.set(values);
+  const push = (impulse) => knobs.pushBy(impulse);
+  Object.assign(page, { push, change: (values) => knobs.set(values) });
+  const stage = parts.find((part) => part instanceof Stage);
+  if (stage && !meta.live.fixed) {
+    new Pusher({ button: find("push"), clock: find("clock"), stage, player, live, push });
+  }
   page.samples = () => ({ t: runs[0].times, q: live.engine.array("q", runs[0].rows).data });
 }
 

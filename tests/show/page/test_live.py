@@ -16,7 +16,9 @@ from tests.support.scenes import SCENES
 
 pytest.importorskip("ziglang")
 pytest.importorskip("selenium")
-from tests.support.chromium import opened, requests
+from selenium.webdriver import ActionChains
+
+from tests.support.chromium import opened, requests, text
 
 pytestmark = pytest.mark.slow
 LEGS = st.Legs.fixed(3.7, -0.3)
@@ -63,7 +65,7 @@ CASES = {
 }
 
 
-def again(motion, values):
+def again(motion, values, faster=0):
     """The run of the same start, model, controller and settings with other values, by Python."""
     made, left, start = vars(motion)[AGAIN], dict(values), {}
     q, v, model = made.start.q0[0].copy(), made.start.v0[0].copy(), motion.model
@@ -89,7 +91,13 @@ def again(motion, values):
         start["legs"] = made.ground.legs
     settings = {name: made.method.settings[name] for name in ("rtol", "atol")}
     return st.simulate(
-        model, (q, v), made.start.end, controller=law, method=made.method.name, **settings, **start
+        model,
+        (q, v + faster),
+        made.start.end,
+        controller=law,
+        method=made.method.name,
+        **settings,
+        **start,
     )
 
 
@@ -136,6 +144,36 @@ def test_a_wrong_value_is_refused_in_the_words_of_python(browser, tmp_path):
         assert driver.execute_script(script, value) == str(error.value)
         assert driver.execute_script(NUMBERS) == before
     assert driver.find_element("css selector", "#knobs p").is_displayed()
+
+
+def test_a_push_changes_the_start_as_python_says(browser, tmp_path):
+    """A drag from the torso pushes it, too; the button takes pushes back."""
+    for name, values in (("flight", TURNED), ("slip", {})):
+        motion = CASES[name][0]()
+        driver, model = (
+            opened(browser, motion.view(tmp_path / "live.html", live=True)),
+            motion.model,
+        )
+        script = "return serpentail.change(arguments[0]) + serpentail.push(arguments[1])"
+        push = {"point": [0.01, 0.04, -0.02], "impulse": [0.02, -0.01, 0.03]}
+        assert driver.execute_script(script, values, push) == ""
+        q = again(motion, values).q[0]
+        own = Rotation.from_quat(np.roll(q[3:7], -1)).inv().apply(push["impulse"])
+        force = np.r_[push["impulse"], np.cross(push["point"], own), [0] * model.nu]
+        expected = again(motion, values, np.linalg.solve(model.mass_matrix(q), force))
+        found = np.reshape(driver.execute_script(SAMPLES), expected.q.shape)
+        np.testing.assert_allclose(found, expected.q, rtol=0, atol=1e-9, err_msg=name)
+    assert "pushed at the start: 0.037417 N s" in text(driver, "notes")
+    with pytest.raises(st.StateError) as error:
+        again(motion, {}, np.nan)
+    wrong = {"point": [0, 0, 0], "impulse": [0, 0, "NaN"]}
+    assert driver.execute_script(script, {}, wrong) == str(error.value)
+    driver.execute_script("document.getElementById('push').click()")
+    view = driver.find_element("id", "view")
+    ActionChains(driver).drag_and_drop_by_offset(view, 60, -30).perform()
+    assert "pushed at the start" in text(driver, "notes") and text(driver, "play") == "Pause"
+    driver.find_element("css selector", "#knobs button").click()
+    assert driver.execute_script(SAMPLES) == motion.q.ravel().tolist()
 
 
 def test_a_slider_moves_the_run_and_a_button_brings_it_back(browser, tmp_path):

@@ -17,11 +17,17 @@ export class Engine {
     const pages = (live.base + image.length - this.memory.buffer.byteLength) / PAGE;
     if (pages > 0) this.memory.grow(Math.ceil(pages));
     this.view = new DataView(this.memory.buffer);
+    this.reset();
   }
 
-  // Puts the run back to its start, as it was given.
-  reset() {
-    new Uint8Array(this.memory.buffer).set(this.image, this.live.base);
+  // Puts the run back to its start, as it was given; or all to what it was when it was kept.
+  reset(image = this.image) {
+    new Uint8Array(this.memory.buffer).set(image, this.live.base);
+  }
+
+  kept() {
+    const { base } = this.live;
+    return new Uint8Array(this.memory.buffer).slice(base, base + this.image.length);
   }
 
   // Advances the run to its end; returns the status of the C.

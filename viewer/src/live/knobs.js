@@ -13,7 +13,8 @@ function limits({ rule, value, slider }) {
 }
 
 export class Knobs {
-  // change: takes the values of the changed knobs, a map; returns why it refuses them
+  // change: takes the values of the changed knobs, a map, and a push or none; returns why it
+  // refuses them
   constructor(holder, knobs, change) {
     Object.assign(this, { knobs, change, values: new Map(), rows: new Map() });
     for (const [group, title] of Object.entries(GROUPS)) {
@@ -60,6 +61,7 @@ export class Knobs {
   // Sets knobs by their names, all others as the run had them; returns why that is refused.
   set(values) {
     this.values = new Map();
+    this.push = undefined;
     for (const knob of this.knobs) {
       if (Object.hasOwn(values, knob.name)) this.values.set(knob, values[knob.name]);
       this.show(knob);
@@ -67,9 +69,17 @@ export class Knobs {
     return this.tell();
   }
 
+  // Pushes the animal at the start; a push that is refused is forgotten.
+  pushBy(push) {
+    this.push = push;
+    const refused = this.tell();
+    if (refused) this.push = undefined;
+    return refused;
+  }
+
   tell() {
     this.due = undefined;
-    this.refused.textContent = this.change(this.values);
+    this.refused.textContent = this.change(this.values, this.push);
     this.refused.hidden = !this.refused.textContent;
     return this.refused.textContent;
   }

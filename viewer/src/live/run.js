@@ -2,8 +2,9 @@
 import { Engine } from "./engine.js";
 import { Facts, largest, norm } from "./facts.js";
 import { numbersOf, rowsOf } from "./numbers.js";
+import { pushed } from "./push.js";
 import { warningsOf } from "./warnings.js";
-import { filled } from "./words.js";
+import { asPython, asWord, filled } from "./words.js";
 
 const DEG = 180 / Math.PI;
 const STILL = [0, 0, 0, 1, 0, 0, 0]; // place and quaternion of a fixed base
@@ -27,29 +28,55 @@ export class LiveRun {
     return Object.assign(new LiveRun(), { engine: await Engine.of(live), live, run, prefix });
   }
 
-  // Computes the run with other values of knobs (a map), and fills the shown one. Returns notes and
-  // warnings; an error refuses the values, and leaves the run as it was.
-  compute(values) {
+  // Computes the run with other values of knobs (a map) and maybe a push, and fills the shown one.
+  // Returns notes and warnings; an error refuses the values, and leaves the run as it was.
+  compute(values, push) {
     for (const [{ rule, words }, value] of values) {
       const sound = Number.isFinite(value) && (SOUND[rule]?.(value) ?? true);
-      if (!sound) throw new Error(filled(words, { value: String(value).replace("NaN", "nan") }));
+      if (!sound) throw new Error(filled(words, { value: asPython(value) }));
     }
-    const { engine, live, prefix } = this;
-    engine.reset();
-    this.apply(values);
-    if (live.calls.contact_points) this.refuseDeep();
-    const status = engine.advance();
-    const facts = new Facts(engine, status);
-    const told = { t: engine.member("t"), why: live.why[status] };
-    const failure = status ? filled(live.words.failed, told) : "";
-    if (facts.rows < 2) throw new Error(failure);
+    const { live, prefix } = this;
+    const [facts, failure] = this.factsOf(values, push);
     this.run.fill(facts.t, this.columns(facts));
     this.run.numbers = rowsOf(numbersOf(facts), live.labels, facts.rows);
     this.run.events = facts.events.map(({ time, group, kind }) => {
       return { time, kind, label: `${prefix}${group} ${kind.replace("_", " ")}` };
     });
-    const notes = failure ? [`${prefix}the run failed, and ends here: ${failure}`] : [];
+    const notes = [];
+    const size = push && asWord(norm(...push.impulse));
+    if (push) notes.push(`${prefix}pushed at the start: ${size} N s`);
+    if (failure) notes.push(`${prefix}the run failed, and ends here: ${failure}`);
     return { notes, warnings: warningsOf(facts).map((text) => prefix + text) };
+  }
+
+  // Computes what the run does, and how it fails. The shown samples lie in the memory of the C: where
+  // values are refused, it gets back what it had.
+  factsOf(values, push) {
+    const { engine, live } = this;
+    const before = engine.kept();
+    try {
+      engine.reset();
+      this.apply(values);
+      if (push) pushed(engine, push);
+      if (live.calls.contact_points) this.refuseDeep();
+      const status = engine.advance();
+      const facts = new Facts(engine, status);
+      const told = { t: engine.member("t"), why: live.why[status] };
+      const failure = status ? filled(live.words.failed, told) : "";
+      if (facts.rows < 2) throw new Error(failure);
+      return [facts, failure];
+    } catch (error) {
+      engine.reset(before);
+      throw error;
+    }
+  }
+
+  number(name) {
+    return this.engine.parameter(name)[0];
+  }
+
+  get mass() {
+    return this.number("torso_mass") + this.number("tail_mass");
   }
 
   apply(values) {
@@ -81,9 +108,8 @@ export class LiveRun {
     engine.call("contact_points", 1);
     const { data, width } = engine.array("contact_points.positions", 1);
     const [depth, point] = largest(width / 3, (i) => -data[3 * i + 2]);
-    const number = (name) => engine.parameter(name)[0];
-    const weight = (number("torso_mass") + number("tail_mass")) * number("gravity");
-    const limit = ((live.limits.MAX_STATIC_LOAD * weight) / number("K_n")) ** (2 / 3);
+    const weight = this.mass * this.number("gravity");
+    const limit = ((live.limits.MAX_STATIC_LOAD * weight) / this.number("K_n")) ** (2 / 3);
     if (!(depth > limit)) return;
     let ends = 0;
     const group = Object.keys(live.groups).find((name) => point < (ends += live.groups[name]));

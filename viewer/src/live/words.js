@@ -1,5 +1,9 @@
 // Words with numbers in them, as Python writes them.
 
+// A number that a user gave, as Python's errors repeat it.
+export const asPython = (value) =>
+  String(value).replace("NaN", "nan").replace("Infinity", "inf");
+
 // A number as Python's format "g" has it, with all zeros if asked for.
 export function general(x, digits, zeros = false) {
   if (!Number.isFinite(x)) return Number.isNaN(x) ? "nan" : x > 0 ? "inf" : "-inf";

@@ -4,6 +4,8 @@ from typing import Any
 
 import numpy as np
 
+from ...basics.checks import refuse_not_finite
+from ...basics.errors import StateError
 from ...model.library import WHY
 from ...model.model import Model
 from ...model.passive import BEHIND
@@ -18,7 +20,7 @@ from ...simulation.runs.single import CompiledRun
 from ...simulation.simulate import RunAgain
 from ..page.samples import as_text
 from .image import BASE, Image
-from .knobs import REAL, knobs
+from .knobs import REAL, knobs, refusal_of
 from .webassembly import webassembly
 
 # functions that a page calls on all samples, if the model has them
@@ -30,6 +32,8 @@ ARRAYS = 10  # of the argument record of a function
 ENDLESS = 2**31 - 1  # steps of one call
 WORDS = audit.WORDS | plausibility.WORDS | {"deep": ground.DEEP, "failed": FAILED}
 WORDS |= {"behind": BEHIND, "ease_stops": EASE_STOPS}
+_RATE = {"field": "v0", "array": np.array([np.nan]), "error": StateError}
+WORDS["rate"] = refusal_of(refuse_not_finite, _RATE).replace("[0]", "[{at}]")
 LIMITS = {  # of warnings and numbers
     name: getattr(module, name)
     for module, names in (

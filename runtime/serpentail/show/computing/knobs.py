@@ -42,10 +42,10 @@ def _knob(
 ) -> Knob:
     """Return a knob: its group, name and unit; wrong: a function and arguments that it refuses."""
     knob = dict(zip(("group", "name", "unit"), name, strict=True)) | {"rule": "finite", "scale": 1}
-    return knob | {"value": value, "places": places, "words": _refusal(*wrong)} | more
+    return knob | {"value": value, "places": places, "words": refusal_of(*wrong)} | more
 
 
-def _refusal(make: Callable[..., object], arguments: dict[str, Any]) -> str:
+def refusal_of(make: Callable[..., object], arguments: dict[str, Any]) -> str:
     """Return the words of the error about nan among arguments, which ``{value}`` stands for."""
     try:
         make(**arguments)
