@@ -1,4 +1,5 @@
 // The page of runs: reads its data, assembles stage, plots and numbers, and handles the keyboard.
+import { Backdrop } from "./backdrop.js";
 import { Run } from "./data.js";
 import { Knobs } from "./live/knobs.js";
 import { Pusher } from "./live/pusher.js";
@@ -37,9 +38,14 @@ async function open() {
   tellNumbers(find("numbers"), runs);
 
   const stage = stageOf(find("view"), runs, meta);
-  const player = new Player(find, runs, (t) => parts.forEach((part) => part.show(t)));
+  const player = new Player(find, runs, (t) => shows.forEach((part) => part.show(t)));
   const plots = new Plots(find("plots"), meta.plots, runs, (t) => player.seek(t));
   const parts = stage ? [plots, stage] : [plots];
+  const shows = [...parts];
+  if (stage) {
+    const seen = (on) => stage.seeThrough(on);
+    shows.push(new Backdrop({ holder: find("backdrop"), video: find("film"), player, seen }));
+  }
   const switches = addSwitches(find("runs"), runs, (k, on) =>
     parts.forEach((part) => part.switchRun(k, on)),
   );
@@ -112,7 +118,7 @@ async function enliven(meta, runs, player, parts) {
 
 function obey(event, player, switches, look) {
   if (event.ctrlKey || event.altKey || event.metaKey) return;
-  if (event.target.matches("select, #knobs input")) return;
+  if (event.target.matches("select, .knob input")) return;
   const box = find({ f: "follow", s: "apart", t: "trail", m: "torques" }[event.key]);
   const own = event.key === "r" ? look : box && (() => box.click());
   const action = player.action(event) ?? own ?? switched(switches, event.key);

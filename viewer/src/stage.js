@@ -54,7 +54,7 @@ export class Stage {
   constructor(canvas, runs, meta) {
     this.canvas = canvas;
     this.length = meta.length;
-    this.renderer = new WebGLRenderer({ canvas, antialias: true });
+    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
     this.scene = new Scene();
     this.camera = new PerspectiveCamera(FIELD, 1, 0.01 * this.length, 1000 * this.length);
     this.camera.up.set(0, 0, 1);
@@ -80,11 +80,17 @@ export class Stage {
   }
 
   paint() {
-    this.scene.background = new Color(colour("stage"));
+    this.scene.background = this.filmed ? null : new Color(colour("stage"));
     for (const animal of this.animals) animal.paint();
     this.ground.clear();
     if (this.grounded) this.layGround();
     this.render();
+  }
+
+  // Lets a film behind the canvas be seen, over which the grid alone is drawn.
+  seeThrough(filmed) {
+    this.filmed = filmed;
+    this.paint();
   }
 
   // The floor is transparent. Its squares have sides of 1, 2 or 5 times a power of ten, in m.
@@ -106,7 +112,8 @@ export class Stage {
     );
     floor.position.z = -1e-3 * this.length;
     floor.renderOrder = 1;
-    this.ground.add(floor, grid);
+    this.ground.add(grid);
+    if (!this.filmed) this.ground.add(floor);
   }
 
   // Moves the ground by whole squares: it seems endless and at rest.

@@ -12,7 +12,7 @@ import serpentail as st
 pytest.importorskip("selenium")
 from selenium.webdriver.support.ui import WebDriverWait
 
-from tests.support.chromium import opened, picture, press, seek, text
+from tests.support.chromium import opened, picture, press, requests, seek, text
 
 pytestmark = pytest.mark.slow
 TRAIL = (0xA8, 0x56, 0x1C)  # colour of the path of the tip
@@ -70,3 +70,17 @@ def test_what_is_shown_is_saved(browser, tmp_path, kick, flight):
     video = saved(driver, tmp_path, "webm")
     assert video[:4] == b"\x1aE\xdf\xa3" and b"V_VP" in video
     assert text(driver, "play") == "Play" and driver.get_log("browser") == []
+    # a film is seen behind the model at the time that is shown; what is none is refused by its name
+    (tmp_path / "<b>no film").write_text("no film")
+    chosen = driver.find_element("css selector", "#backdrop input")
+    chosen.send_keys(str(tmp_path / "<b>no film"))
+    wait = WebDriverWait(driver, 60).until
+    assert wait(lambda _: "<b>no film: this browser" in text(driver, "backdrop"))
+    chosen.send_keys(str(next(tmp_path.glob("*.webm"))))
+    at = "const v = document.getElementById('film'); return v.hidden ? -1 : v.currentTime"
+    wait(lambda _: driver.execute_script(at) >= 0)
+    field = driver.find_elements("css selector", "#backdrop [type=number]")[0]
+    driver.execute_script("arguments[0].value = 0.05", field)
+    seek(driver, 0.1)
+    assert wait(lambda _: driver.execute_script(at) == pytest.approx(0.15, abs=1e-3))
+    assert {each[:5] for each in requests(driver)} <= {"file:", "blob:"}

@@ -49,8 +49,8 @@ export class LiveRun {
     return { notes, warnings: warningsOf(facts).map((text) => prefix + text) };
   }
 
-  // Computes what the run does, and how it fails. The shown samples lie in the memory of the C: where
-  // values are refused, it gets back what it had.
+  // Computes what the run does, and how it fails. The shown samples lie in the memory of the C:
+  // where values are refused, it gets back what it had.
   factsOf(values, push) {
     const { engine, live } = this;
     const before = engine.kept();
