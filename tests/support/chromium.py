@@ -2,7 +2,6 @@
 
 import json
 import shutil
-import time
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -13,7 +12,6 @@ from selenium.webdriver.support.ui import WebDriverWait
 from checks.embedded.boards import ToolchainMissing
 from tests.support.page import need_page
 
-SETTLED = 0.1  # s, for what is drawn when a frame comes
 OPTIONS = (
     "--headless=new",
     "--no-sandbox",
@@ -74,24 +72,3 @@ def requests(driver) -> list[str]:
     entries = [json.loads(entry["message"])["message"] for entry in driver.get_log("performance")]
     sent = [e["params"] for e in entries if e["method"] == "Network.requestWillBeSent"]
     return [each["request"]["url"] for each in sent]
-
-
-def text(driver, name):
-    """Return the text of an element."""
-    return driver.execute_script(f"return document.getElementById('{name}').textContent")
-
-
-def seek(driver, t):
-    """Show another time, s."""
-    driver.execute_script(f"serpentail.seek({t})")
-
-
-def picture(driver):
-    """Return what the stage shows, as a drawn image."""
-    time.sleep(SETTLED)
-    return driver.find_element("id", "view").screenshot_as_png
-
-
-def press(driver, *keys, on="body"):
-    """Press keys on an element."""
-    driver.find_element("css selector", on).send_keys(*keys)

@@ -5,6 +5,7 @@ const NO_VIDEO =
   "This browser cannot record WebM. Open the page in a current Chromium or Firefox, or make a " +
   "film in Python: motion.film(\"run.mp4\").";
 const BITS = 1e7; // of a video, in a second
+const LAST = 200; // ms for the last picture to be taken
 const KEPT = 60000; // ms that a browser has to take over a file
 const axes = (name, parts, unit) => parts.map((part) => `${name} ${part} (${unit})`);
 const PLACES = {
@@ -75,14 +76,15 @@ function record(canvas, player, told) {
   const parts = [];
   recorder.ondataavailable = ({ data }) => parts.push(data);
   recorder.onstop = () => download(parts, VIDEO, "webm");
-  player.toggle(false);
-  player.seek(player.begin);
-  recorder.start();
-  document.body.classList.add("recording");
-  player.playOnce(() => {
+  const stop = () => {
     document.body.classList.remove("recording");
-    recorder.stop();
-  });
+    setTimeout(() => recorder.stop(), LAST);
+  };
+  recorder.onstart = () => player.playOnce(stop);
+  document.body.classList.add("recording");
+  player.toggle(false);
+  recorder.start();
+  player.seek(player.begin);
 }
 
 // Obeys a menu whose values are "csv", "png" and "webm"; stage may be missing.

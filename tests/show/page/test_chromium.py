@@ -1,5 +1,6 @@
-"""The page in a real browser, also in a notebook: it needs nothing else, seeks, obeys keys."""
+"""The page in a real browser, also in a notebook: it needs nothing else, seeks, obeys, saves."""
 
+import csv
 import dataclasses
 import time
 from io import BytesIO
@@ -15,13 +16,14 @@ from tests.support.page import need
 pytest.importorskip("selenium")
 from selenium.webdriver import ActionChains
 from selenium.webdriver.common.keys import Keys
-from selenium.webdriver.support.ui import WebDriverWait
+from selenium.webdriver.support.ui import Select, WebDriverWait
 
 from tests.support import chromium
-from tests.support.chromium import SETTLED, opened, picture, press, requests, seek, text
+from tests.support.chromium import opened, requests
 
 pytestmark = pytest.mark.slow  # Chromium is no part of a newcomer's installation
 PHONE = (375, 740)
+SETTLED = 0.1  # s, for what is drawn when a frame comes
 
 
 @pytest.fixture(scope="module")
@@ -33,6 +35,28 @@ def pages(tmp_path_factory):
         "kick": kick.view(folder / "kick & more.html"),
         "two": st.view([kick, slow], folder / "two.html", names=["whole", "begin"]),
     }
+
+
+def text(driver, name):
+    return driver.execute_script(f"return document.getElementById('{name}').textContent")
+
+
+def seek(driver, t):
+    driver.execute_script(f"serpentail.seek({t})")
+
+
+def picture(driver):
+    """What the stage shows, as a drawn image."""
+    time.sleep(SETTLED)
+    return driver.find_element("id", "view").screenshot_as_png
+
+
+def pixels(png):
+    return np.asarray(Image.open(BytesIO(png)).convert("RGB"), int)
+
+
+def press(driver, *keys, on="body"):
+    driver.find_element("css selector", on).send_keys(*keys)
 
 
 def value(driver):
@@ -90,8 +114,7 @@ def test_runs_switch_on_and_off(browser, pages):
     drawn = [picture(driver)]
     press(driver, "2")
     drawn.append(picture(driver))
-    first, second = (np.asarray(Image.open(BytesIO(d)).convert("RGB"), float) for d in drawn)
-    other = np.abs(first - second).max(axis=2) > 40
+    other = np.abs(pixels(drawn[0]) - pixels(drawn[1])).max(axis=2) > 40
     assert other.mean() < 0.005  # the path of the other's centre of mass
     unnamed = """
       const named = (each) => each.getAttribute("aria-label") || each.closest("label")
@@ -108,12 +131,17 @@ def test_runs_stand_side_by_side_by_a_key(browser, pages):
     driver = opened(browser, pages["two"])
     shown = []
     for _ in range(3):
-        shown.append(np.asarray(Image.open(BytesIO(picture(driver))).convert("RGB"), int))
+        shown.append(pixels(picture(driver)))
         press(driver, "s")
     over, beside = (np.mean(p[..., 0] - p[..., 2] > 60) for p in shown[:2])
     assert beside > 5 * over and (shown[0] == shown[2]).all()
     driver = opened(browser, pages["kick"])
     assert not driver.find_element("id", "apart").is_displayed()
+    seek(driver, 0.42)
+    for key in "mt":  # torques, path of the tail's tip
+        before = pixels(picture(driver))
+        press(driver, key)
+        assert 1e-4 < (pixels(picture(driver)) != before).mean() < 0.05, key
 
 
 def test_keys(browser, pages, kick):
@@ -235,3 +263,39 @@ def test_an_output_of_a_notebook_runs_and_fetches_nothing(browser, kick, tmp_pat
         browser.switch_to.default_content()
     assert browser.get_log("browser") == []
     assert set(requests(browser)) <= {notebook.as_uri(), "about:srcdoc"}
+
+
+def test_what_is_shown_is_saved_and_a_film_is_behind_it(browser, tmp_path, kick, flight):
+    """No name becomes a formula of a spreadsheet; what is no film is refused by its name."""
+    page = st.view([kick, flight], tmp_path / "page.html", names=["</script>", '=1+1,"a"'])
+    driver, wait = opened(browser, page), WebDriverWait(browser, 60).until
+    behavior = {"behavior": "allow", "downloadPath": str(tmp_path)}
+    driver.execute_cdp_cmd("Page.setDownloadBehavior", behavior)
+    press(driver, "1", *"++++++++")  # the second run, fast
+    seek(driver, 0.1)
+
+    def saved(kind):
+        Select(driver.find_element("id", "save")).select_by_value(kind)
+        return wait(lambda _: list(tmp_path.glob(f"*.{kind}")))[0]
+
+    rows = list(csv.DictReader(saved("csv").read_text().splitlines()))
+    assert {each["run"] for each in rows} == {'\'=1+1,"a"'}
+    yaw = np.degrees(flight.tail[:, 3])
+    for key, expected in (("t (s)", flight.t), ("bends of the tail's segments: yaw 2 (deg)", yaw)):
+        np.testing.assert_allclose([float(row[key]) for row in rows], expected, 1e-6, 1e-9)
+    shown = pixels(picture(driver))
+    assert np.abs(shown - pixels(saved("png").read_bytes())).mean() < 1
+    film, wrong = saved("webm"), tmp_path / "<b>none"
+    assert b"V_VP" in film.read_bytes() and text(driver, "play") == "Play"
+    wrong.write_text("no film")
+    chosen = driver.find_element("css selector", "#backdrop input")
+    chosen.send_keys(str(wrong))
+    wait(lambda _: "<b>none: this browser" in text(driver, "backdrop"))
+    chosen.send_keys(str(film))
+    at = "const v = document.getElementById('film'); return v.hidden ? -1 : v.currentTime"
+    wait(lambda _: driver.execute_script(at) >= 0)
+    driver.execute_script("document.querySelector('#backdrop [type=number]').value = 0.05")
+    seek(driver, 0.1)
+    wait(lambda _: driver.execute_script(at) == pytest.approx(0.15, abs=1e-3))
+    assert {each[:5] for each in requests(driver)} <= {"file:", "blob:"}
+    assert driver.get_log("browser") == []
