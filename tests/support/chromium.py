@@ -51,8 +51,11 @@ def chromium(*more):
         driver.quit()
 
 
-def opened(driver, page: Path, size=(1280, 800), scheme="light"):
-    """Return the browser with a loaded page, in a window of a size, in light or dark."""
+def opened(driver, page: Path, size=(1280, 800), scheme="light", script=""):
+    """Return the browser with a loaded page, in a window of a size, in light or dark.
+
+    script: runs before those of the page.
+    """
     for log in ("browser", "performance"):
         driver.get_log(log)
     width, height = size
@@ -60,7 +63,9 @@ def opened(driver, page: Path, size=(1280, 800), scheme="light"):
     driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
     features = [{"name": "prefers-color-scheme", "value": scheme}]
     driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+    added = driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": script})
     driver.get(page.as_uri())
+    driver.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", added)
     done = "return window.serpentail && (serpentail.ready || serpentail.error)"
     WebDriverWait(driver, 60).until(lambda browser: browser.execute_script(done))
     assert driver.execute_script("return serpentail.error") is None

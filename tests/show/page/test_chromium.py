@@ -233,13 +233,9 @@ def test_the_axes_of_a_motion_at_rest_do_not_show_rounding(browser, tmp_path, ki
     q, v = np.repeat(kick.q[:1], len(kick.t), axis=0), np.zeros_like(kick.v)
     q[:, 2] = 0.109 + 1e-8 * np.sin(20 * kick.t)
     rest = dataclasses.replace(kick, q=q, v=v)
-    added = browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": SPY})
-    try:
-        driver = opened(browser, rest.view(tmp_path / "rest.html"))
-        time.sleep(SETTLED)
-        drawn = driver.execute_script("return [...labels.values()].map((each) => [...each])")
-    finally:
-        browser.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", added)
+    driver = opened(browser, rest.view(tmp_path / "rest.html"), script=SPY)
+    time.sleep(SETTLED)
+    drawn = driver.execute_script("return [...labels.values()].map((each) => [...each])")
     height, tilt = (sorted(map(float, each)) for each in drawn[:2])
     assert len(height) > 1 and 0.4e-3 < np.ptp(height) < 3e-3 and height[0] < 0.109 < height[-1]
     assert len(tilt) > 1 and 0.04 < np.ptp(tilt) < 0.3

@@ -36,7 +36,24 @@ def test_what_float32_cannot_hold_is_packed_as_its_largest():
 def test_the_kick_is_whole_and_below_1_mb(tmp_path, kick):
     path = kick.view(tmp_path / "run.html")
     data, run = single_run(path)
-    check_words(data, run, kick)
+    numbers, summary = dict(run["numbers"]), told(kick)
+    assert numbers["samples"] == "1201" and numbers["landed, and stands at the end"] == "no"
+    said = "largest force of the ground"
+    for label, name in (
+        *(("take-off (s)", "take_off_s"), ("highest torso (m)", "apex_m")),
+        *((f"{said} (N)", "peak_ground_force_N"), ("tilt at the end (deg)", "tilt_end_deg")),
+        (f"{said} (body weights)", "peak_ground_force_weights"),
+    ):
+        assert float(numbers[label]) == pytest.approx(summary[name], rel=1e-3), label
+    assert data["notes"] == [] and data["warnings"] == kick.warnings and len(kick.warnings) == 5
+    assert [event["time"] for event in run["events"]] == [event["time"] for event in kick.events]
+    assert run["events"][0]["label"] == "feet take off"
+    forces = np.linalg.norm(kick.contact.forces, axis=2)
+    assert data["force_scale"] == pytest.approx(np.percentile(forces[forces > 0], 95))
+    shown = [plot["curves"][0]["array"] for plot in data["plots"]]
+    assert shown == ["height", "tilt", "bends", "torque", "force", "momentum", "energy"]
+    assert [plot["compressed"] for plot in data["plots"]] == pytest.approx([0] * 4 + [WEIGHT, 0, 0])
+    assert [plot["least"] for plot in data["plots"]] == [1e-3, 0.1, 0.1, 0, 0, 1e-9, 0]
     loaded = st.Trajectory.load(kick.save(tmp_path / "kick.npz"))
     again = loaded.view(tmp_path / "loaded.html", model=kick.model)
     assert again.read_bytes() == path.read_bytes()
@@ -68,27 +85,6 @@ def test_the_kick_is_whole_and_below_1_mb(tmp_path, kick):
     # the leg's last three joints are the foot's points
     feet = arrays["legs"].reshape(1201, 2, 6, 3)[:, :, 3:].reshape(1201, 6, 3)
     np.testing.assert_allclose(feet, kick.contact.points, atol=1e-7)
-
-
-def check_words(data, run, kick):
-    numbers, summary = dict(run["numbers"]), told(kick)
-    assert numbers["samples"] == "1201" and numbers["landed, and stands at the end"] == "no"
-    said = "largest force of the ground"
-    for label, name in (
-        *(("take-off (s)", "take_off_s"), ("highest torso (m)", "apex_m")),
-        *((f"{said} (N)", "peak_ground_force_N"), ("tilt at the end (deg)", "tilt_end_deg")),
-        (f"{said} (body weights)", "peak_ground_force_weights"),
-    ):
-        assert float(numbers[label]) == pytest.approx(summary[name], rel=1e-3), label
-    assert data["notes"] == [] and data["warnings"] == kick.warnings and len(kick.warnings) == 5
-    assert [event["time"] for event in run["events"]] == [event["time"] for event in kick.events]
-    assert run["events"][0]["label"] == "feet take off"
-    forces = np.linalg.norm(kick.contact.forces, axis=2)
-    assert data["force_scale"] == pytest.approx(np.percentile(forces[forces > 0], 95))
-    shown = [plot["curves"][0]["array"] for plot in data["plots"]]
-    assert shown == ["height", "tilt", "bends", "torque", "force", "momentum", "energy"]
-    assert [plot["compressed"] for plot in data["plots"]] == pytest.approx([0] * 4 + [WEIGHT, 0, 0])
-    assert [plot["least"] for plot in data["plots"]] == [1e-3, 0.1, 0.1, 0, 0, 1e-9, 0]
 
 
 def test_a_flight_has_ground_if_it_stays_above_it_and_no_legs(tmp_path, flight):

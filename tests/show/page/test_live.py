@@ -17,6 +17,7 @@ from tests.support.scenes import SCENES
 pytest.importorskip("ziglang")
 pytest.importorskip("selenium")
 from selenium.webdriver import ActionChains
+from selenium.webdriver.support.ui import Select
 
 from tests.support.chromium import opened, requests
 
@@ -77,8 +78,7 @@ def again(motion, values, faster=0):
             q[3:7] = euler.as_quat()[[3, 0, 1, 2]]
     q[2:3] = left.pop("height", q[2])
     for k, name in enumerate(("spin x", "spin y", "spin z")):
-        if name in left:
-            v[3 + k] = left.pop(name)
+        v[3 + k] = left.pop(name, v[3 + k])
     for k, joints in enumerate(np.repeat(model.joints_each, 2)):
         place = len(q) - model.nu + k
         name = f"bend {k // 2 + 1} {('pitch', 'yaw')[k % 2]}"
@@ -186,16 +186,15 @@ def test_a_slider_moves_the_run_and_a_button_brings_it_back(browser, tmp_path):
     assert driver.execute_script(NUMBERS) == before
 
 
-def test_without_webassembly_the_page_says_so_and_replays(browser, tmp_path):
+def test_without_webassembly_or_recorder_the_page_says_so_and_replays(browser, tmp_path):
     page = CASES["arc"][0]().view(tmp_path / "live.html", live=True)
-    source = {"source": "delete globalThis.WebAssembly;"}
-    added = browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", source)
-    try:
-        driver = opened(browser, page)
-    finally:
-        browser.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", added)
+    driver = opened(
+        browser, page, script="delete globalThis.WebAssembly; delete globalThis.MediaRecorder"
+    )
     assert "cannot compute the run again" in driver.find_element("id", "notes").text
     assert not driver.find_element("id", "knobs").is_displayed()
+    Select(driver.find_element("id", "save")).select_by_value("webm")
+    assert "cannot record WebM" in driver.find_element("id", "notes").text
     driver.execute_script("serpentail.seek(0.2)")
     assert "0.2" in driver.find_element("id", "clock").text
 
