@@ -5,7 +5,7 @@ import { Heads, Rods } from "./shapes.js";
 
 const STEPS = 14; // rods of an arc
 const [LEAST, LONGEST] = [0.02, 1.5 * Math.PI]; // share of the largest that is drawn; rad of that
-const [WIDE, THICK] = [0.32, 0.022]; // radii of an arc, over the torso's largest semi-axis
+const [WIDE, THICK] = [0.4, 0.022]; // radii of an arc, over the torso's largest semi-axis
 const [from, to, rod] = [new Vector3(), new Vector3(), new Vector3()];
 const [axis, out, across] = [new Vector3(), new Vector3(), new Vector3()];
 const [attitude, turn] = [new Matrix4(), new Matrix4()];
@@ -16,6 +16,8 @@ export class Torques {
     this.rods = new Rods(material, STEPS * run.bases.length);
     this.heads = new Heads(material, run.bases.length);
     this.group.visible = false;
+    Object.assign(material, { depthTest: false, transparent: true }); // nothing hides them
+    this.rods.mesh.renderOrder = this.heads.mesh.renderOrder = 2;
     this.group.add(this.rods.mesh, this.heads.mesh);
     this.renew();
   }
