@@ -22,6 +22,7 @@ const script = outputFiles[0].text.trim().replaceAll("</script", "<\\/script");
 const style = [
   read("node_modules/uplot/dist/uPlot.min.css"),
   read("src/colours.css"),
+  read("src/bar.css"),
   read("src/style.css"),
   read("src/live/knobs.css"),
 ].join("\n");

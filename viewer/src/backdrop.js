@@ -1,4 +1,4 @@
-// A reader's own film behind the model. The browser reads it from the reader's disk; nothing is sent.
+// A reader's own film behind the model. The browser reads it from their disk; nothing is sent.
 
 const made = (name, more = {}) => Object.assign(document.createElement(name), more);
 const KNOBS = {
