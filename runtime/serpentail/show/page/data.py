@@ -13,7 +13,7 @@ from ...motion.plausibility import warnings_of
 from ...motion.summary import summary
 from ...motion.text import as_word
 from ...motion.trajectory import Trajectory
-from ..animal import BELLY, JOINT, Animal, animal_of
+from ..animal import BELLY, JOINT, THINNEST, Animal, animal_of
 from .samples import packed, samples, thinned
 
 COMMON = 95  # percentile of the forces whose arrow is as long as half the torso
@@ -105,12 +105,13 @@ def _run(motion: Trajectory, model: Model, animal: Animal) -> dict[str, Any]:
 
 
 def _box(model: Model) -> list[float] | None:
-    """Half the sides (3,), m, of a torso that its scene makes a box."""
+    """Half the sides (3,), m, of a torso that its scene makes a box, thick enough to be seen."""
     if model.manifest["scene"].get("body", {}).get("torso", {}).get("shape") != "box":
         return None
     inertia = np.array(model.parameters["torso_inertia"])
-    sides = 6 / model.parameters["torso_mass"] * (inertia.sum() - 2 * inertia)  # squared
-    return (np.sqrt(sides) / 2).tolist()
+    squares = 1.5 / model.parameters["torso_mass"] * (inertia.sum() - 2 * inertia)
+    half = np.sqrt(np.maximum(squares, 0))
+    return np.maximum(half, THINNEST * half.max()).tolist()
 
 
 def _bases(model: Model) -> list[int]:
