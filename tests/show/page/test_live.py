@@ -78,7 +78,8 @@ def again(motion, values, faster=0):
             q[3:7] = euler.as_quat()[[3, 0, 1, 2]]
     q[2:3] = left.pop("height", q[2])
     for k, name in enumerate(("spin x", "spin y", "spin z")):
-        v[3 + k] = left.pop(name, v[3 + k])
+        if name in left:
+            v[3 + k] = left.pop(name)
     for k, joints in enumerate(np.repeat(model.joints_each, 2)):
         place = len(q) - model.nu + k
         name = f"bend {k // 2 + 1} {('pitch', 'yaw')[k % 2]}"
