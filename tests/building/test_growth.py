@@ -136,10 +136,7 @@ def test_a_loaded_model_and_what_no_model_has_are_refused(small):
     refused = (st.ModelError, SceneError)  # the generator of these tests runs in this process
     for ask, words in (
         (lambda: loaded.mass_matrix(Q), r"without 'mass_matrix' .*\+mass_matrix"),
-        (
-            lambda: st.simulate(loaded, Q, V, t_span=0.1),
-            r"'rollout', 'momentum' .*\+rollout",
-        ),
+        (lambda: st.simulate(loaded, Q, V, t_span=0.1), r"'rollout', 'momentum' .*\+rollout"),
         (lambda: flat.casadi.momentum, r"without 'momentum' .*\+momentum"),
         (lambda: small.kernel("mass_matrx"), "did you mean 'mass_matrix'"),
         (lambda: small.casadi.crba, "did you mean 'mass_matrix'"),

@@ -8,7 +8,7 @@ import numpy as np
 
 from serpentail_scene.signatures.table import EXACT_DERIVATIVES
 from tests.references.parameters import random_states
-from tests.support import collocation, zoo
+from tests.support import slopes, zoo
 
 LAST = {"inverse_dynamics": "v_dot", "forward_dynamics": "tau"}
 KINDS = ("random", "straight", "folded")
@@ -36,7 +36,7 @@ class Model:
     def pair(self, function, kind):
         """A derivative of the compiled function, and of the SX function."""
         both = (self.external(function), self.module.function(function))
-        return [collocation.derivatives(f)[kind] for f in both]
+        return [slopes.derivatives(f)[kind] for f in both]
 
     def inputs(self, function, state):
         """The inputs of a function at a state (q, v, v_dot, tau), parameters included."""

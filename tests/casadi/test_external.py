@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.references.parameters import random_states
-from tests.support import collocation, zoo
+from tests.support import slopes, zoo
 from tests.support.rows import row
 
 from .externals import LAST, model_of
@@ -36,10 +36,10 @@ def test_derivatives_are_those_of_the_symbolic_function(tail):
                 assert ports(compiled) == ports(symbolic)
             for label, state in model.states().items():
                 at = model.inputs(name, state)
-                expected = collocation.blocks(symbolic, at)
-                for block, found in collocation.blocks(compiled, at).items():
+                expected = slopes.blocks(symbolic, at)
+                for block, found in slopes.blocks(compiled, at).items():
                     with row(name, kind, label, block):
-                        assert collocation.difference(found, expected[block]) <= 1e-12
+                        assert slopes.difference(found, expected[block]) <= 1e-12
 
 
 def dense(sparsity):
@@ -58,7 +58,7 @@ def test_sparsity_is_that_of_the_numbers(tail):
         for kind in DERIVED:
             (compiled, symbolic), seen = model.pair(name, kind), {}
             for state in states:
-                found = collocation.blocks(symbolic, model.inputs(name, state))
+                found = slopes.blocks(symbolic, model.inputs(name, state))
                 for block, values in found.items():
                     sizes = np.abs(values.full())
                     numbers = sizes > 1e-14 * np.max(sizes, initial=0)
@@ -71,18 +71,6 @@ def test_sparsity_is_that_of_the_numbers(tail):
                     else:
                         np.testing.assert_array_equal(pattern, numbers)
                         assert not np.any(pattern & ~dense(symbolic.sparsity_out(block)))
-
-
-def test_plan_is_that_of_the_symbolic_function():
-    model = model_of("m1_n3")
-    for name in LAST:
-        both = (model.external(name), model.module.function(name))
-        found, expected = (collocation.plan(f, model.vector) for f in both)
-        with row(name):
-            assert found.success and expected.success
-            assert found.iter_count == expected.iter_count
-            assert found.value == pytest.approx(expected.value, rel=1e-12)
-            assert collocation.difference(found.x, expected.x) < 1e-9
 
 
 def test_first_derivatives_by_parameters_are_exact_and_second_ones_no_number():
@@ -99,7 +87,7 @@ def test_first_derivatives_by_parameters_are_exact_and_second_ones_no_number():
                 seeds = {key: np.cos(np.arange(g.numel_in(key))) for key in seeds}
                 blocks.append(g(**at, **{f"out_{out}": 0}, **seeds)[block])
             with row(name, kind):
-                assert collocation.difference(*blocks) < 1e-12
+                assert slopes.difference(*blocks) < 1e-12
         total = casadi.sum1(f(*x))
         mixed = casadi.jacobian(casadi.gradient(total, x[0]), x[3])
         second = [casadi.hessian(total, x[3])[0], mixed, casadi.hessian(total, x[1])[0]]

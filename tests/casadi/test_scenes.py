@@ -12,7 +12,7 @@ import pytest
 import serpentail as st
 from serpentail_scene.signatures.table import EXACT_DERIVATIVES
 from tests.references.parameters import random_states
-from tests.support import collocation, zoo
+from tests.support import slopes, zoo
 from tests.support.models import folder_of
 from tests.support.rows import row
 
@@ -139,7 +139,7 @@ def test_every_casadi_takes_the_same_library(tmp_path, version):
         pytest.skip(f"pip cannot install casadi{version}: {done.stderr.strip()[-300:]}")
     parameters = ",".join(map(repr, map(float, small.vector.full().ravel())))
     module = [str(small.folder), f"{small.name}_casadi", str(small.library), parameters]
-    command = [python, collocation.__file__, *module]
+    command = [python, slopes.__file__, *module]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done
     found = re.fullmatch(r"casadi (\S+): all agree", done.stdout.splitlines()[-1])

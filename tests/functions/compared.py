@@ -21,9 +21,6 @@ def marked(more=(), quick=()):
     ]
 
 
-every_free = pytest.mark.parametrize("name", marked())
-
-
 @cache
 def model_of(name):
     """A model; the stops of a passive tail stiffen on so long a way that states are on it."""

@@ -53,18 +53,6 @@ def test_a_torso_falls_at_its_terminal_velocity():
     assert model.air_force(q, v)[2] == pytest.approx(weight, rel=1e-14)
 
 
-@every_model
-def test_air_that_rests_takes_energy_and_air_that_moves_along_does_nothing(name):
-    model = zoo.model(name).with_parameters(wind=(0, 0, 0))
-    for q, v, _ in moving(model):
-        assert model.air_force(q, v) @ v < 0 or not v.any()
-    if not model.fixed:
-        model = zoo.model(name)
-        v = np.zeros(model.nv)
-        v[:3] = model.parameters["wind"]
-        np.testing.assert_array_equal(model.air_force(q, v), 0)
-
-
 def test_all_functions_of_forces_are_those_of_still_air_less_its_force():
     model, plain = zoo.model("air"), zoo.model("m2_n2")
     for q, v, s in moving(model):

@@ -12,7 +12,7 @@ from serpentail_codegen.ir.cost import executed
 from serpentail_scene.parameters import PASSIVE, PASSIVE_NAMES
 from tests.functions.test_columns import assert_same
 from tests.references.metrics import block_error
-from tests.references.parameters import TABLE_1, random_states
+from tests.references.parameters import random_states
 from tests.references.passive import PassiveTail
 from tests.support import zoo
 from tests.support.rows import row
@@ -104,16 +104,6 @@ def test_dynamics_and_energy_have_the_passive_parts(pair):
         stored, found = pair.reference.energy(q[7:]), pair.elastic.energy(q, v)
         assert found[0] == pytest.approx(kinetic, rel=1e-15) and stored > 0
         assert found[1] == pytest.approx(potential + stored, rel=1e-13, abs=1e-15)
-
-
-def test_mujoco_with_these_torques_accelerates_alike():
-    pytest.importorskip("mujoco")
-    from tests.references.mujoco_chain import MujocoChain
-
-    pair, peer = Pair("elastic"), MujocoChain(TABLE_1, 2, 2)
-    for q, v, _, tau in pair.states():
-        expected = peer.forward_dynamics(q, v, tau - pair.force(q, v))
-        assert block_error(pair.elastic.forward_dynamics(q, v, tau), expected) < 1e-9
 
 
 @pytest.mark.parametrize("gains", [(0.0, 0.0), (4e4, 400.0)], ids=["free", "tracked"])

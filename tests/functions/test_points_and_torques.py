@@ -4,61 +4,9 @@ import numpy as np
 import pytest
 
 from tests.references.contact import attitude, joints
-from tests.references.exact_chain import ExactChain
-from tests.references.exact_continuum import ExactContinuum
-from tests.references.exact_polar import ExactPolar
-from tests.references.parameters import TABLE_1, random_states
+from tests.references.parameters import random_states
 from tests.support import zoo
-from tests.support.derivative_models import of_every_kind
 from tests.support.rows import row
-
-ROUNDINGS = 1e-14  # of the largest number; 45 times the eps of double
-every_tail = pytest.mark.parametrize("name", ["m1_n1", "m2_n2", "loops", "arcs2_loops", "polar"])
-
-
-def reference_of(model):
-    """The exact reference of a model."""
-    if model.kind == "articulated":
-        return ExactChain(dict(TABLE_1), model.segments, model.links)
-    of = ExactPolar if model.name == "polar" else ExactContinuum
-    return of(dict(TABLE_1), model.segments)
-
-
-def states_of(model):
-    """Arrays q, v of all kinds; polar angles theta are kept off 0, where they are singular."""
-    q, v = (np.array([s[x] for _, s in of_every_kind(model)]) for x in ("q", "v"))
-    if model.name == "polar":
-        q[:, 8::2] = 0.05 + abs(q[:, 8::2])
-    return q, v
-
-
-@every_tail
-def test_the_center_of_mass_is_that_of_the_exact_reference(name):
-    model = zoo.model(name)
-    reference, (q, v) = reference_of(model), states_of(model)
-    for state in list(zip(q, v, strict=True))[::2]:
-        expected = reference.center_of_mass(*state)
-        for found, values in zip(model.center_of_mass(*state), expected, strict=True):
-            assert found.shape == values.shape
-            assert np.max(abs(found - values)) <= ROUNDINGS * np.max(abs(values))
-    found = model.casadi.center_of_mass(*state)
-    for x, values in zip(found, expected, strict=True):
-        error = x.full() - np.reshape(values, x.shape)
-        assert np.max(abs(error)) <= ROUNDINGS * np.max(abs(values))
-
-
-@every_tail
-def test_place_and_speed_of_B_add_to_the_centers_and_cost_no_digits(name):
-    model = zoo.model(name)
-    q, v = states_of(model)
-    position, velocity, J = model.center_of_mass(q, v)
-    q[:, :3] += [1, 2, 4]
-    v[:, :3] += [8, 16, 32]
-    further, faster, same = model.center_of_mass(q, v)
-    np.testing.assert_allclose(further - position, np.tile([1, 2, 4], (len(q), 1)), rtol=1e-14)
-    np.testing.assert_allclose(faster - velocity, np.tile([8, 16, 32], (len(q), 1)), rtol=1e-14)
-    assert np.array_equal(same, J)
-
 
 LEGS = {"L_h2d": 0.01, "L_d2k": 0.02, "L_k2a": 0.03, "L_a2m": 0.04, "L_m2t": 0.05}
 

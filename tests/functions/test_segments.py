@@ -46,15 +46,6 @@ def test_accelerations_are_exact_to_rounding(name):
         assert_exact(model, exact, at, state, 1e-14, limit)
 
 
-@pytest.mark.slow
-def test_many_segments_are_exact_too():
-    """The size is the point."""
-    model, exact = long_model(8, 16), ExactChain(TABLE_1, 8, 16)
-    for at, state in states(8):
-        if at in ("random 0", "folded 1", "coiled 0", "coiled 1"):
-            assert_exact(model, exact, at, state, limit=1e-13)
-
-
 @pytest.mark.parametrize("arcs", [5, pytest.param(16, marks=pytest.mark.slow)])
 def test_many_arcs_are_exact_too(arcs):
     """The size is the point: lanes that fill no vector, and two vectors."""
@@ -75,10 +66,3 @@ def test_many_arcs_are_exact_too(arcs):
     q[-1] = 6.4
     with pytest.raises(st.StateError, match=rf"segment {arcs} .*6\.4"):
         model.forward_dynamics(q, v, tau)
-
-
-def long_model(segments, links):
-    """A model of forward dynamics alone, by segments."""
-    model = st.load(model_folder(segments, links, functions=[FUNCTION]))
-    assert model.manifest["functions"][FUNCTION]["emission"] == "segments"
-    return model

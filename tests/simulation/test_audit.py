@@ -53,10 +53,7 @@ def test_work_and_impulses_are_the_integrals_of_the_samples():
         for group, impulse in run.info["impulse_N_s"].items():
             expected = integral(run.contact.of(group).forces.sum(axis=1))
             assert impulse == pytest.approx(expected, abs=8e-6), group
-        lost, done = (
-            integral(-(rates**2) @ damping),
-            integral(rates @ torque),
-        )
+        lost, done = (integral(-(rates**2) @ damping), integral(rates @ torque))
         lost, done = (lost, 0.0) if isinstance(law, st.Damping) else (0.0, done)
         assert work["damping"] == pytest.approx(lost, abs=1e-9 + 1e-5 * abs(lost))
         assert work["torques"] == pytest.approx(done, abs=1e-9 + 1e-5 * abs(done))

@@ -26,15 +26,6 @@ def plan():
     return planned(intervals=40, tolerance=None)
 
 
-def test_a_disturbed_tail_returns_to_the_plan():
-    q, v = start(rat())
-    q[7:] += 0.05
-    how = {"controller": st.Pfl(rat(), plan()), "t_span": plan().duration, "method": "dop853"}
-    flight = st.simulate(rat(), q, v, **how).resample(plan().trajectory.t)
-    error = np.abs(flight.tail - plan().trajectory.tail).max(axis=1)
-    assert error[0] > 0.049 and error[-1] < 1e-4
-
-
 def test_tracking_a_plan_takes_the_planned_torques():
     """On the planned motion Eq. 46 is Eq. 1 solved for tau, at its ends, too, where one by rates is
     further off.

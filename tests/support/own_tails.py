@@ -12,10 +12,7 @@ TORSO = zoo.TORSO | {"tail_mount": zoo.MOUNTED["tail_mount"]}
 VALUES = {name: tuple(x) if isinstance(x, list) else x for name, x in TORSO.items()}
 LINK_BODIES = (
     [Link(5e-4, 0.02, 0.01, (4e-8, 2e-9, 3e-8))] * 3,
-    [
-        Link(5e-4, 0.03, 0.014, (3e-8, 2e-9, 4e-8)),
-        Link(4e-4, 0.025, 0.012, (2e-8, 1e-9, 1e-8)),
-    ],
+    [Link(5e-4, 0.03, 0.014, (3e-8, 2e-9, 4e-8)), Link(4e-4, 0.025, 0.012, (2e-8, 1e-9, 1e-8))],
     [Link(1e-4, 0.01, 0.005, (2e-9, 1e-9, 2e-9))] * 2,
 )
 ARC_BODIES = (Arc(1.5e-3, 0.06, 3), Arc(1.1e-3, 0.09, 3))

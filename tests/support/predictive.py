@@ -168,10 +168,6 @@ def least_squares(R, c, sides, rooms) -> np.ndarray:
     return turned @ y
 
 
-def _row(room, slope) -> dict:
-    return {"type": "ineq", "fun": lambda y: room + slope @ y, "jac": lambda _: slope}
-
-
 def correction_of(mpc: st.Mpc) -> np.ndarray:
     """Return the correction (N 2m,) of the last tick that did not fail."""
     size = mpc.settings.intervals * mpc.model.layout.nt

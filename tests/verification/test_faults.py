@@ -95,44 +95,14 @@ def test_every_slight_fault_disagrees_with_references():
         assert wanted <= found, reference.title
 
 
-def asymmetric(H, _q):
-    """One entry off by one bit."""
-    H[..., 7, 1] = np.nextafter(H[..., 7, 1], 1)
-    return H
+def put(entry, change):
+    """A change of one entry of each matrix."""
 
+    def changed(H, *_):
+        H[(..., *entry)] = change(H[(..., *entry)])
+        return H
 
-def indefinite(H, _q):
-    """A negative moment of inertia."""
-    H[..., 7, 7] *= -1
-    return H
-
-
-def placed(force, q, _v):
-    """Depends on where B is."""
-    return force + 1e-12 * q[..., :1]
-
-
-def tilted(force, *_):
-    """Gravity that is not along z."""
-    force[..., 0] += SLIGHT_FAULT
-    return force
-
-
-def folded_only(H, q):
-    """Wrong for folded tails alone."""
-    return H * (1 + SLIGHT_FAULT * (np.abs(q[..., 7:]).max() > 3))
-
-
-def scaled_attitude(H, q):
-    """Depends on the quaternion's norm."""
-    return H + 1e-14 * np.linalg.norm(q[..., 3:7])
-
-
-def batch_only(H, q):
-    """Wrong in the last state of a batch."""
-    if q.ndim == 2:
-        H[-1, 0, 0] *= 1 + SLIGHT_FAULT
-    return H
+    return changed
 
 
 class Drifting:
@@ -151,73 +121,57 @@ def refused(_result, *_):
     raise st.StateError("refused")
 
 
-def slower(center, *_):
-    """The velocity of the centre of mass alone is wrong."""
-    position, velocity, J = center
-    return position, velocity * (1 + SLIGHT_FAULT), J
+def batch_only(H, q):
+    """Wrong in the last state of a batch."""
+    if q.ndim == 2:
+        H[-1, 0, 0] *= FACTOR
+    return H
 
 
-def stretched(points, q):
-    """Links that are too long."""
-    mount = points[..., :1, :]
-    return mount + (points - mount) * (1 + SLIGHT_FAULT)
+def of_one(which):
+    """A change of one of several results alone."""
+    return lambda results, *_: [x * FACTOR ** (k == which) for k, x in enumerate(results)]
 
 
-def swapped(J, _q):
-    """Columns of alpha and beta in the wrong order."""
-    J[..., [6, 7]] = J[..., [7, 6]]
-    return J
-
-
-def unloaded(v_dot, *arguments):
-    """A load at the tip that does half of what it should."""
-    return v_dot - SLIGHT_FAULT * np.sum(np.abs(arguments[3]))
-
-
-def bent(joints, *_):
-    """The knees alone are in the wrong place."""
-    joints[..., 2, :] *= 1 + SLIGHT_FAULT
-    return joints
-
-
-def ajar(points, *_):
-    """The velocities of the points alone are wrong."""
-    return points[0], points[1] * (1 + SLIGHT_FAULT)
-
-
-def pulling(found, *_):
-    """A ground that holds back what leaves it."""
-    return *found[:2], found[2] - [0, 0, 1e-3]
-
-
-def gusty(force, *_):
-    """Air that never rests."""
-    return force + 1e-9
-
-
+FACTOR = 1 + SLIGHT_FAULT
+ONE_BIT = put((7, 1), lambda x: np.nextafter(x, 1))
+TILTED = put((0,), lambda x: x + SLIGHT_FAULT)  # gravity that is not along z
+FOLDED = lambda H, q: H * (1 + SLIGHT_FAULT * (np.abs(q[..., 7:]).max() > 3))  # noqa: E731
+SCALED = lambda H, q: H + 1e-14 * np.linalg.norm(q[..., 3:7])  # noqa: E731
+STRETCHED = lambda x, _: x[..., :1, :] + (x - x[..., :1, :]) * FACTOR  # noqa: E731
+UNLOADED = lambda v_dot, *given: v_dot - SLIGHT_FAULT * np.sum(np.abs(given[3]))  # noqa: E731
+PULLING = lambda found, *_: (*found[:2], found[2] - [0, 0, 1e-3])  # noqa: E731
 FAULTS = [
-    ("mass_matrix", asymmetric, "mass matrix is symmetric"),
-    ("mass_matrix", indefinite, "mass matrix is positive definite"),
-    ("bias_force", placed, "position and speed of the torso do not matter"),
-    ("bias_force", tilted, "pose in the world turns all alike"),
-    ("forward_dynamics", tilted, "pose in the world turns all alike"),
-    ("mass_matrix", folded_only, "kinetic energy is half v H v"),
-    ("mass_matrix", scaled_attitude, "quaternion has no norm and no sign"),
+    ("mass_matrix", ONE_BIT, "mass matrix is symmetric"),
+    ("mass_matrix", put((7, 7), np.negative), "mass matrix is positive definite"),
+    (
+        "bias_force",
+        lambda force, q, _: force + 1e-12 * q[..., :1],
+        "position and speed of the torso do not matter",
+    ),
+    ("bias_force", TILTED, "pose in the world turns all alike"),
+    ("forward_dynamics", TILTED, "pose in the world turns all alike"),
+    ("mass_matrix", FOLDED, "kinetic energy is half v H v"),
+    ("mass_matrix", SCALED, "quaternion has no norm and no sign"),
     ("mass_matrix", batch_only, "batches are singles"),
     ("bias_force", Drifting(), "calls repeat"),
     ("momentum", refused, "momentum is mass times velocity"),
-    ("center_of_mass", slower, "velocity of the center of mass is J v"),
-    ("center_of_mass", slower, "momentum is mass times velocity of the center of mass"),
-    ("tail_points", stretched, "links have their length"),
-    ("tail_points", stretched, "jacobians are the derivatives of the points"),
-    ("tail_point_jacobians", swapped, "jacobians are the derivatives of the points"),
-    ("forward_dynamics_external", unloaded, "loads accelerate by their generalised force"),
-    ("leg_points", bent, "legs have their lengths"),
+    ("center_of_mass", of_one(1), "velocity of the center of mass is J v"),
+    ("center_of_mass", of_one(1), "momentum is mass times velocity of the center of mass"),
+    ("tail_points", STRETCHED, "links have their length"),
+    ("tail_points", STRETCHED, "jacobians are the derivatives of the points"),
+    (
+        "tail_point_jacobians",
+        lambda J, _: J[..., [0, 1, 2, 3, 4, 5, 7, 6]],
+        "jacobians are the derivatives of the points",
+    ),
+    ("forward_dynamics_external", UNLOADED, "loads accelerate by their generalised force"),
+    ("leg_points", put((2, slice(None)), lambda x: x * FACTOR), "legs have their lengths"),
     ("air_force", times(-1), "air that rests takes energy"),
-    ("forward_dynamics", times(1 + SLIGHT_FAULT), "torques that make up for it rid a tail of it"),
-    ("air_force", gusty, "air that moves along does nothing"),
-    ("contact_points", ajar, "velocities are the rates of the points"),
-    ("contact_dynamics", pulling, "the ground never pulls nor holds by more than friction"),
+    ("forward_dynamics", times(FACTOR), "torques that make up for it rid a tail of it"),
+    ("air_force", lambda force, *_: force + 1e-9, "air that moves along does nothing"),
+    ("contact_points", of_one(1), "velocities are the rates of the points"),
+    ("contact_dynamics", PULLING, "the ground never pulls nor holds by more than friction"),
 ]
 
 

@@ -50,23 +50,3 @@ def test_thin_links_tend_to_the_continuum_and_thick_ones_keep_their_thickness():
     coarse, fine = (difference(links, thin=True) for links in (128, 256))
     assert coarse / fine == pytest.approx(2, abs=0.05)
     assert difference(256) - fine == pytest.approx(-0.0030, abs=1e-4)
-
-
-def test_directions_of_the_com_are_those_of_its_position():
-    bend, links, samples = 2.0, 5, 20_000
-    joints = bend * np.arange(1, links + 1) / links
-    ends = np.cumsum(np.stack([np.sin(joints), np.cos(joints)]), axis=1)
-    x, y = (ends - np.stack([np.sin(joints), np.cos(joints)]) / 2).mean(axis=1)
-    assert swing.chain_direction(np.array(bend), links) == pytest.approx(
-        np.arctan2(x, y), rel=1e-14
-    )
-    assert swing.chain_direction(np.array(bend), samples) == pytest.approx(
-        swing.arc_direction(bend), abs=2 / samples
-    )
-
-
-def test_bends_have_the_wanted_directions():
-    targets = swing.com_directions()
-    bends = swing.bend_towards(swing.arc_direction, targets)
-    assert (bends[0], bends[-1]) == (pytest.approx(0, abs=1e-12), pytest.approx(np.pi, rel=1e-12))
-    np.testing.assert_allclose(swing.arc_direction(bends[1:]), targets[1:], rtol=0, atol=1e-11)

@@ -158,27 +158,6 @@ def test_a_check_passes_up_to_its_limit_and_states_its_law_where_it_failed():
     assert re.search(r"FAILED random\n +A law\.", verify.as_text(zoo.model("bare"), [check]))
 
 
-def test_command_writes_reports_and_returns_one_where_a_check_failed(tmp_path, capsys, monkeypatch):
-    pytest.importorskip("pinocchio")
-    folder, output = zoo.folder("bare"), tmp_path / "reports"
-    assert verify_model.report(folder, output) == 0
-    report = json.loads((output / "bare.json").read_text())
-    assert report["passed"] and report["counts"]["failed"] == 0
-    text, printed = (output / "bare.txt").read_text(), capsys.readouterr().out
-    assert re.search(r"^  calls repeat +0 +0$", text, re.MULTILINE)
-    assert re.search(r"^  Pinocchio +1 +0 +8   ", printed, re.MULTILINE)
-    assert len(printed.splitlines()) < 12 and text.startswith(printed.partition("  report")[0])
-    bad = [verify.Check("name", "Law.", 2.0, 1.0)]
-    monkeypatch.setattr(verify_model, "verify", lambda folder: bad)
-    assert verify_model.report(folder, output) == 1
-    assert "FAILED" in capsys.readouterr().out
-    monkeypatch.undo()
-    assert verify_model.report(tmp_path, tmp_path) == 2
-    assert "manifest.json" in capsys.readouterr().err
-    assert verify_model.report(zoo.folder("polar"), tmp_path) == 2
-    assert "polar" in capsys.readouterr().err
-
-
 # Measures and states
 
 

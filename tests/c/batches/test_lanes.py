@@ -28,17 +28,7 @@ from tests.support import zoo
 from tests.support.models import folder_of
 from tests.support.rows import row
 
-from .tails import (
-    GROUND,
-    TOUCHING,
-    alone,
-    batched,
-    evaluated,
-    given,
-    in_lanes,
-    on_ground,
-    states,
-)
+from .tails import GROUND, TOUCHING, alone, batched, evaluated, given, in_lanes, on_ground, states
 
 FREE = ("m2_n2", "arcs1", "fixed")
 FREE_SLOW = ("straight", "loops", "segments", "single", "arcs2_loops", "arcs2", "mixed", "baked")
