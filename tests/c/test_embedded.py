@@ -3,7 +3,6 @@ frames add up to, their costs are true.
 """
 
 import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -16,7 +15,6 @@ from tests.support.predictive import plan_of
 from tests.support.rows import row
 from tests.support.toolchains import board
 
-ROOT = boards.HERE.parents[1]
 CROSS = [name for name in boards.BOARDS if name != "host"]
 LIBC_STACK = 16  # bytes: what memset and memcpy push, which no call graph of ours has
 # bytes: branches that the stored states do not take, such as angles beyond all reason
@@ -241,20 +239,3 @@ def test_stack_adds_up_along_calls_or_is_unknown(tmp_path):
     for change, words in (({"callee": "f"}, "calls itself"), ({"kind": "dynamic"}, "dynamic")):
         with pytest.raises(costs.StackUnknown, match=words):
             deepest(**change)
-
-
-def test_missing_tools_are_named_with_their_packages(tmp_path):
-    document = ROOT / "docs" / "embedded.md"
-    before, bare = document.read_bytes(), str(zoo.folder("bare"))
-    commands = {name: ["checks.embedded", bare, "--board", name] for name in CROSS}
-    commands["report"] = ["checks.embedded.sizes"]
-    settings = {"cwd": tmp_path, "env": {"PATH": "", "PYTHONPATH": str(ROOT)}, "text": True}
-    for name, words in commands.items():
-        command = [sys.executable, "-m", *words]
-        done = subprocess.run(command, capture_output=True, check=False, **settings)
-        wanted = boards.BOARDS[name if name in CROSS else "m4"]
-        with row(name):
-            assert done.returncode == 2 and "Traceback" not in done.stderr
-            assert wanted.compiler in done.stderr
-            assert f"--no-install-recommends {' '.join(wanted.packages)}" in done.stderr
-    assert document.read_bytes() == before

@@ -23,7 +23,6 @@ from jsonschema import Draft7Validator
 
 from serpentail.scenes.schema import scene_schema
 from serpentail_codegen.scene.parse import parse_scene
-from tests.support.makes import away_from_make, stand_in
 
 ROOT = Path(__file__).parents[2]
 ABOVE = ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md")
@@ -38,6 +37,14 @@ NOT_RUN = "not-run:"
 STRICT = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror")
 LINKED = ("runtime", "codegen", "scenes", "tests", "checks", "benchmarks", "docs")
 LINKED += ("Makefile", "pyproject.toml", "hatch_build.py", "viewer")
+# what a make that runs these tests says to every make below it, EXTRAS of CI's command among it
+OF_MAKE = re.compile(r"MAKE|MFLAGS|(EXTRAS|UV|TAIL|M|N|SCENE|REAL|EMISSION|BAKED|FUNCTIONS)$")
+STAMPS = (".draws", ".paged", ".ready")  # of what is installed, each after those before it
+# Programs of .venv: this interpreter, and no installation, which would reach the real environment.
+PROGRAM = """#!/bin/sh
+case "$*" in *"pip install"*) echo "no pip in here" >&2; exit 9;; esac
+exec {} "$@"
+"""
 OF_RUNTIME = ("simulate", "plan", "identify", "sweep", "phase")  # tables that the runtime reads
 
 
@@ -69,6 +76,20 @@ def blocks(page: Path) -> list[Block]:
     return found
 
 
+def stand_in(tree: Path) -> None:
+    """Give a folder a .venv that is ready, whose programs are those of this interpreter."""
+    programs = tree / ".venv" / "bin"
+    programs.mkdir(parents=True)
+    for name, command in (
+        ("python", sys.executable),
+        ("serpentail", f"{sys.executable} -m serpentail.cli.cli"),
+    ):
+        (programs / name).write_text(PROGRAM.format(command))
+        (programs / name).chmod(0o755)
+    for stamp in STAMPS:
+        (tree / ".venv" / stamp).touch()
+
+
 def run_page(page: Path, folder: Path) -> str:
     """Run the blocks of a page in a folder like a checkout; return what they print."""
     for name in LINKED:
@@ -77,7 +98,7 @@ def run_page(page: Path, folder: Path) -> str:
     stand_in(folder)
     names: dict = {"__name__": "page"}
     printed = io.StringIO()
-    own = away_from_make()
+    own = {name: value for name, value in os.environ.items() if not OF_MAKE.match(name)}
     own["PATH"] = f"{folder}/.venv/bin:{Path(sys.executable).parent}:{os.environ['PATH']}"
     todo = [block for block in blocks(page) if not block.reason]
     with mock.patch.dict(os.environ, own, clear=True), chdir(folder), redirect_stdout(printed):

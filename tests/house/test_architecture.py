@@ -1,10 +1,8 @@
 """The house rules that a machine can check: who imports what, how large things are, what the
-project says of itself; and make, which builds what is asked for, once.
+project says of itself.
 """
 
-import os
 import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -16,7 +14,6 @@ import serpentail_codegen
 from checks.mutants import results, sample
 from checks.mutants.recorded import NO_JUDGES
 from tests.house import file_lengths
-from tests.support.makes import away_from_make, stand_in
 from tests.support.rows import row
 
 CODEGEN, RUNTIME = (Path(package.__file__).parent for package in (serpentail_codegen, serpentail))
@@ -79,83 +76,3 @@ def test_mutants_that_are_argued_away_are_those_of_lines_that_are_there():
             of_file = sample.of_file(ROOT, entry["file"])
             assert any(results.argument(mutation, [entry]) for mutation in of_file)
     assert all((ROOT / name).is_file() for name in NO_JUDGES)
-
-
-NAME = "articulated_m1_n1_fc4a05d"  # of these functions
-ORDER = ("TAIL=articulated", "M=1", "N=1", "FUNCTIONS=mass_matrix")
-
-
-@pytest.mark.slow
-def test_what_is_there_is_not_made_again_and_what_was_lost_is(tmp_path):
-    """In a copy of what make builds from, away from a make that runs these tests."""
-    for name in ("Makefile", "pyproject.toml"):
-        shutil.copy2(ROOT / name, tmp_path)
-    for name in ("codegen", "scenes"):
-        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
-    stand_in(tmp_path)
-    own = {name: value for name, value in away_from_make().items() if name != "CC"}
-    own |= {"PYTHONPATH": str(tmp_path / "codegen"), "LC_ALL": "C", "UV": ""}
-
-    def make(**more):
-        command = ["make", "model", "TAIL=articulated", "M=1", "N=1", "FUNCTIONS=mass_matrix"]
-        return subprocess.run(
-            command, cwd=tmp_path, env=own | more, capture_output=True, text=True, check=False
-        )
-
-    failed = make(CC="no-such-cc", SERPENTAIL_CACHE=str(tmp_path / "cache"))
-    assert failed.returncode == 2 and "CC='no-such-cc'" in failed.stderr
-    first, name = make(), "articulated_m1_n1_fc4a05d"  # of these functions
-    assert first.returncode == 0 and f"{name}: 1 x 1 links" in first.stdout
-    folder = tmp_path / "generated" / name
-    before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
-    assert re.fullmatch(rf"generated/{name}: up to date, \d+\.\d\d s\n", make().stdout)
-    assert {path: path.stat().st_mtime_ns for path in folder.rglob("*")} == before
-    readme = (folder / "README.md").read_bytes()
-    (folder / "README.md").unlink()
-    assert "1 files written" in make().stdout
-    assert (folder / "README.md").read_bytes() == readme
-
-
-UV = """#!/bin/sh
-case $SERPENTAIL_PAGE in later) exit;; esac
-exec {} -c 'import os; from hatch_build import PageHook
-PageHook(os.getcwd(), {{}}, None, None, "", "wheel").initialize("editable", {{"artifacts": []}})'
-"""
-NODE = "case $1 in --version) echo v20.1.0;; *) echo page > $2;; esac"
-NPM = "echo 'npm error code E403' >&2; echo 'npm error  403 Forbidden' >&2; exit 1"
-
-
-def test_why_there_is_no_page_is_told_in_a_line_and_it_is_tried_again(tmp_path):
-    """Installers hide what a hook of the build tells."""
-    pytest.importorskip("hatchling")
-    for name in ("Makefile", "pyproject.toml", "hatch_build.py"):
-        shutil.copy2(ROOT / name, tmp_path)
-    for name in ("viewer", "runtime/serpentail/show/page", "bin"):
-        (tmp_path / name).mkdir(parents=True)
-    stand_in(tmp_path)
-    stamps = {name: tmp_path / ".venv" / f".{name}" for name in ("draws", "paged", "ready")}
-    stamps["paged"].unlink()
-    stamps["ready"].unlink()
-
-    def program(name, text):
-        (tmp_path / "bin" / name).write_text(text if text[0] == "#" else f"#!/bin/sh\n{text}\n")
-        (tmp_path / "bin" / name).chmod(0o755)
-
-    for name, text in {"uv": UV.format(sys.executable), "node": NODE, "npm": NPM}.items():
-        program(name, text)
-    own = away_from_make() | {"LC_ALL": "C", "PATH": f"{tmp_path}/bin:{os.environ['PATH']}"}
-
-    def told():
-        command = ["make", "-s", "setup", "UV=uv"]
-        said = subprocess.run(command, cwd=tmp_path, env=own, capture_output=True, check=True)
-        return said.stdout.decode()
-
-    for _ in range(2):
-        reason = "npm error code E403 npm error 403 Forbidden"
-        assert re.fullmatch(f"no page of runs, .*npm: {reason}\n", told())
-        assert stamps["ready"].exists() and not stamps["paged"].exists()
-    program("npm", "exit 0")
-    assert told() == "" and stamps["paged"].exists()
-    page = tmp_path / "runtime/serpentail/show/page/page.html"
-    page.unlink()
-    assert told() == "" and not page.exists()  # what was made is not made again

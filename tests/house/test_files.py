@@ -265,6 +265,7 @@ def test_a_full_disk_keeps_the_old_file(tmp_path):
 KILLED = {
     "run.npz": WRITERS["run.npz"],
     "run.csv": lambda motion, path: dataclasses.replace(motion, model=None).to_csv(path),
+    "run.nc": lambda motion, path: dataclasses.replace(motion, model=None).to_netcdf(path),
     "run.html": st.view,
 }
 

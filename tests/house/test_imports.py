@@ -23,13 +23,13 @@ from tests.support.rows import row
 
 ROOT = Path(__file__).parents[2]
 HEAVY = ["casadi", "jinja2", "matplotlib", "mpmath", "numpy", "scipy", "serpentail_codegen"]
-HEAVY += ["serpentail.show.page", "sympy"]
+HEAVY += ["pandas", "serpentail.bridges.containers", "serpentail.show.page", "sympy", "xarray"]
 FLIGHT = """
 import sys, serpentail as st
 model = st.load(sys.argv[1])
 settings = {"controller": st.Damping(), "t_span": 0.01}
 flight = st.simulate(model, [0, 0, 0, 1, 0, 0, 0, 0, 0], [0] * 8, **settings)
-assert len(flight.t) == 201
+assert len(flight.t) == 201 and st.Rollouts and st.Plan
 """
 # of the generator, what works without SymPy
 BARE = ("ir.tape", "ir.interpret", "autodiff.reverse", "passes.schedule", "scene.parse")

@@ -39,4 +39,5 @@ def test_the_hook_leaves_the_page_to_later_or_removes_what_it_cannot_make(
         assert data == {"force_include": {}, "artifacts": [MADE]}
     hook.initialize("standard", data)
     assert not page.exists() and "without the page of runs" in capsys.readouterr().err
+    assert (tmp_path / ".build" / "page_missing").read_text().count("\n") == 1  # told by make
     assert data["force_include"] == {str(tmp_path / "scenes"): "serpentail/examples"}

@@ -3,9 +3,7 @@
 import csv
 import dataclasses
 import json
-import subprocess
 import sys
-from unittest import mock
 
 import numpy as np
 import pytest
@@ -196,18 +194,6 @@ def test_tables_of_runs_have_two_indices(runs, tmp_path):
     equal(columns["forces_feet_right_T_z [N]"][:21], runs[0].contact.forces[:, 2, 2])
 
 
-def test_files_are_whole_or_not_there(tmp_path, monkeypatch):
-    path = tmp_path / "a"
-    path.write_text("before")
-    monkeypatch.setattr("pathlib.Path.replace", mock.Mock(side_effect=OSError(28, "no room")))
-    for method in (FLIGHT.to_csv, FLIGHT.to_netcdf):
-        with pytest.raises(st.NotWritten, match="no room"):
-            method(path)
-        with pytest.raises(st.NotWritten, match="not written"):
-            method(path / "below")
-        assert path.read_text() == "before" and [*tmp_path.iterdir()] == [path]
-
-
 def test_an_extra_that_is_missing_is_named_and_csv_needs_none(monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "xarray", None)
     monkeypatch.setitem(sys.modules, "pandas", None)
@@ -218,16 +204,6 @@ def test_an_extra_that_is_missing_is_named_and_csv_needs_none(monkeypatch, tmp_p
         FLIGHT.to_netcdf(tmp_path / "a.nc")
     assert not list(tmp_path.iterdir())
     assert FLIGHT.to_csv(tmp_path / "a.csv").stat().st_size > 1000
-
-
-def test_who_does_not_ask_loads_nothing():
-    program = (
-        "import sys, serpentail as st; st.Trajectory, st.Rollouts, st.Plan\n"
-        "print([n for n in sys.modules if n in ('pandas', 'xarray') or 'containers' in n])"
-    )
-    command = [sys.executable, "-W", "error", "-c", program]
-    done = subprocess.run(command, check=True, capture_output=True, text=True)
-    assert done.stdout == "[]\n"
 
 
 def test_no_cell_of_a_csv_file_is_run_by_a_spreadsheet(tmp_path):
