@@ -100,14 +100,15 @@ def test_values_are_shown_on_one_line_that_is_not_long():
 
 WRITERS = {
     "run.npz": lambda motion, path: motion.save(path),
+    "run.nc": lambda motion, path: dataclasses.replace(motion, model=None).to_netcdf(path),
     "times.svg": lambda motion, path: motion.plot(path=path),
     "times.png": lambda motion, path: motion.plot(path=path),
     "film.pdf": lambda motion, path: motion.film(path),
     "film.gif": lambda motion, path: motion.film(path, speed=2.0),
 }
 OLD = b"what was there before"
-QUICK = ("run.npz", "film.gif")  # drawings take long
-DRAWN = ("times.svg", "times.png", "film.pdf")
+QUICK = ("run.npz", "run.nc")
+DRAWN = ("times.svg", "times.png", "film.pdf", "film.gif")  # which take long
 
 
 def unchanged(folder, name):
@@ -265,7 +266,6 @@ def test_a_full_disk_keeps_the_old_file(tmp_path):
 KILLED = {
     "run.npz": WRITERS["run.npz"],
     "run.csv": lambda motion, path: dataclasses.replace(motion, model=None).to_csv(path),
-    "run.nc": lambda motion, path: dataclasses.replace(motion, model=None).to_netcdf(path),
     "run.html": st.view,
 }
 

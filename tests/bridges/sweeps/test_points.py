@@ -1,4 +1,4 @@
-"""Points of sweeps: grids, and points that fill what they are spread in."""
+"""Points of sweeps: grids, points that fill what they are spread in, and how many a block has."""
 
 import math
 import tracemalloc
@@ -8,6 +8,7 @@ import pytest
 from scipy.stats import kstest
 
 import serpentail as st
+from serpentail.bridges.sweeps.driver import block_size
 from serpentail.bridges.sweeps.points import axes_of
 from tests.support.rows import row as named
 
@@ -101,3 +102,27 @@ def test_points_that_cannot_be_are_refused_in_one_line():
         with named(words), pytest.raises(st.SweepError, match=words) as caught:
             make()
         assert "\n" not in str(caught.value)
+
+
+def test_blocks_have_a_second_or_more_and_share_what_is_left():
+    for (pace, largest, left, workers), wanted in {
+        (0.0, 0, 9999, 4): 1,
+        (0.01, 1, 9999, 4): 8,  # grows
+        (0.01, 1000, 9999, 4): 100,  # a second
+        (0.01, 1000, 30, 4): 25,  # of the end: a quarter of a second, and not all for one worker
+        (0.01, 1000, 10**6, 300): 1000,  # 10 s
+        (0.01, 10**5, 10**10, 10**5): 6000,  # a minute
+        (1e-9, 10**5, 10**9, 4): 50_000,
+        (300.0, 1, 9, 4): 1,
+    }.items():
+        with named((pace, largest, left, workers)):
+            assert block_size(pace, largest, left, workers) == wanted
+
+
+def test_a_thousand_workers_need_few_blocks():
+    """Of a million points of 0.1 s: one scheduler of Dask does about 220 a second."""
+    left, blocks = 10**6, 0
+    while left:
+        left -= block_size(0.1, 10**5, left, 1000)
+        blocks += 1
+    assert blocks < 100 * 10**6 * 0.1 / 1000

@@ -1,1 +1,0 @@
-"""Tests of what the emitted C says of numbers that are none."""
