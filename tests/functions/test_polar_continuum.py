@@ -157,6 +157,9 @@ def test_everything_else_follows_from_the_bend_form():
     np.testing.assert_allclose(polar.energy(q, v), bend.energy(*there), rtol=1e-13)
     for found, expected in zip(polar.momentum(q, v), bend.momentum(*there), strict=True):
         np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-15)
+    *center, of_center = bend.center_of_mass(*there)
+    for found, expected in zip(polar.center_of_mass(q, v), (*center, of_center @ J), strict=True):
+        np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(polar.tail_points(q), bend.tail_points(there[0]), atol=1e-15)
     by_bend = bend.tail_point_jacobians(there[0]) @ J
     np.testing.assert_allclose(polar.tail_point_jacobians(q), by_bend, atol=1e-14)

@@ -107,8 +107,8 @@ WRITERS = {
     "film.gif": lambda motion, path: motion.film(path, speed=2.0),
 }
 OLD = b"what was there before"
-QUICK = ("run.npz", "run.nc")
-DRAWN = ("times.svg", "times.png", "film.pdf", "film.gif")  # which take long
+QUICK = ("run.npz", "run.nc", "film.gif")  # drawings take long
+DRAWN = ("times.svg", "times.png", "film.pdf")
 
 
 def unchanged(folder, name):
