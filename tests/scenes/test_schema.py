@@ -1,29 +1,19 @@
-"""The JSON Schema of scene files accepts what the two packages accept, and refuses slips; any
-value at any key is taken, or refused by the errors that say so.
-"""
+"""The JSON Schema of scene files accepts what the two packages accept, and refuses slips."""
 
 import copy
-import datetime
 import json
 import tomllib
-from pathlib import Path
 
 import jsonschema
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as some
 
 import serpentail as st
 from serpentail.cli import cli
 from serpentail.scenes.plan import plan_arguments
-from serpentail.scenes.schema import TABLES, scene_schema
-from serpentail.scenes.simulate import scenario_of
+from serpentail.scenes.schema import scene_schema
 from serpentail_codegen.scene.parse import load_scene, parse_scene
 from serpentail_codegen.scene.problems import SceneError
-from serpentail_scene.keys import KEYS
-from serpentail_scene.parameters import NAMED, NAMES
-from tests.support import zoo
-from tests.support.posed import posed
+from serpentail_scene.parameters import NAMED
 from tests.support.rows import row
 from tests.support.scenes import SCENES
 
@@ -178,63 +168,3 @@ def test_editors_show_what_each_parameter_is(capsys):
     assert {name: each["description"] for name, each in shown.items()} == {
         p.name: f"{p.meaning} ({p.unit})" for p in NAMED
     }
-
-
-# Any value at any key
-
-WORDS = ("", "free", "auto", "rk4", "pfl", "torques", "²", "\0", "a\nb", "x" * 1000)
-HUGE = (10**18, 10**300, 10**400, -(10**400), 1e-320, 1e300)
-VALUES = some.recursive(
-    some.one_of(
-        *(some.booleans(), some.integers(-3, 3), some.floats()),
-        some.sampled_from([*HUGE, *WORDS, datetime.date(2000, 1, 1)]),
-    ),
-    lambda inner: some.lists(inner, max_size=3) | some.dictionaries(some.just("a"), inner),
-    max_leaves=6,
-)
-
-
-def places(table, keys):
-    """Every path to a value of a table, and to keys that it may have."""
-    found = [(key,) for key in keys]
-    for key, value in table.items() if isinstance(table, dict) else enumerate(table):
-        found.append((key,))
-        if isinstance(value, dict | list):
-            found += [(key, *path) for path in places(value, ())]
-    return found
-
-
-def anything(table, keys):
-    """A table with any value at one place."""
-    return some.builds(changed, some.just(table), some.sampled_from(places(table, keys)), VALUES)
-
-
-@pytest.mark.filterwarnings(
-    "ignore::RuntimeWarning", "ignore::serpentail.basics.errors.UnusualSize"
-)
-@settings(
-    max_examples=150, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck)
-)
-@given(
-    anything(GENERATE, (*KEYS, *NAMES)),
-    anything(SIMULATE, TABLES["simulate"].keys),
-    anything(PLAN, TABLES["plan"].keys),
-)
-def test_any_table_is_taken_or_refused(scene, motion, task):
-    if isinstance(motion.get("start"), dict):
-        motion["start"].pop("settle", None)  # which takes as long as it takes
-
-    def planned():
-        posed(zoo.model("feet_tail"), **plan_arguments(task))
-
-    works = [
-        (SceneError, lambda: parse_scene(scene, "x")),
-        (st.SerpentailError, lambda: scenario_of(zoo.model("feet_tail"), motion, Path())),
-        (st.PlanningError, planned),
-    ]
-    for refusal, work in works:
-        try:
-            work()
-        except refusal as error:
-            lines = str(error).splitlines()
-            assert lines and all(lines) and max(map(len, lines)) < 900
