@@ -3,6 +3,7 @@ compilers that would delete the checks are refused.
 """
 
 import ctypes
+import os
 import subprocess
 from collections import Counter
 from collections.abc import Iterator
@@ -175,8 +176,8 @@ def test_every_file_that_computes_refuses_fast_mathematics():
         assert len(sources) == (6 if parts == "*" else 1)
         flags = ("", "-ffast-math", "-Ofast", "-ffinite-math-only")
         for source, compiler, flag in product(sources, ("gcc", "clang"), flags):
-            command = [compiler, "-std=c99", "-O2", *flag.split(), "-fsyntax-only", str(source)]
-            command += ["-I", str(folder / "include")]
+            command = [compiler, "-std=c99", "-O2", *flag.split(), "-E", "-o", os.devnull]
+            command += [str(source), "-I", str(folder / "include")]
             done = subprocess.run(command, capture_output=True, text=True, check=False)
             with row(source.name, compiler, flag):
                 refused = f"{name} checks for NaN and infinity" in done.stderr

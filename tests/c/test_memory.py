@@ -217,8 +217,10 @@ def built(model, tmp_path, text):
 
 @pytest.mark.parametrize(
     "name",
-    ["bare", "small"]
-    + [pytest.param(n, marks=pytest.mark.slow) for n in ("m1_n1", "ground_m1_n1", "polar")],
+    ["bare"]
+    + [
+        pytest.param(n, marks=pytest.mark.slow) for n in ("small", "m1_n1", "ground_m1_n1", "polar")
+    ],
 )
 def test_sanitizers_find_nothing(tmp_path, name):
     model = model_of(name)

@@ -13,7 +13,7 @@ from examples.studies.parts import Part, made
 from serpentail.basics.plausible_values import UNLIKE as UNLIKE_FROM
 from serpentail.basics.plausible_values import disparity
 from tests.references.metrics import mass_matrix_error
-from tests.support import zoo
+from tests.support import swept, zoo
 from tests.support.rows import row
 
 
@@ -127,21 +127,17 @@ def test_arguments_that_the_fuzz_once_broke_are_refused():
 # Parts of studies.
 
 
-def part(folder, result=None):
-    """Return a result; each call writes a line."""
-    with open(folder / "made", "a") as file:
-        file.write("once\n")
-    return {"third": 1 / 3, "lost": float("nan")} if result is None else result / 0
-
-
 def one(folder, starts, files=(), **given):
     """The result of a part called "one", and how often it was made."""
-    made_of = Part(partial(part, folder, **given), {"starts": (1, starts)}, files)
+    made_of = Part(partial(swept.part, folder, **given), {"starts": (1, starts)}, files)
     found = made("study", folder / "parts", {"one": made_of})["one"]
     return found, (folder / "made").read_text().count("once")
 
 
-def test_parts_are_made_once_and_again_where_inputs_change_files_are_gone_or_one_failed(tmp_path):
+def test_parts_are_made_once_and_again_where_inputs_change_files_are_gone_or_one_failed(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setenv("SERPENTAIL_THREADS", "1")  # one process
     picture = tmp_path / "picture.png"
     with pytest.raises(st.SerpentailError, match="one: ZeroDivisionError: division"):
         one(tmp_path, 2, result=1)

@@ -1,6 +1,6 @@
-"""Motion on the ground: methods agree, touch-downs and take-offs are found, and runs that are stopped
-or paused are what they are whole. Sliders stop where Coulomb says, forces move the centre of mass,
-and books balance.
+"""Motion on the ground: methods agree, touch-downs and take-offs are found, and runs that are
+stopped or paused are what they are whole. Sliders stop where Coulomb says, forces move the centre
+of mass, and books balance.
 """
 
 from functools import cache

@@ -13,7 +13,7 @@ from tests.support.toolchains import clang
 
 from .emitted import C99, NAMES, PLAIN, STRICT, Model, compiled, model_of, run, symbols
 
-QUICK = ("m1_n1", "small", "segments", "arcs1", "ground_m1_n1")
+QUICK = ("small", "segments", "arcs1")
 every_model = pytest.mark.parametrize(
     "models",
     [QUICK, pytest.param([n for n in zoo.ZOO if n not in QUICK], marks=pytest.mark.slow)],
