@@ -135,7 +135,7 @@ def test_forms_are_chosen_where_they_are_faster():
 
 
 def test_the_manifest_tells_forms_and_the_rule_that_chose_them():
-    for name in ("m1_n3", "m3_n4", "straight", "loops", "lanes", "segments"):
+    for name in ("m1_n3", "m3_n4", "loops", "segments"):
         manifest, auto = zoo.model(name).manifest, name.startswith("m")
         form = {"m1_n3": "straight", "m3_n4": "lanes"}.get(name, name)
         with row(name):

@@ -23,7 +23,9 @@ def near(found, expected, limit):
     np.testing.assert_allclose(found, expected, rtol=0, atol=limit * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("name", PAIRS)
+@pytest.mark.parametrize(
+    "name", ["fixed", "fixed_mixed", pytest.param("fixed_arcs", marks=pytest.mark.slow)]
+)
 def test_it_is_the_tails_part_of_a_torso_at_rest(name):
     model, free = zoo.model(name), zoo.model(PAIRS[name])
     assert model.nq == model.nv == 2 * model.segments and model.fixed

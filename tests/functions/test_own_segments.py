@@ -23,7 +23,9 @@ from tests.support.own_tails import IN_ZOO, animal, dynamics, states
 from tests.support.rows import row
 
 SHIFT = MP.mpf(10) ** -12
-every_tail = pytest.mark.parametrize("name", IN_ZOO)
+every_tail = pytest.mark.parametrize(
+    "name", ["mixed", *(pytest.param(n, marks=pytest.mark.slow) for n in ("own_links", "own_arcs"))]
+)
 
 
 @every_tail

@@ -30,7 +30,9 @@ def test_joints_are_those_of_the_reference():
         np.testing.assert_allclose(graph, place, rtol=0, atol=2e-14)
 
 
-@pytest.mark.parametrize("name", ["m1_n3", "loops", "arcs3", "arcs2_loops"])
+@pytest.mark.parametrize(
+    "name", ["m1_n3", "loops", "arcs2_loops", pytest.param("arcs3", marks=pytest.mark.slow)]
+)
 def test_torques_of_the_tail_are_those_of_eliminating_the_torso(name):
     """Eqs. 44 to 46, in flight, in H and C."""
     model = zoo.model(name)

@@ -13,6 +13,7 @@ from tests.support.models import model_folder
 from tests.support.rows import row
 
 FUNCTION = "forward_dynamics"
+SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in ("straight", "lanes")]
 # rad at every joint: turns that lie on one another
 COILS = ((0.7, 0.4), (1.5, -0.2))
 
@@ -36,7 +37,7 @@ def assert_exact(model, exact, name, state, per_condition=5e-15, limit=1.0):
         assert error <= limit
 
 
-@pytest.mark.parametrize("name", ["m1_n3", "straight", "loops", "lanes", "segments", "m3_n4"])
+@pytest.mark.parametrize("name", ["m1_n3", "loops", "segments", "m3_n4", *SLOW])
 def test_accelerations_are_exact_to_rounding(name):
     model = zoo.model(name)
     exact = ExactChain(TABLE_1, model.segments, model.links)

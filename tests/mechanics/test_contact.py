@@ -18,7 +18,8 @@ from tests.support import zoo
 from tests.support.rows import row
 
 LAWS = ["ground", "smooth", "paper"]  # all laws of friction on one tail
-TAILS = ["ground_m2_n2", "ground_arcs", "ground_mixed"]
+TAILS = ["ground_m2_n2", "ground_arcs"]
+TAILS += [pytest.param("ground_mixed", marks=pytest.mark.slow)]
 UPRIGHT = np.array([0, 0, 0, 1.0, 0, 0, 0, 0, 0])
 
 
@@ -60,6 +61,7 @@ def test_legs_have_the_numbers_of_the_mechanism():
         assert abs(found[1, 2] - found[2, 2]) < 1e-17
 
 
+@pytest.mark.slow
 def test_points_of_a_tail_on_a_tilted_mount_are_those_of_its_kinematics():
     model = zoo.model("ground_mixed")
     tail = slice(6, 6 + model.contacts["tail"])

@@ -237,7 +237,10 @@ def test_sliders_stop_where_coulomb_says():
     assert slide("cone", 0.0).v[:, 0].min() > -spring > 5 * slide("paper", 0.0).v[:, 0].min()
 
 
-@pytest.mark.parametrize(("name", "height"), [("ground", 0.13), ("ground_mixed", 0.3)])
+@pytest.mark.parametrize(
+    ("name", "height"),
+    [("ground", 0.13), pytest.param("ground_mixed", 0.3, marks=pytest.mark.slow)],
+)
 def test_external_forces_alone_move_the_centre_of_mass(name, height):
     """Momentum is the impulse of weight and ground; angular momentum about the centre that of the
     ground's moments. The first touch is where the lowest point reaches the ground.
@@ -267,7 +270,9 @@ def test_external_forces_alone_move_the_centre_of_mass(name, height):
     assert flight.events[0]["time"] == pytest.approx(t[k - 1] + share * 2e-5, abs=1e-6)
 
 
-@pytest.mark.parametrize("name", ["ground_mixed", "ground_arcs"])
+@pytest.mark.parametrize(
+    "name", ["ground_arcs", pytest.param("ground_mixed", marks=pytest.mark.slow)]
+)
 def test_other_tails_land_with_books_that_balance_better_with_the_tolerance(name):
     model, left = zoo.model(name), []
     q, v = np.zeros(model.nq), np.zeros(model.nv)

@@ -1,8 +1,8 @@
 """The models that tests share: each has all functions, and is generated and compiled once.
 
 A test asks for one by name: ``zoo.model("m1_n3")``.  It takes another size only where the size is
-its point.  ``python -m tests.support.zoo`` makes all of them, side by side; a run of few tests
-makes those that it asks for.
+its point.  ``python -m tests.support.zoo`` makes all of them, side by side, with ``--quick`` those
+of quick tests; a run of few tests makes those that it asks for.
 """
 
 import argparse
@@ -228,12 +228,15 @@ ZOO: dict[str, dict[str, Any]] = {
     "reproducible": _links(1, 3, profile="reproducible", **GROUND),
     "small": _links(1, 1, real="float", profile="reproducible", emission="loops", functions=FEW)
     | GROUND,
-    # it lacks all that a test wants to miss
     # whose runs have gradients, which other models get when they are asked for them
     "taped": _links(1, 3, contacts=["feet"], functions=TAPED),
     "taped_m2_n2": _links(2, 2, functions=TAPED, **GROUND, parameters={"tail_damping": 1e-3}),
+    # it lacks all that a test wants to miss
     "bare": _links(1, 1, functions=["forward_dynamics"]),
 }
+# which slow tests alone ask for
+SLOW = {"straight", "lanes", "arcs3", "own_arcs", "air_mixed", "air_ground"}
+SLOW |= {"ground_mixed", "fixed_arcs"}
 
 
 def scene(name: str, **changes: Any) -> Scene:
@@ -272,14 +275,15 @@ def _made(name: str) -> None:
 def main() -> None:
     """Make all models."""
     parser = argparse.ArgumentParser(description=__doc__)
-    told = "without optimisation, unless CC is set"
+    told = "those of quick tests, without optimisation unless CC is set"
     parser.add_argument("--quick", action="store_true", help=told)
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="models at the same time")
     options = parser.parse_args()
     models.choose_compiler(options.quick)
     begun = time.monotonic()
-    make(list(ZOO), options.jobs)
-    print(f"{len(ZOO)} models for tests: {time.monotonic() - begun:.0f} s")
+    names = [name for name in ZOO if not options.quick or name not in SLOW]
+    make(names, options.jobs)
+    print(f"{len(names)} models for tests: {time.monotonic() - begun:.0f} s")
 
 
 if __name__ == "__main__":

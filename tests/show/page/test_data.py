@@ -168,7 +168,7 @@ def test_a_plan_shows_what_it_plans_and_what_is_true(tmp_path):
 
 def test_links_and_arcs_are_drawn_as_thick_as_they_are():
     """Arcs as that mass of water; the last link has no inertia along itself."""
-    for name in ("own_links", "own_arcs", "mixed"):
+    for name in ("own_links", "mixed"):
         model, changes = zoo.model(name), {}
         p = model.parameters
         links = np.linspace(0.004, 0.001, len(p.get("link_masses", ())))

@@ -28,7 +28,7 @@ def drift(flight):
 
 
 def test_a_minute_of_tumbling_conserves():
-    for name, spin in (("m1_n3", 20), ("m2_n2", 10), ("m3_n4", 5), ("m3_n4", 20), ("arcs3", 10)):
+    for name, spin in (("m1_n3", 20), ("m2_n2", 5), ("arcs2", 10)):
         model = zoo.model(name).with_parameters(gravity=0.0)
         with row(name, spin):
             flight = st.simulate(model, *tumbling(model, spin), **LONG)
