@@ -24,6 +24,8 @@ GROUND = {"contacts": ["feet", "tail", "torso"]}
 FLYING = [*(name for name in VALUES if name != "air_force"), "rollout"]
 FEW = ["mass_matrix", "forward_dynamics", "energy", "contact_dynamics"]
 FEW += ["pfl", "rollout", "implicit"]
+# derivatives of flight are those of the same tail without contact
+LANDING = [*FLYING, "contact_points", "leg_points", "contact_dynamics", "pfl", "implicit"]
 TAPED = ["mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics", "energy"]
 TAPED += ["momentum", "contact_points", "contact_dynamics", "rollout", "implicit", "gradients"]
 # what differs from coordinate to coordinate shows an exchange of two of them
@@ -192,24 +194,24 @@ ZOO: dict[str, dict[str, Any]] = {
     # springs, damping and stops
     "elastic": _links(2, 2, parameters=ELASTIC),
     "elastic_arcs": _arcs(2, parameters=ELASTIC),
-    "elastic_ground": _links(2, 2, parameters=ELASTIC, **GROUND),
+    "elastic_ground": _links(2, 2, parameters=ELASTIC, functions=LANDING, **GROUND),
     # motors that a run meets the limits of
     "motors": _links(1, 3, parameters=MOTORS),
     # in air
     "air": _links(2, 2, parameters=AIR | widths(4)),
     "air_mixed": _own("mixed", MIXED, parameters=TORSO | MOUNTED | AIR | widths(7)),
     "air_fixed": _links(2, 2, base="fixed", parameters=TAIL_IN_AIR),
-    "air_ground": _links(1, 3, parameters=AIR, **GROUND),
+    "air_ground": _links(1, 3, parameters=AIR, functions=["air_force", *LANDING], **GROUND),
     # on the ground
     "ground_m1_n1": _links(1, 1, **GROUND),
     "ground": _links(1, 3, **GROUND),
     "ground_m2_n2": _links(2, 2, **GROUND),
     "ground_arcs": _arcs(2, **GROUND),
-    "ground_mixed": _own("mixed", MIXED, **GROUND),
+    "ground_mixed": _own("mixed", MIXED, functions=LANDING, **GROUND),
     "feet": _links(1, 3, contacts=["feet"]),
     "feet_tail": _links(1, 3, contacts=["feet", "tail"]),
-    "smooth": _links(1, 3, friction="smooth", **GROUND),
-    "paper": _links(1, 3, friction="paper", **GROUND),
+    "smooth": _links(1, 3, friction="smooth", functions=LANDING, **GROUND),
+    "paper": _links(1, 3, friction="paper", functions=LANDING, **GROUND),
     # a torso that never moves
     "fixed": _links(2, 2, base="fixed"),
     "fixed_arcs": _arcs(2, base="fixed"),
