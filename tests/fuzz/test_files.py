@@ -156,7 +156,7 @@ def bounded():
 
 
 @pytest.mark.parametrize("name", FORMATS)
-@pytest.mark.parametrize("many", [100, pytest.param(2000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("many", [100, pytest.param(1000, marks=pytest.mark.slow)])
 def test_any_file_is_read_or_refused_in_a_line(name, many, tmp_path, monkeypatch):
     make, read, refusals = FORMATS[name]
     if name == "run.c3d":
@@ -192,7 +192,7 @@ def generated(path):
         scene_of(parser().parse_args([str(path)]))
 
 
-@pytest.mark.parametrize("many", [100, pytest.param(2000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("many", [100, pytest.param(1000, marks=pytest.mark.slow)])
 def test_commands_read_or_refuse_any_scene_in_words(many, tmp_path, capsys):
     """The folder has no model, so `simulate` and `plan` must refuse each of them."""
     path, empty = tmp_path / "damaged.toml", tmp_path / "empty"

@@ -23,7 +23,7 @@ def model():
     return st.build("righting_m1_n3", air_density=1.2, **drag)
 
 
-@pytest.fixture(scope="module", params=["fatrop", "ipopt"])
+@pytest.fixture(scope="module", params=["fatrop", pytest.param("ipopt", marks=pytest.mark.slow)])
 def plan(request, model):
     return st.plan(model, **TASK, solver=request.param)
 
