@@ -87,21 +87,18 @@ function record(canvas, player, told) {
   player.seek(player.begin);
 }
 
-// Obeys a menu whose values are "csv", "png" and "webm"; stage may be missing.
+// Obeys buttons whose values are "csv", "png" and "webm"; stage may be missing.
 // told: takes the reason why something cannot be saved.
-export function addSaving(menu, { runs, plots, player, stage, shown, told }) {
+export function addSaving(group, { runs, plots, player, stage, shown, told }) {
   const actions = {
     csv: () => download([tableOf(runs, plots, shown)], "text/csv", "csv"),
     png: () => stage.picture((blob) => download([blob], "image/png", "png")),
     webm: () => record(stage.canvas, player, told),
   };
-  for (const option of menu.options)
-    option.disabled = !stage && option.value !== "csv" && option.value !== "";
-  menu.addEventListener("change", () => {
-    const { value } = menu;
-    menu.value = "";
-    actions[value]();
-  });
+  for (const button of group.querySelectorAll("button")) {
+    button.disabled = !stage && button.value !== "csv";
+    button.addEventListener("click", actions[button.value]);
+  }
   // the frame of a notebook may save nothing
-  menu.hidden = location.href === "about:srcdoc";
+  group.hidden = location.href === "about:srcdoc";
 }
