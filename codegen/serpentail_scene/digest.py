@@ -13,10 +13,7 @@ def generator_digest() -> str:
     """Return a digest of the generator and its tools; ModuleNotFoundError names what is missing."""
     digest = hashlib.sha256(sys.version.encode())
     for tool in TOOLS:
-        # a package's name and version; importlib.metadata would take 30 ms for this
-        names = os.listdir(os.path.dirname(_home(tool)))
-        installed = [n for n in names if n.startswith(f"{tool}-") and n.endswith("-info")]
-        digest.update(repr(sorted(installed)).encode())
+        digest.update(installed(tool).encode())
     for home in (_home(GENERATOR), os.path.dirname(__file__)):
         for folder, folders, names in os.walk(home):
             folders.sort()
@@ -25,6 +22,12 @@ def generator_digest() -> str:
                     content = file.read()
                 digest.update(repr((folder[len(home) :], name, len(content))).encode() + content)
     return digest.hexdigest()
+
+
+def installed(tool: str) -> str:
+    """Return a package's name and version as installed; importlib.metadata would take 30 ms."""
+    names = os.listdir(os.path.dirname(_home(tool)))
+    return repr(sorted(n for n in names if n.startswith(f"{tool}-") and n.endswith("-info")))
 
 
 def _home(package: str) -> str:

@@ -226,7 +226,7 @@ def test_parts_of_the_dead_go_after_a_minute_and_those_in_use_stay(tmp_path):
     assert listed(tmp_path) == sorted(
         {*ages, "run"} - {".b.csv.89abcdef.part", ".held.00000000.part"}
     )
-    with mock.patch("serpentail.basics.files.fcntl", None):  # as on Windows
+    with mock.patch("serpentail_scene.posix.fcntl", None):  # as on Windows
         age(tmp_path)
         put(tmp_path / "run", b"newer")
     assert (tmp_path / "run").read_bytes() == b"newer"

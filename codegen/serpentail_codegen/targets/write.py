@@ -3,11 +3,11 @@
 The new folder is made beside the old one, and one rename exchanges them: a reader sees the old
 model or the new one, also if the process is killed. If the system or the file system (NFS, for
 example) cannot exchange folders, there are two renames, and the place is empty between them.
+Only what replaces a folder waits for the disk: where none was, a loss of power can lose none.
 """
 
 import ctypes
 import errno
-import fcntl
 import hashlib
 import json
 import os
@@ -19,6 +19,8 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
+
+from serpentail_scene.posix import lock, opened_folder, synchronise
 
 from ..scene.problems import Problem, SceneError
 
@@ -67,13 +69,11 @@ def write_folder(folder: Path, files: dict[str, str], manifest: dict) -> list[st
 @contextmanager
 def _alone(parent: Path) -> Iterator[None]:
     """Let other generations into the same parent wait, where its file system has locks."""
-    handle = os.open(parent, os.O_RDONLY)
-    try:
+    with opened_folder(parent) as handle:
         with suppress(OSError):
-            fcntl.flock(handle, fcntl.LOCK_EX)
+            if handle is not None:
+                lock(handle)
         yield
-    finally:
-        os.close(handle)
 
 
 def _sweep(parent: Path) -> None:
@@ -94,7 +94,7 @@ def _has(folder: Path, name: str, content: bytes) -> bool:
 
 def _replace(folder: Path, contents: Mapping[str, bytes], changed: list[str]) -> None:
     """Put a folder with these files in place of an earlier one, whose user's files come along."""
-    beside, earlier = _name_beside(folder), _earlier(folder)
+    beside, earlier, replaces = _name_beside(folder), _earlier(folder), folder.exists()
 
     def ours(place: str, names: list[str]) -> list[str]:
         inside = os.path.relpath(place, folder)
@@ -110,18 +110,20 @@ def _replace(folder: Path, contents: Mapping[str, bytes], changed: list[str]) ->
             if name in changed:
                 with open(path, "xb") as file:
                     file.write(content)
-                    file.flush()
-                    os.fsync(file.fileno())
+                    if replaces:
+                        file.flush()
+                        os.fsync(file.fileno())
             else:  # it keeps its time, by which `make` goes
                 _link(folder / name, path)
         # folders that only earlier files of ours were in
         for name in earlier - contents.keys():
             with suppress(OSError):
                 os.removedirs((beside / name).parent)
-        for place in {beside, *((beside / name).parent for name in contents)}:
-            _synchronise(place)
+        for place in {beside, *((beside / name).parent for name in contents)} if replaces else ():
+            synchronise(place)
         _swap(beside, folder)
-        _synchronise(folder.parent)
+        if replaces:
+            synchronise(folder.parent)
     finally:
         shutil.rmtree(beside, ignore_errors=True)  # the old folder by now
 
@@ -150,16 +152,6 @@ def _earlier(folder: Path) -> set[str]:
         return set()
 
 
-def _synchronise(folder: Path) -> None:
-    """Write the names in a folder to the disk, where the file system can."""
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        with suppress(OSError):
-            os.fsync(handle)
-    finally:
-        os.close(handle)
-
-
 def _swap(beside: Path, folder: Path) -> None:
     """Exchange the places of the two; `beside` is the old folder then, or gone."""
     try:
@@ -182,15 +174,15 @@ def _swap(beside: Path, folder: Path) -> None:
 
 def _exchange(beside: Path, folder: Path) -> bool:
     """Exchange two folders by one rename; False if the system cannot."""
-    library = ctypes.CDLL(None, use_errno=True)
     paths, exchange = (os.fsencode(beside), os.fsencode(folder)), ctypes.c_uint(EXCHANGE)
     try:
+        library = ctypes.CDLL(None, use_errno=True)
         if sys.platform == "darwin":
             failed = library.renamex_np(*paths, exchange)
         else:
             here = WORKING_FOLDER
             failed = library.renameat2(here, paths[0], here, paths[1], exchange)
-    except AttributeError:  # an older C library
+    except (AttributeError, TypeError):  # an older C library; Windows, which has none
         return False
     code = ctypes.get_errno()
     if failed and code not in NO_EXCHANGE:

@@ -12,12 +12,9 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from .errors import NotWritten
+from serpentail_scene.posix import has_locks, lock, synchronise
 
-try:
-    import fcntl
-except ImportError:  # Windows, where no part is locked, and none is swept
-    fcntl = None  # type: ignore[assignment]
+from .errors import NotWritten
 
 PART = re.compile(r"\..+\.[0-9a-f]{8}\.part")
 # begins a text, but no number, that a spreadsheet would run, with or without a ' in front
@@ -51,8 +48,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
             else:
                 _sync(part)
                 part.replace(target)
-                with contextlib.suppress(OSError):  # not every file system syncs folders
-                    _sync(folder)
+                synchronise(folder)
         except OSError as reason:
             raise NotWritten(
                 f"{str(path)!r} is not written ({reason.strerror or reason}): make room, or name "
@@ -102,21 +98,21 @@ def _locked_part(folder: Path, name: str) -> Iterator[Path]:
     part = folder / f".{name}.{secrets.token_hex(4)}.part"
     handle = os.open(part, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
     try:
-        if fcntl is None:
-            os.close(handle)  # an open file cannot be renamed there
+        if has_locks():
+            lock(handle)
         else:
-            fcntl.flock(handle, fcntl.LOCK_EX)
+            os.close(handle)  # an open file cannot be renamed there
         yield part
     finally:
         with contextlib.suppress(OSError):  # its folder may be missing
             part.unlink(missing_ok=True)
-        if fcntl is not None:
+        if has_locks():
             os.close(handle)
 
 
 def _remove_abandoned(folder: Path) -> None:
     """Remove parts that killed processes left in a folder, where locks tell which these are."""
-    if fcntl is None:
+    if not has_locks():
         return
     with os.scandir(folder) as entries:
         parts = [entry.path for entry in entries if PART.fullmatch(entry.name)]
@@ -125,15 +121,15 @@ def _remove_abandoned(folder: Path) -> None:
             if time.time() - os.stat(part).st_mtime > ABANDONED_AFTER_S:
                 handle = os.open(part, os.O_RDWR)
                 try:
-                    fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    lock(handle, wait=False)
                     os.unlink(part)
                 finally:
                     os.close(handle)
 
 
 def _sync(path: Path) -> None:
-    """Wait until a file or the entries of a folder are on the disk."""
-    handle = os.open(path, os.O_RDWR if path.is_file() else os.O_RDONLY)
+    """Wait until a file is on the disk."""
+    handle = os.open(path, os.O_RDWR)
     try:
         os.fsync(handle)
     finally:

@@ -6,16 +6,17 @@ of the positions.
 
 import json
 import os
-import resource
 import sys
 from contextlib import suppress
 from typing import Any, BinaryIO
 
 
-def limit(what: int, most: int) -> None:
+def limit(what: str, most: int) -> None:
     """Limit what this process may use, unless the system has no such limit or a lower one."""
-    with suppress(ValueError, OSError):
-        resource.setrlimit(what, (most, most))
+    with suppress(ImportError, AttributeError, ValueError, OSError):  # Windows has none
+        import resource
+
+        resource.setrlimit(getattr(resource, f"RLIMIT_{what}"), (most, most))
 
 
 def main(path: str, memory: int, seconds: int, answer: BinaryIO) -> None:
@@ -26,9 +27,9 @@ def main(path: str, memory: int, seconds: int, answer: BinaryIO) -> None:
     except ImportError as error:
         tell(answer, {"missing": True, "error": str(error)})
         return
-    limit(resource.RLIMIT_CORE, 0)
-    limit(resource.RLIMIT_AS, memory)
-    limit(resource.RLIMIT_CPU, seconds)
+    limit("CORE", 0)
+    limit("AS", memory)
+    limit("CPU", seconds)
     try:
         content = ezc3d.c3d(path)
         point = content["parameters"]["POINT"]
