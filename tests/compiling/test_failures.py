@@ -76,6 +76,16 @@ def test_broken_compiler_on_path_gives_way_to_the_next_and_ziglang_comes_last(
     assert list(toolchain.candidates()) == [(sys.executable, "-m", "ziglang", "cc")]
 
 
+@pytest.mark.slow  # half a minute where zig has not compiled its C library yet
+def test_without_a_compiler_on_path_ziglang_compiles_and_says_so(model, monkeypatch, tmp_path):
+    pytest.importorskip("ziglang")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    told = []
+    with st.progress(lambda now: told.append(str(now))):
+        assert call_twice(compiler.compile_library(*model)) == 42.0
+    assert "compile by ziglang, half a minute" in told[0] and "twice.c" in told[0]
+
+
 def test_failures_show_the_compilers_words_without_the_middle_of_long_ones(model, cache, script):
     (source,), include = model
     wrong = source.with_name("wrong.c")

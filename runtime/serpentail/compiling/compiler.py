@@ -34,13 +34,14 @@ from .toolchain import (
     Toolchain,
     examine,
     noted_toolchain,
-    run_command,
     run_commands,
 )
 
 Texts = Mapping[str, bytes]  # sources and headers by paths; headers are searched below include/
 
 LONGEST_REPORT = 6000  # characters of a compiler's output that an error shows
+# begins a stage's subject: zig's first link, for which it compiles a C library, takes that long
+LAST_RESORT = "by ziglang, half a minute at the first time: "
 REMEDY_FAILED = (
     "Generate the model again if its files were edited; else try another compiler with CC=..."
 )
@@ -177,14 +178,15 @@ def _compile(sources: Sequence[str], compiler: Sequence[str], part: Path) -> Non
         (*compiler, "-fPIC", "-I", str(part / "include"), "-c", str(part / source), "-o", file)
         for source, file in zip(sources, objects, strict=True)
     ]
-    with Stage("compile", ", ".join(Path(source).name for source in sources)) as stage:
-        done = run_commands(commands, stage.tell)
-    for finished in done:
-        if finished.returncode:
+    what = ", ".join(Path(source).name for source in sources)
+    with Stage("compile", LAST_RESORT * ("ziglang" in compiler) + what) as stage:
+        for finished in run_commands(commands, stage.tell):
+            if finished.returncode:
+                raise _failure(finished, part)
+        link = (*compiler, *SHARED_FLAGS, *objects, "-o", str(made), "-lm")
+        (finished,) = run_commands([link], stage.tell)
+        if finished.returncode or not made.is_file() or made.stat().st_size == 0:
             raise _failure(finished, part)
-    finished = run_command((*compiler, *SHARED_FLAGS, *objects, "-o", str(made), "-lm"))
-    if finished.returncode or not made.is_file() or made.stat().st_size == 0:
-        raise _failure(finished, part)
 
 
 def _failure(finished: Finished, part: Path) -> CompileFailed:

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache as memoised
+from itertools import compress
 from pathlib import Path
 
 from ..basics.errors import CompilerNotFound, SerpentailError
@@ -140,18 +141,15 @@ def _not_found(refusals: list[str]) -> str:
 
 def _ask(command: tuple[str, ...], profile: str) -> Toolchain:
     """Return what `command` reports about itself; CompilerNotFound if that fails."""
-    answer = run_command((*command, "--version"))
+    nothing, choice = ("-E", "-x", "c", os.devnull), CPU_FLAGS[profile]
+    questions = [("--version",), nothing, *((flag, *nothing) for flag in choice)]
+    answer, usual, *replies = run_commands([(*command, *question) for question in questions])
     if answer.returncode or not answer.stdout.strip():
         reason = (answer.stderr.strip() or "no answer to --version")[:300]
         raise CompilerNotFound(f"`{shlex.join(command)}` ({reason})")
     # the first of the profile's processor flags that it takes in silence
-    nothing = ("-E", "-x", "c", os.devnull)
-    usual, flags = run_command((*command, *nothing)).stderr, PROFILES[profile]
-    for flag in CPU_FLAGS[profile]:
-        silent = run_command((*command, flag, *nothing))
-        if silent.returncode == 0 and silent.stderr == usual:
-            flags += (flag,)
-            break
+    taken = (not each.returncode and each.stderr == usual.stderr for each in replies)
+    flags = PROFILES[profile] + tuple(compress(choice, taken))[:1]
     # what the flags resolve to: gcc's list, else the predefined macros
     target = processor()
     for question in (("-Q", "--help=target"), ("-dM", *nothing)):
