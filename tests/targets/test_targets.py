@@ -4,9 +4,11 @@ NumPy target that follows the recipe means what the programs mean.
 
 import inspect
 import json
+import sys
 from dataclasses import replace
 from types import SimpleNamespace
 
+import jinja2
 import numpy as np
 import pytest
 
@@ -17,6 +19,7 @@ from serpentail_codegen.ir import program as ir
 from serpentail_codegen.ir.builder import Builder
 from serpentail_codegen.ir.interpret import Numbers, Run
 from serpentail_codegen.scene.parse import scene_for
+from serpentail_codegen.targets import templating
 from serpentail_codegen.targets.c.loops import LoopPrinter, in_loops
 from serpentail_codegen.targets.c.routine import routine_lines
 from serpentail_codegen.targets.casadi.printer import PythonPrinter, step_view
@@ -176,3 +179,28 @@ def test_emitted_module_computes_what_the_programs_mean(scene, tmp_path, monkeyp
                 wanted = np.array(expected[key], float)
                 limit = 1e-10 * np.max(np.abs(wanted))
                 np.testing.assert_allclose(values, wanted, rtol=0, atol=limit, err_msg=key)
+
+
+def test_templates_are_compiled_once_for_a_text_and_a_jinja(tmp_path, monkeypatch):
+    compiled = []
+
+    class Counting(jinja2.Environment):
+        def _compile(self, source, filename):
+            compiled.append(filename)
+            return super()._compile(source, filename)
+
+    def rendered(text, folder=tmp_path):
+        kept = templating.CompiledTemplates()
+        kept.directory = str(folder)
+        loader = jinja2.DictLoader({"a": text})
+        return Counting(loader=loader, bytecode_cache=kept).get_template("a").render()
+
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    assert [rendered(text) for text in "1122"] == [*"1122"] and len(compiled) == 2
+    monkeypatch.setattr(templating, "installed", lambda _: "another Jinja2")
+    assert rendered("2") == "2" and len(compiled) == 3
+    assert rendered("3", tmp_path / "none") == "3"  # as where nobody may write
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    (kept,) = tmp_path.iterdir()
+    before = kept.read_bytes()
+    assert rendered("4") == "4" and kept.read_bytes() == before
