@@ -143,11 +143,8 @@ import filelock, numpy  # which know by other signs where they are
 filelock.FileLock = filelock.SoftFileLock
 sys.modules |= dict.fromkeys(("fcntl", "resource"))
 opened = os.open
-def no_folders(path, *more, **options):
-    if os.path.isdir(path):
-        raise PermissionError(13, "Permission denied", str(path))
-    return opened(path, *more, **options)
-os.open = no_folders
+os.open = lambda path, *more, **options: opened(f"{path}/none" if os.path.isdir(path) else path,
+                                                *more, **options)
 for name in ("geteuid", "killpg", "uname", "confstr", "register_at_fork", "sched_getaffinity",
              "O_CLOEXEC", "O_DIRECTORY", "O_NONBLOCK"):
     delattr(os, name)
