@@ -60,12 +60,16 @@ def fly(model, point):
     }
 
 
-def main(folder, executor, pause):
-    """Run the troubled sweep, and print its progress."""
+def study(folder, pause):
+    """The troubled sweep."""
     run = partial(troubled, pause, str(folder / "log"))
     over = {"number_of": st.grid(range(POINTS))}
-    found = st.sweep(None, over, run, store=folder / "s.rows", limit=1.0, executor=executor)
-    print(found.status())
+    return {"model": None, "over": over, "run": run, "store": folder / "s.rows"}
+
+
+def main(folder, executor, pause):
+    """Run the troubled sweep, and print its progress."""
+    print(st.sweep(**study(folder, pause), limit=1.0, executor=executor).status())
 
 
 if __name__ == "__main__":

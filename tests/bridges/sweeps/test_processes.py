@@ -55,16 +55,9 @@ def test_points_that_hang_crash_or_raise_are_rows(worker, tmp_path):
     assert crashed == [2, 2] and log.count(str(swept.HANGS[0])) == 1 and found.status().failed == 4
 
 
-def test_a_limit_is_of_processor_time_and_what_sleeps_is_given_up_without_a_row(
-    worker, tmp_path, monkeypatch
-):
+def test_a_limit_is_of_processor_time_and_what_sleeps_is_given_up_without_a_row(worker, tmp_path):
     run = partial(swept.troubled, 0.4, str(tmp_path / "log"))  # s on the clock
     over = {"number_of": st.grid([1, *swept.SLEEPS])}
     found = st.sweep(None, over, run, limit=0.15, executor=worker)
     assert found[0]["error"] is None and found[0]["seconds"] >= 0.4
     assert found.status() == Status(2, 1, 0) and found.spent.hung == 1
-    monkeypatch.setattr(processes, "HANGS", 0.3)  # as where many others are at work
-    monkeypatch.setattr(processes, "LEAST", 1e-3)
-    over = {"number_of": st.grid(swept.HANGS)}
-    found = st.sweep(None, over, run, limit=0.5, executor=worker)  # but it does not hang
-    assert found[0]["error"].startswith("TimeLimit")

@@ -2,18 +2,16 @@
 
 import time
 from collections import deque
-from concurrent.futures import Future
-from contextlib import suppress
-from dataclasses import dataclass, field
-from queue import Empty, SimpleQueue
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ...basics.errors import SweepError
 from ...basics.progress import Stage
-from .executors import GONE, Place, asked, place_of
-from .processes import Block, BlockSettings, Bundle, model_of, run_block
+from .places import Place, asked, place_of
+from .processes import Block, Bundle, model_of
 from .result import Sweep
 from .runs import run_points
 from .store import Row
@@ -32,18 +30,23 @@ HERE_S = 3.0  # s of work of flights that is not worth other processes
 
 @dataclass
 class Group:
-    """Points of one model without rows, that are not sent yet; pace: seconds that one takes."""
+    """Points of one model without rows, that are not sent yet.
+
+    pace: seconds that one takes; largest: points of the largest block that came back.
+    """
 
     bundle: Bundle | None
     left: np.ndarray
     pace: float = 0.0
-    largest: int = field(default=0, init=False)  # block that came back
+    largest: int = 0
 
-    def take(self, workers: int) -> np.ndarray:
-        """Return the numbers of the points of the next block."""
-        count = block_size(self.pace, self.largest, len(self.left), workers)
-        block, self.left = np.split(self.left, [count])
-        return block
+    def take(self, workers: int) -> list[int]:
+        """Return the numbers of the points of the next block; one to begin with."""
+        usual = min(max(LEAST_S, workers / TASKS_PER_S), MOST_S) / max(self.pace, 1e-9)
+        in_the_end = max(SHORTEST * usual, len(self.left) / (SHARE * workers))
+        count = max(1, round(min(usual, in_the_end, GROWTH * self.largest, MOST_IN_BLOCK)))
+        block, self.left = self.left[:count], self.left[count:]
+        return block.tolist()
 
     def learn(self, rows: list[Row]) -> None:
         """Note how long a block took; in a small one, the start of a worker counts too much."""
@@ -53,98 +56,80 @@ class Group:
         self.largest = max(self.largest, len(rows))
 
 
-def block_size(pace: float, largest: int, left: int, workers: int) -> int:
-    """Return how many points the next block has, of those that are left; one to begin with.
-
-    pace: seconds a point; largest: points of the largest block before.
-    """
-    usual = min(max(LEAST_S, workers / TASKS_PER_S), MOST_S) / max(pace, 1e-9)
-    in_the_end = max(SHORTEST * usual, left / (SHARE * workers))
-    return max(1, round(min(usual, in_the_end, GROWTH * largest, MOST_IN_BLOCK, left)))
-
-
 class Driver:
     """Runs all points of a sweep that have no rows; these come into the store."""
 
-    def __init__(self, sweep: Sweep, settings: BlockSettings, name: str):
+    def __init__(self, sweep: Sweep, limit: float | None, name: str):
         self.store, self.posed, self.spent = sweep.store, sweep.posed, sweep.spent
-        self.settings, self.name = settings, name
+        self.name, self.job = name, sweep.posed.job
+        self.usual = Block(self.job.pickled(), limit or 0.0, self.job.run == "simulate", None, {})
         missing = np.flatnonzero(~self.store.done)
         models = self.posed.models[self.posed.axes.places(missing)]
         bundles = enumerate(self.posed.bundles)
         # groups take turns, so that workers make all models at once
-        self.groups = deque(Group(bundle, missing[models == k]) for k, bundle in bundles)
+        groups = (Group(bundle, missing[models == k]) for k, bundle in bundles)
+        self.groups = deque(group for group in groups if len(group.left))
 
     def drive(self, executor: Any) -> None:
         """Run all points; NotWritten if rows cannot be written, SweepError if no worker is left."""
         begun = time.perf_counter()
         with Stage("sweep", self.name) as stage:
             self._tell(stage)
-            if executor is None and self.settings.limit is None and self.settings.together:
+            if executor is None and not self.usual.limit and self.usual.together:
                 self._run_here(stage)
-            if self._group():
+            if self.groups:
                 with place_of(executor) as place:
                     self._run_at(place, stage)
             self._tell(stage)
         self.spent.wall_s = time.perf_counter() - begun
 
-    def _group(self) -> Group | None:
-        """Return the group whose turn it is; None if no points are left to send."""
-        for _ in range(len(self.groups)):
-            self.groups.rotate(-1)
-            if len(self.groups[0].left):
-                return self.groups[0]
-        return None
+    def _next(self, workers: int) -> tuple[Group, Block]:
+        """Return the next block, of the group whose turn it is."""
+        group = self.groups.popleft()
+        numbers = group.take(workers)
+        if len(group.left):
+            self.groups.append(group)
+        points = dict(zip(numbers, self.posed.axes.at(numbers), strict=True))
+        return group, self.usual._replace(bundle=group.bundle, points=points)
 
     def _run_here(self, stage: Stage) -> None:
         """Run flights in this process for as long as others would take to begin."""
-        begun, job = time.perf_counter(), self.posed.job
-        while time.perf_counter() - begun < HERE_S and (group := self._group()):
-            numbers = group.take(1)
-            points = zip(numbers.tolist(), self.posed.axes.at(numbers), strict=True)
-            parts = run_points(job, model_of(group.bundle), dict(points))
-            self._keep(group, len(numbers), [row for part in parts for row in part])
+        begun = time.perf_counter()
+        while self.groups and time.perf_counter() - begun < HERE_S:
+            group, block = self._next(1)
+            parts = run_points(self.job, model_of(block.bundle), block.points)
+            self._keep(group, block, [row for part in parts for row in part])
             self._tell(stage)
 
     def _run_at(self, place: Place, stage: Stage) -> None:
         """Keep all workers at work until no point is left."""
-        ended: SimpleQueue[Future] = SimpleQueue()
-        sent: dict[Future, tuple[Group, int]] = {}
-        group, looked = self._group(), -LOOK_S
+        sent: dict[Future, tuple[Group, Block]] = {}
         try:
-            while group or sent:
-                if time.perf_counter() - looked >= LOOK_S:
-                    looked, self.spent.workers = time.perf_counter(), asked(place.workers)
-                    if not place.alive():
-                        raise SweepError(GONE)
-                    self._tell(stage)
-                while group and len(sent) < AHEAD * self.spent.workers:
-                    numbers = group.take(self.spent.workers)
-                    columns = self.posed.axes.columns(numbers)
-                    block = Block(self.settings, group.bundle, columns, numbers)
-                    future = asked(place.submit, run_block, block)
-                    sent[future] = group, len(numbers)
-                    future.add_done_callback(ended.put)
-                    group = self._group()
-                with suppress(Empty):
-                    future = ended.get(timeout=LOOK_S)
+            while self.groups or sent:
+                workers = self.spent.workers = asked(place.workers)
+                while self.groups and len(sent) < AHEAD * workers:
+                    group, block = self._next(workers)
+                    sent[asked(place.submit, block)] = group, block
+                for future in wait(sent, LOOK_S, FIRST_COMPLETED).done:
                     self._keep(*sent.pop(future), asked(future.result))
+                self._tell(stage)
         finally:
             for future in sent:
                 future.cancel()
 
-    def _keep(self, group: Group, points: int, rows: list[Row] | str) -> None:
-        """Keep the rows of a block of points; SweepError if no process can run it."""
+    def _keep(self, group: Group, block: Block, rows: list[Row] | str) -> None:
+        """Keep the rows of a block; SweepError if no process can run it."""
         if isinstance(rows, str):
             raise SweepError(rows)
         self.store.accept(rows)
         group.learn(rows)
         self.spent.points += len(rows)
-        self.spent.hung += points - len(rows)
+        self.spent.hung += len(block.points) - len(rows)
         self.spent.blocks += 1
         self.spent.busy_s += sum(row.seconds for row in rows)
 
     def _tell(self, stage: Stage) -> None:
-        done, total, failed = int(self.store.done.sum()), len(self.store.done), self.store.failed
+        done, total = np.count_nonzero(self.store.done), len(self.store.done)
+        failed = np.count_nonzero(self.store.failed)
         words = f", {failed} failed" if failed else ""
         stage.tell(done / total, f"{self.name}: {done} of {total}{words}")

@@ -89,22 +89,14 @@ class Axes:
         pairs = zip(self.spreads.items(), parts, strict=True)
         return {name: axis.at(part) for (name, axis), part in pairs}
 
-    def columns(self, numbers: Sequence[int] | np.ndarray) -> dict[str, list]:
-        """Return the points of some numbers by names: the last axis changes first."""
+    def at(self, numbers: Sequence[int] | np.ndarray) -> list[Point]:
+        """Return the points of some numbers: the last axis changes first."""
         places, found = self.places(numbers), {}
         for (names, columns), where in zip(self.grids.items(), places, strict=False):
             for name, column in zip(names, columns, strict=True):
                 found[name] = [column[k] for k in where.tolist()]
-        return found | {name: array[places[-1]].tolist() for name, array in self.samples.items()}
-
-    def at(self, numbers: Sequence[int] | np.ndarray) -> list[Point]:
-        """Return the points of some numbers."""
-        return points_of(self.columns(numbers))
-
-
-def points_of(columns: Mapping[str, list]) -> list[Point]:
-    """Return points, given by names."""
-    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+        found |= {name: array[places[-1]].tolist() for name, array in self.samples.items()}
+        return [dict(zip(found, row, strict=True)) for row in zip(*found.values(), strict=True)]
 
 
 def drawn(kind: str, points: int, size: int, seed: int) -> np.ndarray:

@@ -1,14 +1,12 @@
-"""Runs blocks of points in processes of their own, and survives crashes and hangs of these.
+"""Runs blocks of points in processes of their own, and survives the end of these.
 
 Why not multiprocessing, concurrent.futures, loky or pebble: Dask's workers may not have children of
 multiprocessing, on which all of these build, and it imports the main program into every worker.
 """
 
-import atexit
 import hashlib
 import os
 import pickle
-import queue
 import signal
 import subprocess
 import sys
@@ -17,16 +15,15 @@ import time
 import zlib
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import replace
 from functools import lru_cache
+from itertools import islice
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import numpy as np
-
-from ...basics.errors import SerpentailError, SweepError
+from ...basics.errors import SerpentailError
 from ...compiling.cache import cache_folder
 from ...compiling.commands import inherited
 from ...compiling.threads import VARIABLE, after_fork
@@ -34,14 +31,12 @@ from ...model.load import model_from
 from ...model.manifest import CheckedFolder, snapshot
 from ...model.model import Model
 from .axis import as_json
-from .points import Point, points_of
-from .runs import run_points
+from .points import Point
+from .runs import TOGETHER, run_points
 from .store import Row
 
 TRIES = 2  # of a point whose process ends: something else may have ended it
-TOGETHER = 2048  # points that a process gets at once: it holds the motions of flights of them
-HANGS = 10  # limits on the clock in which a point hangs if it takes less processor time than
-LEAST = 0.1  # limits
+HANGS = 10  # limits on the clock in which a point hangs
 COMMAND = "from serpentail.bridges.sweeps.processes import serve; serve({})"
 MOST_MODELS = 64  # that a process keeps
 
@@ -73,88 +68,102 @@ def model_of(bundle: Bundle | None) -> Model | None:
     return model_from(checked, parameters, profile=profile)
 
 
-@dataclass(frozen=True)
-class BlockSettings:
-    """What all blocks of a sweep have in common.
+class Block(NamedTuple):
+    """Points of one model, by the numbers of their rows.
 
-    job: pickled; limit: seconds of processor time that a point may take, None: no limit; together:
+    job: pickled; limit: seconds of processor time that a point may take, 0: no limit; together:
     whether points may be run side by side, with all results at once.
     """
 
     job: bytes
-    limit: float | None
+    limit: float
     together: bool
-
-
-class Block(NamedTuple):
-    """Points of one model: columns: their values by names; numbers: of their rows."""
-
-    settings: BlockSettings
     bundle: Bundle | None
-    columns: dict[str, list]
-    numbers: np.ndarray
+    points: dict[int, Point]
 
 
-def run_block(block: Block) -> list[Row] | str:
-    """Return the rows of a block but of points that hang, or why no process can run it.
+class Crew:
+    """Processes that run points, each for one thread at a time."""
 
-    The reason is no exception, because Dask would print that.
-    """
-    points = list(zip(block.numbers.tolist(), points_of(block.columns), strict=True))
-    try:
-        parts = (dict(points[k : k + TOGETHER]) for k in range(0, len(points), TOGETHER))
-        return [row for part in parts for row in _rows(block, part)]
-    except SweepError as reason:
-        return str(reason)
+    def __init__(self) -> None:
+        self.all: set[Process] = set()
+        self.idle: list[Process] = []
+        self.dismissed = False
+
+    def run(self, block: Block) -> list[Row] | str:
+        """Return the rows of a block but of points that hang, or why no process can run it.
+
+        A point fails if it takes more processor time than the limit, or if its process ends twice.
+        The reason is no exception, because Dask would print that.
+        """
+        rows: list[Row] = []
+        left, ends = dict(block.points), Counter[int]()
+        while left and not self.dismissed:
+            # after an end one by one, so that the point at fault shows
+            points = dict(islice(left.items(), 1 if ends else None))
+            process, begun = self._process(), time.perf_counter()
+            try:
+                for answer in process.run(block._replace(points=points)):
+                    if isinstance(answer, str):
+                        self.idle.append(process)
+                        return f"run: no process can run it: {answer}"
+                    rows += answer
+                    for row in answer:
+                        del left[row.number]
+                    begun = time.perf_counter()
+                self.idle.append(process)
+                continue
+            except (EOFError, OSError):
+                self.all.discard(process)
+                status = process.end()
+            number = next(iter(left), -1)
+            ends[number] += 1
+            if len(points) > 1 and block.together:
+                continue
+            if status in (-signal.SIGPROF, -signal.SIGALRM) or ends[number] >= TRIES:
+                left.pop(number, None)
+                if status != -signal.SIGALRM:
+                    error = _error_text(status, block.limit)
+                    rows.append(Row(number, None, error, time.perf_counter() - begun))
+        return rows
+
+    def _process(self) -> "Process":
+        process = self.idle.pop() if self.idle else Process()
+        self.all.add(process)
+        if self.dismissed:  # while it was made
+            process.child.kill()
+        return process
+
+    def dismiss(self) -> None:
+        """End all processes; their threads return, and start no others."""
+        self.dismissed = True
+        for process in list(self.all):
+            process.child.kill()
+        while self.idle:
+            self.idle.pop().end()
 
 
-def _rows(block: Block, left: dict[int, Point]) -> Iterator[Row]:
-    """Yield the rows of points, whatever happens to the process that runs them.
-
-    A point fails if it takes more processor time than the limit, or if the process ends twice while
-    it runs. If it hangs, it has no row.
-    """
-    ends: Counter[int] = Counter()
-    one_by_one = False
-    while left:
-        points = {k: left[k] for k in list(left)[:1]} if one_by_one else dict(left)
-        process, begun = _idle.pop() if _idle else Process(), time.perf_counter()
-        try:
-            for rows in process.run(block, points):
-                for row in rows:
-                    del left[row.number]
-                    yield row
-                begun = time.perf_counter()
-            continue
-        except (EOFError, OSError) as reason:
-            hangs, status = isinstance(reason, TimeoutError), process.end()
-        # it was at the first point that is left, unless it ran all at once
-        if block.settings.together and 1 < len(points) == len(left):
-            one_by_one = True
-            continue
-        number = next(iter(left))
-        ends[number] += 1
-        if hangs or status == -signal.SIGPROF or ends[number] >= TRIES:
-            del left[number]
-            if not hangs:
-                error = _error_text(status, block.settings.limit)
-                yield Row(number, None, error, time.perf_counter() - begun)
-
-
-def _error_text(status: int, limit: float | None) -> str:
+def _error_text(status: int, limit: float) -> str:
     if status == -signal.SIGPROF:
         return f"TimeLimit: took more than {limit:g} s of processor time"
     how = f"signal {-status}" if status < 0 else f"status {status}"
     return f"ProcessEnded: the process that ran it ended with {how}, {TRIES} times"
 
 
+_here = Crew()  # of executors that run blocks in threads or processes of their own
+after_fork(_here.idle.clear)  # they are the parent's
+
+
+def run_block(block: Block) -> list[Row] | str:
+    """Run a block where an executor has sent it, see ``Crew.run``."""
+    return _here.run(block)
+
+
 class Process:
     """A process that runs points, see ``serve``."""
 
     def __init__(self) -> None:
-        if _ending.is_set():
-            raise SweepError("the sweep is ended")
-        here, there = Pipe()
+        self.link, there = Pipe()
         self.child = subprocess.Popen(
             [sys.executable, "-c", COMMAND.format(there.fileno())],
             env=inherited(**{VARIABLE: "1"}),  # its siblings use the other cores
@@ -163,73 +172,21 @@ class Process:
             process_group=0,  # Ctrl-C is the driver's to answer
         )
         there.close()
-        self.link: Connection[Any, Any] = here
-        _all.add(self)
 
-    def run(self, block: Block, points: dict[int, Point]) -> Iterator[list[Row]]:
-        """Yield rows of points as they come; then it is idle.
+    def run(self, block: Block) -> Iterator[list[Row] | str]:
+        """Yield rows of points as they come, or why it cannot run them.
 
-        TimeoutError if a point hangs, EOFError or OSError if the process ends, SweepError if it
-        cannot run them.
+        EOFError or OSError if the process ends.
         """
-        settings = block.settings
-        limit = settings.limit or 0.0  # of one point
-        first_limit = limit * len(points) if settings.together else limit  # of what comes first
-        self.link.send((settings.job, block.bundle, points, first_limit, limit))
-        patience = None  # s until the next answer; any until it has made the model
-        while (answer := self._answer(patience, LEAST * limit)) is not None:
-            if isinstance(answer, str):
-                _idle.append(self)
-                raise SweepError(f"run: no process can run it: {answer}")
+        self.link.send(block)
+        while (answer := self.link.recv()) is not None:
             yield answer
-            patience = HANGS * (limit if answer else first_limit) or None
-        _idle.append(self)
-
-    def _answer(self, patience: float | None, least: float) -> Any:
-        """Return an answer; TimeoutError if the process takes too little time in its patience."""
-        clock = (~self.child.pid << 3) | 2  # Linux's of its processor time
-        used = time.clock_gettime(clock)
-        while not self.link.poll(patience):
-            before, used = used, time.clock_gettime(clock)
-            if used - before < least:
-                raise TimeoutError
-        return self.link.recv()
 
     def end(self) -> int:
         """End the process in any case; return its status."""
-        _all.discard(self)
         self.child.kill()
         self.link.close()
         return self.child.wait()
-
-
-_idle: list[Process] = []
-_all: set[Process] = set()
-_ending = threading.Event()  # while all are ended, and no new one is to begin
-after_fork(_idle.clear)  # they are the parent's
-after_fork(_all.clear)
-
-
-@atexit.register
-def end_all() -> None:
-    """End all processes that this one started to run points."""
-    _idle.clear()
-    while _all:
-        process = _all.pop()
-        process.child.kill()
-        process.child.wait()
-
-
-@contextmanager
-def ending() -> Iterator[None]:
-    """End all processes, and let none begin meanwhile."""
-    _ending.set()
-    end_all()
-    try:
-        yield
-    finally:
-        end_all()
-        _ending.clear()
 
 
 # In such a process.
@@ -239,37 +196,39 @@ _job = lru_cache(1)(pickle.loads)  # one after another: tasks of a sweep have th
 
 
 def serve(descriptor: int) -> None:
-    """Run points that come through a socket, until it is closed.
+    """Run points that come through a socket, until it is closed or the parent ends.
 
-    The answers to a task are [] once it begins, then lists of rows, at last None; or a text that
-    tells why this process cannot run it. The system ends the process by SIGPROF once a point has
-    taken more processor time than its limit.
+    The answers to a block are lists of rows, at last None; or a text that tells why this process
+    cannot run it. The system ends the process by SIGPROF once a point has taken more
+    processor time than its limit, and by SIGALRM once it hangs.
     """
     os.dup2(2, 1)  # output of functions must not mix with reports
     link: Connection = Connection(descriptor)
-    tasks: queue.SimpleQueue = queue.SimpleQueue()
-    threading.Thread(target=_listen, args=(link, tasks), daemon=True).start()
-    while True:
-        content, bundle, points, first_limit, limit = tasks.get()
-        try:
-            job = _job(content)
-            model = model_of(bundle)
-        except (SerpentailError, ImportError, AttributeError, OSError) as reason:
-            link.send(f"{reason}")
-            continue
-        link.send([])
-        signal.setitimer(signal.ITIMER_PROF, first_limit)
-        for rows in run_points(job, model, points):
-            signal.setitimer(signal.ITIMER_PROF, limit)
-            link.send(rows)
-        signal.setitimer(signal.ITIMER_PROF, 0)
-        link.send(None)
-
-
-def _listen(link: Connection, tasks: queue.SimpleQueue) -> None:
-    """Receive tasks; end the process when the parent is gone."""
-    try:
+    threading.Thread(target=_end_after, args=(os.getppid(),), daemon=True).start()
+    with suppress(EOFError, OSError):
         while True:
-            tasks.put(link.recv())
-    except (EOFError, OSError):
-        os._exit(1)
+            block: Block = link.recv()
+            try:
+                job, model = _job(block.job), model_of(block.bundle)
+            except (SerpentailError, ImportError, AttributeError, OSError) as reason:
+                link.send(f"{reason}")
+                continue
+            _allow(block.limit * (min(len(block.points), TOGETHER) if block.together else 1))
+            for rows in run_points(job, model, block.points):
+                _allow(block.limit * len(rows))  # for as many
+                link.send(rows)
+            _allow(0.0)
+            link.send(None)
+
+
+def _allow(seconds: float) -> None:
+    """Let the next points take some processor time; 0: any."""
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    signal.setitimer(signal.ITIMER_REAL, HANGS * seconds)
+
+
+def _end_after(parent: int) -> None:
+    """End this process when its parent has ended."""
+    while os.getppid() == parent:
+        time.sleep(1)
+    os._exit(1)

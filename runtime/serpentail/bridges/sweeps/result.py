@@ -88,7 +88,7 @@ class Sweep(NearNames):
 
     def __getitem__(self, k: int) -> dict[str, Any]:
         """Return the row of point k; KeyError if it has none yet, IndexError if k is no point."""
-        row = self.store.row(range(len(self))[k])
+        row = next(self.store.rows([range(len(self))[k]]), None)
         if row is None:
             raise KeyError(f"point {k} has no row yet")
         return self._row(row, self.axes.at([row.number])[0])
@@ -124,7 +124,7 @@ class Sweep(NearNames):
     def status(self) -> Status:
         """Return how far the sweep is, from the store's present content."""
         self.store.look()
-        return Status(len(self), int(self.store.done.sum()), self.store.failed)
+        return Status(len(self), int(self.store.done.sum()), int(self.store.failed.sum()))
 
     def motion(self, k: int) -> Any:
         """Run a point again and return its motion.

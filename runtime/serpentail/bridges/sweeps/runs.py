@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import islice
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -35,6 +36,7 @@ STARTS = ("q0", "v0")
 DATA = "data"  # of an identification: its files of marker tracks
 ENDS = ("end_s", "q_end", "v_end", "kinetic_end_J", "potential_end_J")  # outputs by default
 OUTPUTS = (*ENDS, *UNITS)
+TOGETHER = 2048  # flights at once, whose motions are held
 MOST_TEXT = 2000  # characters of an error
 SHARED = (type(None), Damping, TorqueTable, TorqueCurve)  # controllers that any parameters suit
 Outcome = tuple[str | None, str | None]  # JSON, or the error in place of it
@@ -115,7 +117,13 @@ def _name_of(run: Any) -> Any:
 
 
 def run_points(job: Job, model: Model | None, points: Mapping[int, Point]) -> Iterator[list[Row]]:
-    """Yield the rows of points by their numbers, in their order: one at a time, or all at once."""
+    """Yield the rows of points by their numbers, in their order: one at a time, or many at once."""
+    left = iter(points.items())
+    while part := dict(islice(left, TOGETHER)):
+        yield from _run_part(job, model, part)
+
+
+def _run_part(job: Job, model: Model | None, points: Mapping[int, Point]) -> Iterator[list[Row]]:
     if len(points) > 1 and model is not None and job.run == "simulate":
         begun = time.perf_counter()
         try:

@@ -13,7 +13,6 @@ from .axis import Grid, Spread, plain
 from .driver import Driver
 from .points import axes_of
 from .pose import pose
-from .processes import BlockSettings
 from .result import Sweep
 from .runs import ENDS, OUTPUTS, RUNS, STARTS, Job
 from .store import Store
@@ -50,8 +49,8 @@ def sweep(  # noqa: PLR0913 - the public face names all that it takes
         What to run. A function f(model, point) or f(point) returns a dict of plain data. It may
         add its Trajectory or Plan as "motion", for pages.
     store : str or path, optional
-        Folder for the rows, in Parquet files; needs the extra "parquet". Default: in memory. A
-        second call with the same model, run and points runs only what is missing.
+        File for the rows, of SQLite. Default: in memory. A second call with the same model, run
+        and points runs only what is missing.
     points : int, optional
         Number of points of the axes made by ``random``, ``latin`` or ``sobol``.
     seed : int, default 0
@@ -65,8 +64,8 @@ def sweep(  # noqa: PLR0913 - the public face names all that it takes
         their reports.
     limit : float, optional
         Processor time that a point may take (s). A point fails if it takes more, if its run raises
-        an error, or if its process ends. A point that takes less than a tenth of it in ten times
-        the limit on the clock hangs: it gets no row, so that the next call runs it again.
+        an error, or if its process ends. A point that takes ten times as long on the clock hangs:
+        it gets no row, so that the next call runs it again.
     executor : str or concurrent.futures.Executor, optional
         Where the points run: "processes", "processes:4", "dask" (a cluster on this machine),
         "dask:ADDRESS", "dask:FILE.json", or an executor. They are sent in blocks of one
@@ -108,8 +107,7 @@ def sweep(  # noqa: PLR0913 - the public face names all that it takes
     with rows.store.writing():
         if retry_failed:
             rows.store.forget()
-        shared = BlockSettings(rows.posed.job.pickled(), limit, run == "simulate")
-        Driver(rows, shared, name).drive(executor)
+        Driver(rows, limit, name).drive(executor)
     return rows
 
 
@@ -141,7 +139,7 @@ def posed(  # noqa: PLR0913 - the arguments of ``sweep`` on which rows depend
             "the top of a module, and settings that can be pickled"
         ) from None
     problem = pose(model, axes, job, of)
-    return Sweep(problem, Store(store, problem.spec, len(axes)))
+    return Sweep(problem, Store(store, problem.keys))
 
 
 def _settings(settings: Any, run: Any) -> dict[str, Any]:

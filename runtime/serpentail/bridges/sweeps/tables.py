@@ -12,7 +12,7 @@ from ...basics.checks import shown
 from ...basics.errors import SweepError
 from ...basics.extras import needed
 from ...basics.files import refuse_unwritable, replacing, write_csv, write_netcdf
-from .store import AT_ONCE, parquet_library
+from .store import AT_ONCE
 
 if TYPE_CHECKING:
     import xarray
@@ -56,7 +56,7 @@ def write(sweep: "Sweep", path: str | PathLike[str]) -> Path:
 
 def _write_parquet(sweep: "Sweep", path: Path) -> None:
     """Write a column for each entry; SweepError if one has texts and numbers."""
-    arrow, parquet, _ = parquet_library()
+    arrow, parquet = needed("pyarrow", "parquet"), needed("pyarrow.parquet", "parquet")
     schema = arrow.schema([])
     try:
         for part in _parts(sweep):
