@@ -6,7 +6,6 @@ import contextlib
 import faulthandler
 import os
 import resource
-import shutil
 import subprocess
 import tempfile
 import warnings
@@ -16,9 +15,8 @@ import ezc3d  # noqa
 import pytest
 
 import serpentail as st
-from serpentail.bridges.sweeps.result import Sweep
 from serpentail.bridges.sweeps.scene import arguments_of
-from serpentail.bridges.sweeps.store import Row, Shard
+from serpentail.bridges.sweeps.store import Row
 from serpentail.bridges.sweeps.sweep import posed
 from serpentail.cli import cli
 from serpentail.identification import c3d, c3d_child
@@ -53,36 +51,17 @@ duration = [0.1, 0.2]
 OVER = {"x": st.grid(range(20)), "word": st.grid(["a", "b"])}
 
 
-def shard(path):
+def stored(path):
     rows = [Row(k, '{"square":4.0}' if k else None, None if k else "no", 0.1) for k in range(40)]
-    made = sweep_of(path.parent, OVER)
-    with made.writing():
-        made.accept(rows)
-    shutil.copy(made.shards[0].where, path)
+    store = posed(None, OVER, swept.square, path).store
+    with store.writing():
+        store.accept(rows)
 
 
 def rows_of(path):
-    return [Sweep._row(row, {}) for row in Shard(0, 39, 40, 1, str(path)).rows()]
-
-
-def sweep_of(folder, over):
-    return posed(None, over, swept.square, folder / "store").store
-
-
-def described(path):
-    """Write what tells a sweep from others."""
-    begun = sweep_of(path.parent, OVER)
-    with begun.writing():
-        shutil.copy(begun.folder / "sweep.json", path)
-
-
-def adopted(path):
-    """Begin another sweep, which looks for its rows in that one."""
-    begun, folder = sweep_of(path.parent, OVER | {"x": st.grid(range(9))}), path.parent / "store"
-    (folder / f"{begun.folder.name[:16]}-0").mkdir(parents=True)
-    shutil.copy(path, folder / f"{begun.folder.name[:16]}-0" / "sweep.json")
-    with begun.writing():
-        begun.look()
+    found = posed(None, OVER, swept.square, path)
+    with found.store.writing():
+        return found.rows()
 
 
 def motion(path):
@@ -132,8 +111,7 @@ FORMATS = {  # how a file is made and read, and the errors that say what is wron
     "run.csv": (MARKERS[0], lambda path: st.read_markers(path, "m"), ValueError),
     "run.c3d": (lambda path: c3d_of(some(), path), MARKERS[1], ValueError),
     "run.npz": (motion, st.Trajectory.load, ValueError),
-    "run.parquet": (shard, rows_of, st.SweepError),
-    "sweep.json": (described, adopted, st.SweepError),
+    "study.rows": (stored, rows_of, ERRORS),
     "kick_and_land.toml": (packaged, lambda path: st.scenario(path, zoo.folder("ground")), ERRORS),
     "righting_m1_n3.toml": (packaged, read_by(plan_arguments, "plan"), ERRORS),
     "identify_tail.toml": (packaged, read_by(identify_arguments, "identify"), ERRORS),

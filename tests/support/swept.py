@@ -11,6 +11,7 @@ from pathlib import Path
 import serpentail as st
 
 POINTS, HANGS, CRASHES, RAISES, SLEEPS = 60, (33,), (9, 40), (12,), (99,)
+TEXT = "a row of a size that a small disk notices" * 5
 
 
 def square(point):
@@ -39,7 +40,7 @@ def troubled(pause, log, point):
     if number in RAISES:
         raise ValueError("no such number")
     time.sleep(pause)
-    return {"twice": 2 * number}
+    return {"twice": 2 * number, "text": TEXT}
 
 
 def part(folder, result=None):
@@ -73,6 +74,8 @@ def main(folder, executor, pause):
 
 
 if __name__ == "__main__":
+    from tests.support.swept import main  # whose functions have the names that others see
+
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         main(Path(sys.argv[1]), sys.argv[2], float(sys.argv[3]))

@@ -36,7 +36,7 @@ from .runs import TOGETHER, run_points
 from .store import Row
 
 TRIES = 2  # of a point whose process ends: something else may have ended it
-HANGS = 10  # limits on the clock in which a point hangs
+HANGS = 30  # limits on the clock in which a point hangs: on a crowded machine it may still work
 COMMAND = "from serpentail.bridges.sweeps.processes import serve; serve({})"
 MOST_MODELS = 64  # that a process keeps
 

@@ -64,7 +64,7 @@ def sweep(  # noqa: PLR0913 - the public face names all that it takes
         their reports.
     limit : float, optional
         Processor time that a point may take (s). A point fails if it takes more, if its run raises
-        an error, or if its process ends. A point that takes ten times as long on the clock hangs:
+        an error, or if its process ends. A point that takes 30 times as long on the clock hangs:
         it gets no row, so that the next call runs it again.
     executor : str or concurrent.futures.Executor, optional
         Where the points run: "processes", "processes:4", "dask" (a cluster on this machine),
