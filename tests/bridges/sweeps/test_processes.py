@@ -52,7 +52,7 @@ def test_points_that_hang_crash_or_raise_are_rows(worker, tmp_path):
             assert row["error"] is None and row["twice"] == 2 * row["number_of"]
     log = (tmp_path / "log").read_text().split()
     crashed = [log.count(str(number)) for number in swept.CRASHES]
-    assert crashed == [2, 2] and log.count(str(swept.HANGS[0])) == 1 and found.status().failed == 4
+    assert found.status().failed == 4 and set(crashed) <= {2, 3}  # once with others, twice alone
 
 
 def test_a_limit_is_of_processor_time_and_what_sleeps_is_given_up_without_a_row(worker, tmp_path):

@@ -62,7 +62,7 @@ class Driver:
     def __init__(self, sweep: Sweep, limit: float | None, name: str):
         self.store, self.posed, self.spent = sweep.store, sweep.posed, sweep.spent
         self.name, self.job = name, sweep.posed.job
-        self.usual = Block(self.job.pickled(), limit or 0.0, self.job.run == "simulate", None, {})
+        self.usual = Block(self.job.pickled(), limit or 0.0, None, {})
         missing = np.flatnonzero(~self.store.done)
         models = self.posed.models[self.posed.axes.places(missing)]
         bundles = enumerate(self.posed.bundles)
@@ -75,7 +75,7 @@ class Driver:
         begun = time.perf_counter()
         with Stage("sweep", self.name) as stage:
             self._tell(stage)
-            if executor is None and not self.usual.limit and self.usual.together:
+            if executor is None and not self.usual.limit and self.job.run == "simulate":
                 self._run_here(stage)
             if self.groups:
                 with place_of(executor) as place:

@@ -75,13 +75,6 @@ def pose(what: Any, axes: Axes, job: Job, of: Any) -> Posed:
     axes = axes.measured(units)
     if isinstance(what, Model):
         _refuse_shapes(what, axes)
-    grids = [[names, _row_texts(names, columns, job)] for names, columns in axes.grids.items()]
-    for k, (_, rows) in enumerate(grids):
-        if len(set(rows)) < len(rows):
-            place = next(i for i, row in enumerate(rows) if row in rows[:i])
-            number = place * int(np.prod(axes.sizes[k + 1 :]))
-            point = shown(axes.at([number])[0])
-            raise SweepError(f"over: point {number} occurs twice, {point}: needs each once")
 
     # one model for each place on the axes that decide on it; the last axis has all spreads
     decides = [not job.built.isdisjoint(names) for names in axes.grids]
@@ -94,7 +87,12 @@ def pose(what: Any, axes: Axes, job: Job, of: Any) -> Posed:
     files = job.digest_of({}) if job.run == "identify" and DATA not in axes.names else ""
     family = [__version__, job.identity(), plain("of", of), files, sorted(job.built)]
     hashes = [_hash([*family, bundle.identity if bundle else ""]) for bundle in bundles]
-    keys = np.reshape(np.array(hashes, np.uint64), shape) + _places_hashed(axes, grids)
+    keys = np.reshape(np.array(hashes, np.uint64), shape) + _places_hashed(axes, job)
+    _, firsts = np.unique(keys, return_index=True)
+    if len(firsts) < len(axes):
+        number = int(np.setdiff1d(np.arange(len(axes)), firsts)[0])
+        point = shown(axes.at([number])[0])
+        raise SweepError(f"over: point {number} occurs twice, {point}: needs each once")
     models = np.broadcast_to(models.reshape(shape), axes.sizes)
     return Posed(axes, job, bundles, models, keys.view(np.int64).ravel())
 
@@ -104,15 +102,15 @@ def _hash(told: Any) -> int:
     return int.from_bytes(blake2b(as_json(told).encode(), digest_size=8).digest(), "little")
 
 
-def _places_hashed(axes: Axes, grids: Sequence) -> np.ndarray:
+def _places_hashed(axes: Axes, job: Job) -> np.ndarray:
     """Return a number for each point of the axes: a sum, so that the order of these is no matter.
 
-    Of fewer or more samples the first ones are the same, but not those of a Latin hypercube. Two of
-    ten million points have the same number by a chance of 1e-5 at most.
+    Of fewer or more samples the first ones are the same, but not those of a Latin hypercube.
     """
     summed = np.zeros((), np.uint64)
-    for names, rows in grids:
-        summed = np.add.outer(summed, np.array([_hash([names, row]) for row in rows], np.uint64))
+    for names, columns in axes.grids.items():
+        rows = [_hash([names, text]) for text in _row_texts(names, columns, job)]
+        summed = np.add.outer(summed, np.array(rows, np.uint64))
     if axes.spreads:
         told: list[Any] = [
             [name, axis.kind, axis.low.tolist(), axis.high.tolist(), axis.law]

@@ -13,17 +13,15 @@ import sys
 import threading
 import time
 import zlib
-from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache
-from itertools import islice
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from typing import NamedTuple
 
-from ...basics.errors import SerpentailError
+from ...basics.errors import SerpentailError, SweepError
 from ...compiling.cache import cache_folder
 from ...compiling.commands import inherited
 from ...compiling.threads import VARIABLE, after_fork
@@ -71,13 +69,11 @@ def model_of(bundle: Bundle | None) -> Model | None:
 class Block(NamedTuple):
     """Points of one model, by the numbers of their rows.
 
-    job: pickled; limit: seconds of processor time that a point may take, 0: no limit; together:
-    whether points may be run side by side, with all results at once.
+    job: pickled; limit: seconds of processor time that a point may take, 0: no limit.
     """
 
     job: bytes
     limit: float
-    together: bool
     bundle: Bundle | None
     points: dict[int, Point]
 
@@ -90,49 +86,37 @@ class Crew:
         self.idle: list[Process] = []
         self.dismissed = False
 
-    def run(self, block: Block) -> list[Row] | str:
-        """Return the rows of a block but of points that hang, or why no process can run it.
+    def run(self, block: Block, tries: int = TRIES) -> list[Row]:
+        """Return the rows of a block but of points that hang; SweepError if none can run it.
 
-        A point fails if it takes more processor time than the limit, or if its process ends twice.
-        The reason is no exception, because Dask would print that.
+        A point fails if it takes more processor time than the limit, or if it ends its process as
+        often as it is tried.
         """
-        rows: list[Row] = []
-        left, ends = dict(block.points), Counter[int]()
-        while left and not self.dismissed:
-            # after an end one by one, so that the point at fault shows
-            points = dict(islice(left.items(), 1 if ends else None))
-            process, begun = self._process(), time.perf_counter()
-            try:
-                for answer in process.run(block._replace(points=points)):
-                    if isinstance(answer, str):
-                        self.idle.append(process)
-                        return f"run: no process can run it: {answer}"
-                    rows += answer
-                    for row in answer:
-                        del left[row.number]
-                    begun = time.perf_counter()
-                self.idle.append(process)
-                continue
-            except (EOFError, OSError):
-                self.all.discard(process)
-                status = process.end()
-            number = next(iter(left), -1)
-            ends[number] += 1
-            if len(points) > 1 and block.together:
-                continue
-            if status in (-signal.SIGPROF, -signal.SIGALRM) or ends[number] >= TRIES:
-                left.pop(number, None)
-                if status != -signal.SIGALRM:
-                    error = _error_text(status, block.limit)
-                    rows.append(Row(number, None, error, time.perf_counter() - begun))
-        return rows
-
-    def _process(self) -> "Process":
+        begun = time.perf_counter()
         process = self.idle.pop() if self.idle else Process()
         self.all.add(process)
         if self.dismissed:  # while it was made
             process.child.kill()
-        return process
+        try:
+            answer = process.run(block)
+            self.idle.append(process)
+            if isinstance(answer, str):
+                raise SweepError(f"run: no process can run it: {answer}")
+            return answer
+        except (EOFError, OSError):
+            self.all.discard(process)
+            status = process.end()
+        if self.dismissed:
+            return []
+        if len(block.points) > 1:  # one by one, so that the point at fault shows
+            alone = (block._replace(points={k: point}) for k, point in block.points.items())
+            return [row for each in alone for row in self.run(each)]
+        if status == -signal.SIGALRM:
+            return []
+        if tries > 1 and status != -signal.SIGPROF:
+            return self.run(block, tries - 1)
+        error = _error_text(status, block.limit)
+        return [Row(number, None, error, time.perf_counter() - begun) for number in block.points]
 
     def dismiss(self) -> None:
         """End all processes; their threads return, and start no others."""
@@ -155,8 +139,14 @@ after_fork(_here.idle.clear)  # they are the parent's
 
 
 def run_block(block: Block) -> list[Row] | str:
-    """Run a block where an executor has sent it, see ``Crew.run``."""
-    return _here.run(block)
+    """Return the rows of a block where an executor has sent it, or why no process can run it.
+
+    The reason is no exception, because Dask would print that.
+    """
+    try:
+        return _here.run(block)
+    except SweepError as reason:
+        return str(reason)
 
 
 class Process:
@@ -173,14 +163,14 @@ class Process:
         )
         there.close()
 
-    def run(self, block: Block) -> Iterator[list[Row] | str]:
-        """Yield rows of points as they come, or why it cannot run them.
+    def run(self, block: Block) -> list[Row] | str:
+        """Return the rows of a block, or why it cannot run it.
 
         EOFError or OSError if the process ends.
         """
         self.link.send(block)
-        while (answer := self.link.recv()) is not None:
-            yield answer
+        answer: list[Row] | str = self.link.recv()
+        return answer
 
     def end(self) -> int:
         """End the process in any case; return its status."""
@@ -198,9 +188,9 @@ _job = lru_cache(1)(pickle.loads)  # one after another: tasks of a sweep have th
 def serve(descriptor: int) -> None:
     """Run points that come through a socket, until it is closed or the parent ends.
 
-    The answers to a block are lists of rows, at last None; or a text that tells why this process
-    cannot run it. The system ends the process by SIGPROF once a point has taken more
-    processor time than its limit, and by SIGALRM once it hangs.
+    The answer to a block is a list of rows, or a text that tells why it cannot be run. The system
+    ends the process by SIGPROF once a point has taken more processor time than its limit, and by
+    SIGALRM once it hangs.
     """
     os.dup2(2, 1)  # output of functions must not mix with reports
     link: Connection = Connection(descriptor)
@@ -213,12 +203,13 @@ def serve(descriptor: int) -> None:
             except (SerpentailError, ImportError, AttributeError, OSError) as reason:
                 link.send(f"{reason}")
                 continue
-            _allow(block.limit * (min(len(block.points), TOGETHER) if block.together else 1))
-            for rows in run_points(job, model, block.points):
-                _allow(block.limit * len(rows))  # for as many
-                link.send(rows)
+            rows: list[Row] = []
+            _allow(block.limit * (min(len(block.points), TOGETHER) if job.run == "simulate" else 1))
+            for part in run_points(job, model, block.points):
+                _allow(block.limit * len(part))  # for as many
+                rows += part
             _allow(0.0)
-            link.send(None)
+            link.send(rows)
 
 
 def _allow(seconds: float) -> None:
