@@ -93,7 +93,7 @@ def _add_sweep(verbs: argparse._SubParsersAction) -> None:
     text = "make the runs of a scene's table [sweep]; the same command resumes where it stopped"
     add = verbs.add_parser("sweep", help=text).add_argument
     add("scene", help="a scene file with a table [sweep], such as study.toml")
-    add("--store", type=Path, metavar="FOLDER", help="folder for the rows")
+    add("--store", type=Path, metavar="FILE", help="file for the rows")
     place = "processes:4, dask (on this machine), dask:tcp://host:8786 or dask:scheduler.json"
     add("--executor", metavar="WHERE", help=f"{place}; by default processes")
     add("--status", action="store_true", help="report how far it is, and run nothing")

@@ -1,14 +1,12 @@
 """``Sweep``: the rows of a sweep, from its store."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-from serpentail_scene.messages import one_line
 
 from ...basics.errors import SweepError
 from ...basics.extras import needed
@@ -18,7 +16,7 @@ from .points import Axes, checked_row
 from .pose import Posed
 from .processes import model_of
 from .runs import run_point
-from .store import AT_ONCE, Row, Store
+from .store import AT_ONCE, Store
 from .tables import dataset, flat, write
 
 if TYPE_CHECKING:
@@ -88,30 +86,24 @@ class Sweep(NearNames):
 
     def __getitem__(self, k: int) -> dict[str, Any]:
         """Return the row of point k; KeyError if it has none yet, IndexError if k is no point."""
-        row = next(self.store.rows([range(len(self))[k]]), None)
-        if row is None:
-            raise KeyError(f"point {k} has no row yet")
-        return self._row(row, self.axes.at([row.number])[0])
+        for row in self._rows([range(len(self))[k]]):
+            return row
+        raise KeyError(f"point {k} has no row yet")
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
         """Yield all rows that exist, in the order of their points."""
-        rows = self.store.rows()
-        while some := list(islice(rows, AT_ONCE)):
-            points = self.axes.at([row.number for row in some])
-            yield from map(self._row, some, points)
+        return self._rows(None)
 
-    @staticmethod
-    def _row(row: Row, point: dict[str, Any]) -> dict[str, Any]:
-        """Return a stored row as a dict; SweepError if it is damaged."""
-        try:
-            outcome = {} if row.outcome is None else json.loads(row.outcome)
-            outcome |= {"error": row.error, "seconds": row.seconds}
-            return {"number": row.number} | point | outcome
-        except (RecursionError, TypeError, ValueError) as reason:
-            raise SweepError(
-                f"store: the row of point {row.number} is damaged ({one_line(str(reason))}): "
-                "restore a copy, or name another folder"
-            ) from None
+    def _rows(self, numbers: Sequence[int] | None) -> Iterator[dict[str, Any]]:
+        """Yield the rows of some points, by default of all; SweepError if one is damaged."""
+        rows = self.store.rows(numbers)
+        while some := list(islice(rows, AT_ONCE)):
+            pairs = zip(some, self.axes.at([row.number for row in some]), strict=True)
+            with self.store.reading():
+                for row, point in pairs:
+                    outcome = json.loads(row.outcome or "{}")
+                    told = {"error": row.error, "seconds": row.seconds}
+                    yield {"number": row.number} | point | outcome | told
 
     def rows(self) -> list[dict[str, Any]]:
         """Return all rows that exist, in the order of their points.

@@ -6,6 +6,7 @@ import pickle
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import islice
@@ -120,28 +121,23 @@ def run_points(job: Job, model: Model | None, points: Mapping[int, Point]) -> It
     """Yield the rows of points by their numbers, in their order: one at a time, or many at once."""
     left = iter(points.items())
     while part := dict(islice(left, TOGETHER)):
-        yield from _run_part(job, model, part)
-
-
-def _run_part(job: Job, model: Model | None, points: Mapping[int, Point]) -> Iterator[list[Row]]:
-    if len(points) > 1 and model is not None and job.run == "simulate":
-        begun = time.perf_counter()
-        try:
-            outcomes = _side_by_side(job, model, list(points.values()))
-        except (SerpentailError, TypeError, ValueError):  # one by one, the point at fault shows
-            outcomes = None
+        begun, outcomes = time.perf_counter(), None
+        if len(part) > 1 and model is not None and job.run == "simulate":
+            # where this fails, the point at fault shows one by one
+            with suppress(SerpentailError, TypeError, ValueError):
+                outcomes = _side_by_side(job, model, list(part.values()))
         if outcomes is not None:
-            seconds = (time.perf_counter() - begun) / len(points)
-            pairs = zip(points, outcomes, strict=True)
+            seconds = (time.perf_counter() - begun) / len(part)
+            pairs = zip(part, outcomes, strict=True)
             yield [Row(number, *outcome, seconds) for number, outcome in pairs]
-            return
-    for number, point in points.items():
-        begun = time.perf_counter()
-        try:
-            outcome, error = _as_text(run_point(job, model, point)[0]), None
-        except Exception as reason:  # a failure is a row, too
-            outcome, error = None, _error_text(reason)
-        yield [Row(number, outcome, error, time.perf_counter() - begun)]
+            continue
+        for number, point in part.items():
+            begun = time.perf_counter()
+            try:
+                outcome, error = _as_text(run_point(job, model, point)[0]), None
+            except Exception as reason:  # a failure is a row, too
+                outcome, error = None, _error_text(reason)
+            yield [Row(number, outcome, error, time.perf_counter() - begun)]
 
 
 def run_point(job: Job, model: Model | None, point: Point) -> tuple[dict[str, Any], Any]:

@@ -16,6 +16,7 @@ from ...basics.errors import NotWritten, SweepError
 TABLE = "CREATE TABLE rows (point INTEGER, outcome TEXT, error TEXT, seconds REAL)"
 FOUND = np.dtype([("place", np.int64), ("point", np.int64), ("failed", bool)])
 AT_ONCE = 2048  # rows that are read together
+FAULTS = (OSError, OverflowError, RecursionError, TypeError, ValueError, sqlite3.Error)
 PATIENCE_S = 60  # s to wait while another process reads
 
 
@@ -52,7 +53,7 @@ class Store:
 
     def _open(self) -> bool:
         """Open the file, which need not exist; return whether it has a table of rows."""
-        with self._reading():
+        with self.reading():
             if self.base is None:
                 self.base = sqlite3.connect(
                     self.path or ":memory:",
@@ -66,21 +67,21 @@ class Store:
         return bool(tables)
 
     @contextmanager
-    def _reading(self) -> Iterator[None]:
-        """SweepError if the file is damaged, of another program, or out of reach."""
+    def reading(self) -> Iterator[None]:
+        """SweepError where the file is damaged, of another program, or out of reach."""
         try:
             yield
-        except (OSError, OverflowError, TypeError, ValueError, sqlite3.Error) as reason:
+        except FAULTS as reason:
             raise SweepError(
-                f"store: {str(self.path)!r:.300} cannot be used ({one_line(str(reason))}): name "
-                "another file"
+                f"store: {str(self.path)!r:.300} cannot be used ({one_line(str(reason))}): needs a "
+                "file that sweeps of this version made, or a new one"
             ) from None
 
     @contextmanager
     def writing(self) -> Iterator[None]:
         """Be the one process that writes; SweepError if another is."""
         if self.path is not None:
-            with self._reading():
+            with self.reading():
                 self.path.parent.mkdir(parents=True, exist_ok=True)
         known = self._open()
         try:
@@ -117,7 +118,7 @@ class Store:
         there = self.path is None or self.path.exists()
         if not (there and self._open()):
             return
-        with self._reading():
+        with self.reading():
             rows = self.base.execute("SELECT rowid, point, error IS NOT NULL FROM rows")
             found = np.fromiter(rows, FOUND)
         _, numbers, k = np.intersect1d(self.keys, found["point"], return_indices=True)
@@ -147,7 +148,7 @@ class Store:
         for part in np.split(asked, range(AT_ONCE, len(asked), AT_ONCE)):
             places = ",".join(map(str, self.places[part]))
             rows = f"SELECT point, outcome, error, seconds FROM rows WHERE rowid IN ({places})"
-            with self._reading():
+            with self.reading():
                 found = {key: rest for key, *rest in self.base.execute(rows)}
             pairs = zip(part.tolist(), self.keys[part].tolist(), strict=True)
             yield from (Row(number, *found[key]) for number, key in pairs if key in found)
