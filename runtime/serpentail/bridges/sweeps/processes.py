@@ -98,7 +98,8 @@ class Crew:
         if self.dismissed:  # while it was made
             process.child.kill()
         try:
-            answer = process.run(block)
+            process.link.send(block)
+            answer: list[Row] | str = process.link.recv()
             self.idle.append(process)
             if isinstance(answer, str):
                 raise SweepError(f"run: no process can run it: {answer}")
@@ -162,15 +163,6 @@ class Process:
             process_group=0,  # Ctrl-C is the driver's to answer
         )
         there.close()
-
-    def run(self, block: Block) -> list[Row] | str:
-        """Return the rows of a block, or why it cannot run it.
-
-        EOFError or OSError if the process ends.
-        """
-        self.link.send(block)
-        answer: list[Row] | str = self.link.recv()
-        return answer
 
     def end(self) -> int:
         """End the process in any case; return its status."""
