@@ -10,6 +10,7 @@ import sys
 import time
 from collections import Counter
 from contextlib import closing, contextmanager
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -129,15 +130,11 @@ def finish(folder, executor):
     return counts
 
 
-def few_rows():
-    """Let no file be larger than one of few rows."""
-    resource.setrlimit(resource.RLIMIT_FSIZE, (13_000, 13_000))
-
-
 @pytest.mark.slow
 def test_a_full_disk_kills_and_ctrl_c_keep_the_rows(tmp_path):
     """On the same rows, one after the other: none is lost, and none that is there made again."""
-    process = driver(tmp_path, "processes:2", preexec_fn=few_rows)
+    few = partial(resource.setrlimit, resource.RLIMIT_FSIZE, (13_000, 13_000))  # bytes a file
+    process = driver(tmp_path, "processes:2", preexec_fn=few)
     told = process.communicate(timeout=PATIENCE)[1].splitlines()[-1]
     assert process.returncode == 1 and "is not written" in told and "make room" in told
     assert 0 < len(rows(tmp_path)) < swept.POINTS
