@@ -1,10 +1,11 @@
 """Drops gain no energy, and what once broke stays mended; parts of studies are made once."""
 
+import sqlite3
+from contextlib import closing
 from functools import partial
 
 import numpy as np
 import pytest
-from filelock import FileLock
 
 import serpentail as st
 from checks.stress import drops
@@ -148,6 +149,7 @@ def test_parts_are_made_once_and_again_where_inputs_change_files_are_gone_or_one
         assert found["third"] == 1 / 3 and np.isnan(found["lost"])  # JSON has no NaN of its own
         assert times == count
         picture.touch()
-    lock = FileLock(tmp_path / "parts" / "study.rows" / "lock")
-    with lock, pytest.raises(st.SerpentailError, match="another process is writing"):
-        one(tmp_path, 4)
+    with closing(sqlite3.connect(tmp_path / "parts" / "study.rows", isolation_level=None)) as other:
+        other.execute("BEGIN IMMEDIATE")
+        with pytest.raises(st.SerpentailError, match="another process is writing"):
+            one(tmp_path, 4)

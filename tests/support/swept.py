@@ -3,8 +3,10 @@
 import ctypes
 import os
 import signal
+import sqlite3
 import sys
 import time
+from contextlib import closing
 from functools import partial
 from pathlib import Path
 
@@ -12,6 +14,15 @@ import serpentail as st
 
 POINTS, HANGS, CRASHES, RAISES, SLEEPS = 60, (33,), (9, 40), (12,), (99,)
 TEXT = "a row of a size that a small disk notices" * 5
+
+
+def stored(path):
+    """Read a store as another program does: point, outcome, error."""
+    if not path.exists():
+        return []
+    with closing(sqlite3.connect(path)) as base:
+        begun = base.execute("SELECT name FROM sqlite_master").fetchall()
+        return base.execute("SELECT point, outcome, error FROM rows").fetchall() if begun else []
 
 
 def square(point):

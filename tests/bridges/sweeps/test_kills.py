@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
@@ -89,12 +89,9 @@ def driver(folder, executor, **settings):
 
 
 def rows(folder):
-    """Read the store as another program does: number, outcome, error."""
+    """Read the rows of the store: number, outcome, error."""
     numbers = {int(key): k for k, key in enumerate(posed(**swept.study(folder, 0.1)).posed.keys)}
-    with closing(sqlite3.connect(folder / "s.rows")) as base:
-        begun = base.execute("SELECT name FROM sqlite_master").fetchall()
-        found = base.execute("SELECT point, outcome, error FROM rows") if begun else []
-        return [(numbers[key], *told) for key, *told in found]
+    return [(numbers[key], *told) for key, *told in swept.stored(folder / "s.rows")]
 
 
 def wait_for(count, folder, process):
