@@ -204,6 +204,7 @@ def test_what_cannot_be_is_refused_in_one_line():
 
 
 def test_exports_and_iteration_hold_few_rows(tmp_path):
+    pytest.importorskip("pyarrow.parquet")  # before memory counts
     count = 20_000
     found = posed(None, {"x": st.grid(range(count))}, swept.square, tmp_path / "rows")
     with found.store.writing():
