@@ -119,13 +119,37 @@ def roll_inertias(model: st.Model) -> tuple[float, float]:
     return float(whole), float(-tail)
 
 
+def planar_sweep(p: dict, legs: tuple[str, ...], mass: float) -> float:
+    """Sweep (deg) of a tail across the body that turns it by 180 deg, by hand and in a plane, with
+    rods as legs. mass: of the tail, or the reduced mass.
+    """
+    tail, body = p["link_inertias"][0] + mass * p["link_centers"][0] ** 2, p["torso_inertia"][1]
+    for leg in legs:
+        out = p[f"{leg}_mount"][0] + p[f"{leg}_link_centers"][0]
+        body += 2 * (p[f"{leg}_link_inertias"][0] + p[f"{leg}_mass"] * out**2)
+    return 180 * (1 + body / tail)
+
+
 def gecko(folder: Path) -> dict[str, float | bool]:
     """A rigid tail across the body swings about its long axis, with legs and without."""
     legged, bare = st.build("gecko_legs", links=1), st.build("gecko_legs", links=1, chain={})
     p = legged.parameters
     legs = 2 * (p["hind_mass"] + p["fore_mass"])
     (whole, tail), (whole_bare, tail_bare) = roll_inertias(legged), roll_inertias(bare)
-    body, sweep = p["torso_inertia"][1], np.pi * whole / tail
+    body, sweep, sweep_bare = (
+        p["torso_inertia"][1],
+        np.pi * whole / tail,
+        180 * whole_bare / tail_bare,
+    )
+
+    # the axis fixed: the tail's own mass counts; free: the reduced mass, as by hand
+    m = p["tail_mass"]
+    fixed = tail + m**2 / (p["torso_mass"] + m + legs) * p["link_centers"][0] ** 2
+    fixed_bare = tail_bare + m**2 / (p["torso_mass"] + m) * p["link_centers"][0] ** 2
+    by_hand = [
+        planar_sweep(p, names, m * rest / (rest + m))
+        for names, rest in ((("hind", "fore"), p["torso_mass"] + legs), ((), p["torso_mass"]))
+    ]
 
     on_its_back = [0.0, 0.0, 1.0, 0.0]
     path = [[SIDEWAYS, -sweep / 2], [SIDEWAYS, sweep / 2]]
@@ -137,7 +161,10 @@ def gecko(folder: Path) -> dict[str, float | bool]:
         "legs_mass": 100 * legs / (p["torso_mass"] + p["tail_mass"] + legs),
         "legs_inertia": 100 * (1 - body / (whole - tail)),
         "sweep": float(np.degrees(sweep)),
-        "sweep_bare": 180 * whole_bare / tail_bare,
+        "sweep_bare": sweep_bare,
+        "fixed": 180 * (1 + (whole - tail) / fixed),
+        "fixed_bare": 180 * (1 + (whole_bare - tail_bare) / fixed_bare),
+        "reduced": bool(np.allclose(by_hand, [np.degrees(sweep), sweep_bare], rtol=1e-9)),
         "tail": bool(upright > np.cos(np.radians(30))),
         "alone": bool(shares.turns["tail"][-1, 1] > 0.95 * shares.turned[-1, 1] > 0),
         "torque": 1e3 * float(np.abs(motion.tau[:, :2]).max()),
