@@ -204,12 +204,14 @@ def yaw(folder: Path) -> dict[str, bool]:
     # the tail's centre of mass by that of the animal, both seen from the torso's
     p = rat.parameters
     com = rat.center_of_mass(motion.q, motion.v)[0] - motion.q[:, :3]
-    away = np.hypot(*com[:, :2].T) * (p["torso_mass"] + p["tail_mass"]) / p["tail_mass"]
+    x, y, _ = (com * (p["torso_mass"] + p["tail_mass"]) / p["tail_mass"]).T
+    away, swing_rate = np.hypot(x, y), np.abs(np.gradient(np.unwrap(np.arctan2(y, x)), times))
     omega = st.rotation_matrix(motion.attitude) @ motion.v[:, 3:6, None]
     rate, near = np.abs(omega[:, 2, 0]), away < np.median(away)
     parts = st.momentum_shares(rat, motion).momentum
     changes = [np.gradient(parts[name][:, 2], times) for name in ("torso", "tail")]
     return {
         "stepwise": bool(rate[near].mean() < rate[~near].mean() / 2),
+        "lever": bool(np.corrcoef(rate, swing_rate * away**2)[0, 1] > 0.99),
         "proportional": bool(abs(np.corrcoef(*changes)[0, 1]) > 0.95),
     }

@@ -7,6 +7,7 @@ morphology      plans of righting for tails of many shapes, from many tumbles: 2
 replanning      bodies unlike the planned one: the plan's torques, PFL, predictive control
 pushed          hard pushes in flight: predictive control, and new plans where its flags ask
 identification  how often the intervals of identified parameters cover the truth
+air             righting of 1000 tumbles with a bare tail and a tuft, by plans with air and without
 
 The work is done in parallel, as many processes as $SERPENTAIL_THREADS says or there are cores. Each
 part is kept in FOLDER, so that an interrupted study resumes. The options are those of one study.
@@ -29,6 +30,7 @@ OPTIONS = {
         "segments": (front.count, 1, "segments of the tail"),
         "links": (int, 3, "links of each; 0: a continuum"),
     },
+    "air": {"tumbles": (front.count, 1000, "tumbling starts")},
 }
 NAMES = ("contact", "landing", *OPTIONS)
 
