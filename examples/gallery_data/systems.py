@@ -17,6 +17,7 @@ HERE = Path(__file__).parent
 ROLL = 4  # of the torso's velocities in v
 SIDEWAYS = np.pi / 2  # rad, pitch of a tail across the body: its yaw then turns it about the body
 STEADY = 1e-10  # rtol
+MOVED = 0.2  # by how much of its length a bone may be longer or shorter
 
 
 def swing(model: st.Model, path: list, duration: float, attitude: list) -> st.Trajectory:
@@ -171,8 +172,10 @@ def gecko(folder: Path) -> dict[str, float | bool]:
     }
 
 
-def joints(folder: Path) -> dict[str, bool]:
-    """Efforts of one turn by tails of one to four joints of two axes, of equal length and mass."""
+def joints(folder: Path) -> dict[str, float | bool]:
+    """Efforts of one turn by tails of one to four joints of two axes, of equal length and mass; the
+    best place of the joint between two bones.
+    """
     turn = Rotation.from_euler("ZXY", [30, 20, 40], degrees=True).as_quat(scalar_first=True)
     task = {"goal": st.Goal(attitude=turn), "duration": 0.3}
     task["bounds"] = st.Bounds(torque=0.05, angle="90 deg")
@@ -186,7 +189,23 @@ def joints(folder: Path) -> dict[str, bool]:
         motions[f"{count} joints"] = plan.trajectory
     st.view(list(motions.values()), folder / "joints.html", names=list(motions))
     saved = -np.diff(efforts)
-    return {"help": bool((saved > 0).all()), "returns": bool((np.diff(saved) < 0).all())}
+
+    length, mass = rat.parameters["tail_length"], rat.parameters["tail_mass"]
+    bones = [{"links": 1, "length": length / 2, "mass": mass / 2}] * 2
+    rat = st.build(tail="articulated", segments=bones, purpose=["plan"])
+    start = rat.state(bends=[[0.1, 0.1]] * 2)
+    ends = tuple([length / 2 * (1 + moved)] * 2 for moved in (-MOVED, MOVED))
+    free = {"design": {"link_lengths": ends}, "design_totals": {"link_lengths": length}}
+    free["guess"] = st.plan(rat, start=start, **task)
+    best = st.plan(
+        rat, start=start, **task | {"solver": st.Solver(track=False, multi_start=3)}, **free
+    )
+    first, second = best.design["link_lengths"]
+    return {
+        "help": bool((saved > 0).all()),
+        "returns": bool((np.diff(saved) < 0).all()),
+        "lengths": first / second if best.success else np.nan,
+    }
 
 
 def yaw(folder: Path) -> dict[str, bool]:
