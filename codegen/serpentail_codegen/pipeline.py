@@ -97,6 +97,7 @@ def _tree(tail: Tail, chains: tuple[Tail, ...]) -> Tail:
     own = [replace(s, kind=s.kind if s.kind in KINDS else "hinge") for s in each]
     kinds, counts = (tuple(getattr(s, name) for s in own) for name in ("kind", "points"))
     mixed = len(set(kinds)) > 1
+    owned = {name: [c.name for c in chains if c.owner == name] for name in tail.contacts}
     fall = Shape(weightless=tail.shape.weightless, sloped=tail.shape.sloped)
     return replace(
         tail,
@@ -104,6 +105,7 @@ def _tree(tail: Tail, chains: tuple[Tail, ...]) -> Tail:
         links=max(counts),
         kind="mixed" if mixed else kinds[0],
         bend_range=max(chain.bend_range for chain in chains),
+        contacts=tuple(group for name, own in owned.items() for group in own or [name]),
         shape=replace(fall, counts=counts, kinds=kinds * mixed),
         passive=tuple(part for part in PARTS if any(part in chain.passive for chain in chains)),
         branches=chains,

@@ -28,7 +28,7 @@ from .rules import (
 
 KINDS = ("articulated", "continuum", "mixed")
 LIMBS = ("limb", "placed_limb")  # of other chains: all bodies along -y, or bodies anywhere
-GROUPS = ("feet", "tail", "torso")  # of contact points, in their order
+GROUPS = ("feet", "tail", "torso")  # of contact points; other chains follow the tail
 TARGETS = ("c", "casadi")  # languages to emit, in their order
 # a model with such a name would hide the system's header
 C_HEADERS = (
@@ -58,8 +58,13 @@ BEND = KeyRule(
     lambda x: not isinstance(x, bool) and isinstance(x, int | float) and 0 < x <= 100,
     {"exclusiveMinimum": 0, "maximum": 100},
 )
-CONTACTS = different(
-    GROUPS, 'an array of different names out of "feet", "tail" and "torso", such as ["feet"]'
+CONTACTS = KeyRule(
+    'an array of different names out of "feet", "tail", "torso" and other chains, such as ["feet"]',
+    lambda x: (
+        isinstance(x, list | tuple)
+        and all(isinstance(name, str) and x.count(name) == 1 for name in x)
+    ),
+    {"type": "array", "items": {"anyOf": [{"enum": [*GROUPS]}, NAME.schema]}, "uniqueItems": True},
 )
 PURPOSE = different(
     list(PURPOSES),

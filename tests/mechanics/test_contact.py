@@ -12,14 +12,27 @@ from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.targets.c.loops import in_loops
 from serpentail_codegen.targets.c.straight import straight_line
+from tests.functions.test_trees import ARM, LEG, LIMB, WHEEL
+from tests.references.body_set import Animal, Chain
 from tests.references.contact import Contacts, attitude
 from tests.references.parameters import random_states
-from tests.support import zoo
+from tests.support import own_tails, zoo
 from tests.support.rows import row
 
 LAWS = ["ground", "smooth", "paper"]  # all laws of friction on one tail
-TAILS = ["ground_m2_n2", "ground_arcs"]
+TAILS = ["ground_m2_n2", "ground_arcs", "tree_ground"]
 TAILS += [pytest.param("ground_mixed", marks=pytest.mark.slow)]
+SIDES = [(segments, *LEG[1:]) for segments in (LIMB[0][:2], own_tails.ARC_BODIES[:1])]
+SIDES[1] = (SIDES[1][0], (0.002, 0.05, 0.01), LEG[2])
+TREE = Animal(
+    segments=own_tails.LINK_BODIES[1:2],
+    mount_angles=own_tails.TILT,
+    **own_tails.VALUES,
+    chains=(
+        *(Chain(*each, mirrored=left) for each in SIDES for left in (False, True)),
+        Chain((*ARM, WHEEL), (0.002, 0.05, 0.01)),
+    ),
+)
 UPRIGHT = np.array([0, 0, 0, 1.0, 0, 0, 0, 0, 0])
 
 
@@ -29,14 +42,20 @@ def untilted(name):
     return model.with_parameters(mount_angles=[0, 0, 0]) if name == "ground_mixed" else model
 
 
+def reference_of(name):
+    """The reference of a model."""
+    return Contacts(untilted(name), TREE if name == "tree_ground" else None)
+
+
 def near_ground(model, seed, count=20):
     """Random states with the torso about as high as the legs are long: some points touch."""
     rng = np.random.default_rng(seed)
     q, v, _, tau = random_states(model.segments, seed, count, "random")
+    q, v, tau = q[:, : model.nq], v[:, : model.nv], tau[:, : model.nv - 6]
     q[:, 2] = rng.uniform(-0.05, 0.15, count)
     q[:, 7:] *= 0.5
     lowest, highest = [3, -1.5, 3, -1.5, *[-80] * 4], [4.2, 0, 4.2, 0, *[80] * 4]
-    legs = rng.uniform(lowest, highest, (count, 8))
+    legs = rng.uniform(lowest, highest, (count, 8)) if "feet" in model.contacts else [None] * count
     points = sum(entry["count"] for entry in model.manifest["contacts"])
     return q, v, tau, rng.normal(0, 2e-3, (count, 2 * points)), legs
 
@@ -91,7 +110,7 @@ def test_points_forces_powers_and_accelerations_are_the_references(name):
     against the ground's force on what it moves in the torso.
     """
     model = untilted(name)
-    reference, touched, driven = Contacts(model), 0, 0.0
+    reference, touched, driven = reference_of(name), 0, 0.0
     for q, v, tau, bristles, legs in each(model):
         positions, velocities = model.contact_points(q, v, legs)
         places, motion = reference.positions(q, legs).real, reference.velocities(q, v, legs)
@@ -110,16 +129,18 @@ def test_points_forces_powers_and_accelerations_are_the_references(name):
         largest = ((np.abs(load) + np.abs(bias)) / scale).max()
         assert np.abs(residual / scale).max() < 1e-10 * largest
 
-        *same, heights, powers = model.kernel("contact_rates")(q, v, tau, bristles, legs)
+        given = [each for each in (q, v, tau, bristles, legs) if each is not None]
+        *same, heights, powers = model.kernel("contact_rates")(*given)
         for found, value in zip(same, (v_dot, rates, forces), strict=True):
             np.testing.assert_allclose(found, value, rtol=1e-9, atol=1e-9 * np.abs(value).max())
         rising = np.stack([places[:, 2], motion[:, 2]], axis=1)
         np.testing.assert_allclose(np.reshape(heights, (-1, 2)), rising, rtol=1e-9, atol=1e-11)
-        drift = motion - reference.velocities(q, v, np.r_[legs[:4], np.zeros(4)])
+        still = None if legs is None else np.r_[legs[:4], np.zeros(4)]
+        drift = motion - reference.velocities(q, v, still)
         works = [np.sum(motion * expected), -np.sum(drift * expected)]
         np.testing.assert_allclose(powers, works, rtol=1e-8, atol=1e-9 * np.abs(works).max())
         touched, driven = touched + np.count_nonzero(expected[:, 2]), max(driven, abs(works[1]))
-    assert touched > 20 and driven > 1
+    assert touched > 20 and driven > ("feet" in model.contacts) - 1
 
 
 @pytest.mark.parametrize("name", LAWS)

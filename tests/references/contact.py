@@ -111,11 +111,41 @@ class Points:
         return out[1:]
 
 
-class Contacts:
-    """The points of a model; ``groups`` as in its manifest."""
+class Chains:
+    """The points of all chains of an animal of `body_set` but their mounts, in the torso frame."""
 
-    def __init__(self, model):
-        self.parameters, self.points = model.parameters, Points(model)
+    def __init__(self, animal):
+        self.chains = animal._all
+
+    def at(self, q_t):
+        """Return the points, chain by chain."""
+        out, left = [], list(q_t)
+        for one in self.chains:
+            pitch, roll, yaw = (turn(x * axis) for x, axis in zip(one.mount_angles, np.eye(3)))
+            R, found = yaw @ pitch @ roll, [np.array(one.mount)]
+            for segment in one.segments:
+                if hasattr(segment, "axis"):
+                    R = R @ turn(np.eye(3)[segment.axis] * left.pop(0))
+                    found.append(found[-1] + R @ np.array(segment.tip))
+                    continue
+                angles, place = (left.pop(0), left.pop(0)), found[-1]
+                if isinstance(segment, list):
+                    R, more = chain(R, place, angles, [link.length for link in segment])
+                else:
+                    R, more = arc(R, place, angles, segment.length, segment.samples)
+                found += more
+            out += [place * [1 - 2 * one.mirrored, 1, 1] for place in found[1:]]
+        return out
+
+
+class Contacts:
+    """The points of a model, or of an animal of several chains that is the same; ``groups`` as in
+    its manifest.
+    """
+
+    def __init__(self, model, animal=None):
+        self.parameters = model.parameters
+        self.points = Chains(animal) if animal else Points(model)
         self.groups = [entry["group"] for entry in model.manifest["contacts"]]
         self.friction, self.nv = model.manifest["scene"]["friction"], model.nv
 

@@ -147,6 +147,12 @@ LIMBS = {
         ],
     },
 }
+# without passive parts: hinges and arcs, also of mirrored chains, on the ground
+TOUCHING = {
+    "leg": LIMBS["leg"] | {"joints": [{"name": "swing", "axis": "y"}, LIMBS["leg"]["joints"][1]]},
+    "fin": CHAINS["second"] | {"pair": True, "mount_angles": [0.4, -0.2, 1.3]},
+    "arm": LIMBS["arm"],
+}
 
 
 def _links(segments: int, links: int, **keys: Any) -> dict[str, Any]:
@@ -219,6 +225,12 @@ ZOO: dict[str, dict[str, Any]] = {
     # several chains
     "tree": _own("articulated", OWN_LINKS[:2], chain=CHAINS),
     "limbs": _own("articulated", OWN_LINKS[1:2], chain=LIMBS),
+    "tree_ground": _own(
+        "articulated",
+        OWN_LINKS[1:2],
+        chain=TOUCHING,
+        contacts=["torso", "arm", "fin", "leg", "tail"],
+    ),
     # other gravity
     "slope": _links(1, 3, slope={"angle": "25 deg", "toward": "-x"}, contacts=["torso"]),
     # other numbers

@@ -1,16 +1,17 @@
 """Functions of the points that can touch the ground: their positions, motion and forces."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 
 from ..ir.program import Array, Index, Ref
-from ..mechanics import contact, leg, loads
+from ..mechanics import branch, contact, leg, loads
 from ..mechanics.lower import derive
 from .draft import Draft
 from .dynamics import accelerate_by_segments, copied_torques
 from .factored import factored_dynamics
-from .layout import coordinates
 from .passive import net_torques
 from .scope import State, Torso, Vectors
+from .sweeps.chains import each_chain, sided
 from .sweeps.pieces import attitude, each_point, mechanism, torso_pose
 from .tail import Tail
 from .tails.mechanism import Segments
@@ -18,14 +19,14 @@ from .tails.mechanism import Segments
 
 @dataclass(frozen=True)
 class Points:
-    """Arms and velocities of all points, the first point of each group, columns of the tail's
-    joints (one for each point), and the drift rates of the feet's points in the torso.
+    """Arms and velocities of all points, the first point of each group, columns of the joints of
+    chains (one for each point) by group, and the drift rates of the feet's points in the torso.
     """
 
     arms: Array
     velocities: Array
     first: dict[str, int]
-    S: Array | None = None
+    columns: dict[str, Array] = field(default_factory=dict)
     drifts: Array | None = None
 
     def motion(self, k: Index | int) -> Vectors:
@@ -39,13 +40,6 @@ class Points:
             raise ValueError("no feet touch the ground")
         return self.drifts
 
-    @property
-    def columns(self) -> Array:
-        """Columns of the tail's joints."""
-        if self.S is None:
-            raise ValueError("no points of the tail touch the ground")
-        return self.S
-
 
 def first_points(tail: Tail) -> dict[str, int]:
     """Number of the first point of each group."""
@@ -56,23 +50,35 @@ def first_points(tail: Tail) -> dict[str, int]:
     return numbers
 
 
-def gather_points(
-    draft: Draft, state: State, R: Ref, arrays: dict[str, Array], segments: Segments | None = None
-) -> Points:
-    """Compute all points that can touch the ground: feet, then tail, then the lowest of the torso.
+def touching(draft: Draft) -> Iterator[Tail]:
+    """Stand on each chain in turn that can touch the ground; yields it."""
+    contacts = draft.tail.contacts
+    return (chain for chain in each_chain(draft) if chain.group in contacts)
 
-    ``segments`` describes the pieces of the tail, if another function has prepared them before.
+
+def gather_points(
+    draft: Draft,
+    state: State,
+    R: Ref,
+    arrays: dict[str, Array],
+    segments: list[Segments] | None = None,
+) -> Points:
+    """Compute all points that can touch the ground: feet, then chains, then the lowest of the
+    torso.
+
+    ``segments`` describes the pieces of each chain, if another function has prepared them before.
     """
     tail, torso = draft.tail, state.torso(R)
-    S = draft.array("S_point", 12, tail.total) if "tail" in tail.contacts else None
+    S = {c.group: draft.array("S_point", 6 * c.width, c.total) for c in touching(draft)}
     arms, velocities = draft.array("arm", 3, tail.points), draft.array("velocity", 3, tail.points)
     drifts = draft.array("foot_rate", 3, 6) if "feet" in tail.contacts else None
     points = Points(arms, velocities, first_points(tail), S, drifts)
     if "feet" in tail.contacts:
         place_feet(draft, torso, points, arrays["legs"])
-    if "tail" in tail.contacts:
-        samples = mechanism(draft).prepare_samples(draft, state, segments)
-        place_tail(draft, torso, samples, points)
+    for chain in touching(draft):
+        own = segments[tail.chains.index(chain)] if segments else None
+        samples = mechanism(draft).prepare_samples(draft, state.on(chain), own)
+        place_chain(draft, torso, samples, points)
     if "torso" in tail.contacts:
         place = draft.store(contact.lowest_point, torso, place=3)
         drift, motion = {"drift": draft.zero(3)}, points.motion(points.first["torso"])
@@ -98,21 +104,29 @@ def place_feet(draft: Draft, torso: Torso, points: Points, angles: Array) -> Non
             draft.step(contact.point_on_torso, torso, place, **motion)
 
 
-def place_tail(draft: Draft, torso: Torso, samples: Segments, points: Points) -> None:
-    """Compute the tail's points but the first, which is the mount: a point of the torso,
-    inside it.
+def place_chain(draft: Draft, torso: Torso, samples: Segments, points: Points) -> None:
+    """Compute a chain's points but the first, which is the mount: a point of the torso, inside it.
+
+    A mirrored chain is followed in the mirror image of the world.
     """
     # fixed samples of an arc, because its lowest point (Eqs. 38, 39) jumps from end to end
-    S = points.columns
-    pose = torso_pose(draft, torso.R, name="point")
+    chain, R = draft.tail, torso.R
+    S, first = points.columns[chain.group], points.first[chain.group]
+    if chain.mirrored:
+        R = draft.store(sided(draft, branch.mirrored_torso), {"R": R}, R=9)["R"]
+    pose = torso_pose(draft, R, name="point")
+    place = draft.vectors(P=3) if chain.mirrored else pose.vectors()
     twist = draft.store(contact.torso_twist, torso, turn=3, slide=3)
     added = {f"{name}_": ref for name, ref in twist.named.items()}
     for i, g in each_point(draft):
         draft.step(mechanism(draft).twist, pose, samples.at(i, g), S=S[g])
         draft.step(mechanism(draft).pose, pose, samples.at(i, g), **pose)
-        draft.step(contact.carried_twist, {"S": S[g]}, samples.motion(i), **added)
-        motion = points.motion(g + points.first["tail"])
-        draft.step(contact.point_on_tail, pose, twist, **motion)
+        if chain.mirrored:
+            seen = {"S": S[g], "P": pose.P}
+            draft.step(sided(draft, branch.mirrored_point), seen, S=S[g], P=place["P"])
+        carried = draft.of_segment(contact.carried_twist)
+        draft.step(carried, {"S": S[g]}, samples.motion(i), **added)
+        draft.step(contact.point_on_tail, {"P": place["P"]}, twist, **points.motion(g + first))
 
 
 def assemble_contact_points(draft: Draft, arrays: dict[str, Array]) -> None:
@@ -166,18 +180,24 @@ def gather_contact_loads(
     load = draft.vector("load", 6)
     draft.fill(load, 0)
 
-    def add(k: Index | int) -> None:
+    def add(k: Index | int, load: Ref) -> None:
         reads = {"arm": points.arms[k], "force": forces.part(3 * k, 3)}
         draft.step(contact.load_about_torso, reads, load_=load)
 
-    if points.S:
+    for chain in touching(draft):
+        beyond = draft.vector("load", 6) if chain.name else load
+        if chain.name:
+            draft.fill(beyond, 0)
         for i, g in each_point(draft, downward=True):
-            add(g + points.first["tail"])
-            reads = {"S": points.S[g], "F_beyond": load}
-            draft.step(loads.joint_load, reads, torque_=coordinates(torques, i))
-    for group in [name for name in draft.tail.contacts if name != "tail"]:
+            add(g + points.first[chain.group], beyond)
+            reads = {"S": points.columns[chain.group][g], "F_beyond": beyond}
+            own = chain.segment_tau(torques, i)
+            draft.step(draft.of_segment(loads.joint_load), reads, torque_=own)
+        if chain.name:
+            draft.copy(load, beyond, adds=True)
+    for group in [name for name in draft.tail.contacts if name not in points.columns]:
         with draft.loop("k", draft.tail.groups[group]) as k:
-            add(k + points.first[group])
+            add(k + points.first[group], load)
     reads = {"R": R, "load": load}
     return draft.store(contact.load_in_torso, reads, load_force=3, load_moment=3)
 

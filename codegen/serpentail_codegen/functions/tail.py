@@ -52,6 +52,11 @@ class Tail(Sizes):
         return self.branches or (self,)
 
     @property
+    def group(self) -> str:
+        """Name of the chain's points among those that can touch the ground."""
+        return self.name or "tail"
+
+    @property
     def stretches(self) -> tuple[Stretch, ...]:
         """Consecutive segments of one kind with equally many links."""
         return stretches_of(self.segments, self.links, self.kind, self.shape)
@@ -128,8 +133,8 @@ class Tail(Sizes):
         return self.width * i + self.coordinates_before
 
     def coordinate_v(self, v: Array, k: Index | int) -> Ref:
-        """Return the rate, acceleration or force of tail coordinate k."""
-        return v.part(self.torso_nv + k, 1)
+        """Return the rate, acceleration or force of coordinate k of the tail, or of a chain."""
+        return v.part(self.torso_nv + self.coordinates_before + k, 1)
 
     @property
     def total(self) -> int:
@@ -166,9 +171,9 @@ class Tail(Sizes):
     @property
     def groups(self) -> dict[str, int]:
         """Return the number of points in each group that can touch the ground: A, M and T of both
-        feet, tail, torso.
+        feet, tail, other chains, torso.
         """
-        count = {"feet": 6, "tail": self.total, "torso": 1}
+        count = {"feet": 6, "torso": 1} | {chain.group: chain.total for chain in self.chains}
         return {name: count[name] for name in self.contacts}
 
     @property
@@ -235,7 +240,8 @@ class Tail(Sizes):
         if self.contacts:
             blocks |= {"R": (9, 1), "relax": (1, 1), "depth": (1, self.points)}
             blocks |= {"arm": (3, self.points), "spring": (SPRING, self.points)}
-            blocks |= {"J": (3 * self.nt, self.groups.get("tail", 0))}
+            points = self.groups
+            blocks |= {f"J_{c.group}": (3 * c.nt, points.get(c.group, 0)) for c in self.chains}
         return blocks
 
     @property

@@ -64,6 +64,21 @@ def mirrored_columns(let, side: V1, columns: V12) -> dict:
     return {"columns": Matrix.vstack(*turned)}
 
 
+def mirrored_torso(let, side: V1, R: M33) -> dict:
+    """Attitude of the mirror image of the torso, in the mirror image of the world."""
+    signs = diag(side[0], 1, 1)
+    return {"R": signs * R * signs}
+
+
+def mirrored_point(let, side: V1, S: V12, P: V3) -> dict:
+    """Spatial columns at B, and a place, of a mirrored chain in the world, from those in its mirror
+    image.
+    """
+    parts = [S[k : k + 3, :] for k in range(0, len(S), 3)]
+    turned = [(axial, polar)[k % 2](side, part) for k, part in enumerate(parts)]
+    return {"S": Matrix.vstack(*turned), "P": polar(side, P)}
+
+
 def mirrored_motion(let, side: V1, w: V3, w_dot: V3, a: V3) -> dict:
     """The torso's motion, seen from the other side."""
     return {"w": axial(side, w), "w_dot": axial(side, w_dot), "a": polar(side, a)}

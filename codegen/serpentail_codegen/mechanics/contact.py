@@ -36,7 +36,8 @@ def torso_twist(let, R: M33, p_dot: V3, omega: V3) -> dict:
 
 def carried_twist(let, S: V12, rates: V2) -> dict:
     """Contribution of one joint or bend to the twist about B of everything beyond."""
-    total = rates[0] * S[0:6, :] + rates[1] * S[6:12, :]
+    each = [rate * S[6 * k : 6 * k + 6, :] for k, rate in enumerate(rates)]
+    total = sum(each[1:], each[0])
     return {"turn": total[0:3, :], "slide": total[3:6, :]}
 
 

@@ -44,7 +44,8 @@ def point_jacobian_tail(let, S: V12, arm: V3) -> dict:
     segment i.
     """
     # A8 for the columns of one segment: both lines have a tilde
-    columns = [S[3:6, :] + S[0:3, :].cross(arm), S[9:12, :] + S[6:9, :].cross(arm)]
+    starts = range(0, len(S), 6)
+    columns = [S[k + 3 : k + 6, :] + S[k : k + 3, :].cross(arm) for k in starts]
     return rows(Matrix.hstack(*columns))
 
 

@@ -19,7 +19,10 @@ FOUND = [p for p in NAMED if p.of_chain]
 OF_CHAINS = {key_in_chain(p.name): p for p in FOUND}
 # keys of a scene with several chains that do not work yet: which values, and what to do
 REFUSED: dict[str, tuple[Callable[[Any], bool], str]] = {
-    "contacts": (bool, "fly without contacts, or remove the chains"),
+    "contacts": (
+        lambda x: "feet" in x,
+        '"feet" are legs without mass: name the chain that touches the ground',
+    ),
     "coordinates": (lambda x: x == "polar", 'use "bend", or remove the chains'),
     "base": (lambda x: x == "fixed", 'set base = "free", or remove the chains'),
     "baked": (lambda x: x is True, "set baked = false, or remove the chains"),

@@ -3,7 +3,7 @@
 from collections.abc import Collection, Mapping
 from typing import Any
 
-from serpentail_scene.keys import KEYS, ONLY, foreign_to
+from serpentail_scene.keys import CONTACTS, GROUPS, KEYS, ONLY, foreign_to
 from serpentail_scene.parameters import (
     AIR_NAMES,
     NAMES,
@@ -129,6 +129,19 @@ def lacking(needs: str, contacts: Collection[str]) -> str:
     if not needs or needs in contacts or (needs == "contacts" and contacts):
         return ""
     return "feet" if needs == "contacts" else needs
+
+
+def contacts_in_order(
+    contacts: Collection[str], chains: Collection[str]
+) -> tuple[tuple[str, ...], list[Problem]]:
+    """Return the groups of contact points in their order, and a problem for each that is none."""
+    groups = (*GROUPS[:2], *chains, *GROUPS[2:])
+    unknown = [
+        Problem("contacts", name, f"needs {CONTACTS.text}; {suggest(name, groups)}")
+        for name in contacts
+        if name not in groups
+    ]
+    return tuple(group for group in groups if group in contacts), unknown
 
 
 def contact_problems(

@@ -8,7 +8,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from serpentail_scene.keys import CONTACTS, GROUPS, KEYS, KINDS, ONLY, TARGETS, Only, foreign_to
+from serpentail_scene.keys import CONTACTS, KEYS, KINDS, ONLY, TARGETS, Only, foreign_to
 from serpentail_scene.parameters import PARAMETERS, name_in
 from serpentail_scene.purposes import functions_of
 from serpentail_scene.signatures.table import ALL
@@ -20,6 +20,7 @@ from .chains import all_parameters, chains_of
 from .checks import (
     MOST_LINKS,
     contact_problems,
+    contacts_in_order,
     fixed_problems,
     function_problems,
     key_problems,
@@ -76,6 +77,8 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
     chains = chains_of(values, parse_scene)
     problems += chains.problems
     values |= {"chains": chains.chains, "parameters": chains.parameters}
+    ordered, unknown = contacts_in_order(contacts, [chain.name for chain in chains.chains])
+    problems += unknown
     tail = tail_description(kind, values)
     values |= tail.values
     problems += [*tail.problems, *key_problems(values), *kind_problems(table, kind)]
@@ -105,7 +108,7 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
         raise SceneError(problems)
 
     # one order of names, so that equal scenes are equal
-    values["contacts"] = tuple(group for group in GROUPS if group in contacts)
+    values["contacts"] = ordered
     values["targets"] = tuple(target for target in TARGETS if target in values["targets"])
     values["functions"] = tuple(function for function in ALL if function in values["functions"])
     return Scene(**{field.name: values[field.name] for field in fields(Scene)})

@@ -43,6 +43,7 @@ OF_TREES = (
     *("momentum_derivatives", "inverse_dynamics_vjp", "forward_dynamics_vjp"),
     *("inverse_dynamics_parameter_derivatives", "forward_dynamics_parameter_derivatives"),
     *("forward_dynamics_jvp", "pfl", "implicit", "rollout", "mount_wrench"),
+    *("contact_points", "contact_dynamics"),
 )
 AIRBORNE = in_group(PLANNING)
 NEEDS = {name: signature.needs for name, signature in SIGNATURES.items() if signature.needs}

@@ -34,7 +34,7 @@ FIXED = ("v_dot", "multiplier", "slips", "branches")  # arguments of P that are 
 def assemble_power(draft: Draft, arrays: dict[str, Array]) -> None:
     """P - slips^T (rates of the bristles)."""
     tail, power, multiplier = draft.tail, arrays["power"][0], arrays["multiplier"]
-    segments = assemble_virtual_power(draft, arrays)[0]
+    segments = assemble_virtual_power(draft, arrays)
     if not tail.contacts:
         return
 

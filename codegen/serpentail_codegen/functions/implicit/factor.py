@@ -16,16 +16,15 @@ from ...ir.step import Step
 from ...mechanics import contact, loads, passive
 from ...mechanics import contact_stiffness as stiffness
 from ...mechanics.lower import derive
-from ..contact import Points, gather_points
+from ..contact import Points, gather_points, touching
 from ..draft import Draft
 from ..dynamics import fill_mass_matrix
-from ..layout import coordinate
 from ..passive import SLOPES, passive_parameters
 from ..scope import State, Torso, Vectors
 from ..sweeps.chains import each_chain
 from ..sweeps.pieces import each_segment, points_of
 from ..tails.mechanism import Segments
-from .layout import Factors, each_contact, first_tail_point
+from .layout import Factors, Place, each_contact
 
 
 def assemble_factor(draft: Draft, arrays: dict[str, Array]) -> None:
@@ -55,7 +54,7 @@ def assemble_factor(draft: Draft, arrays: dict[str, Array]) -> None:
 
     # the ground
     if draft.tail.contacts:
-        add_contacts(draft, f, state, R, segments[0], arrays)
+        add_contacts(draft, f, state, R, segments, arrays)
         add_sliding(draft, f, R)
         draft.factor_pair(f.array, nv)
     else:
@@ -127,7 +126,7 @@ def add_contacts(
     f: Factors,
     state: State,
     R: Ref,
-    segments: Segments,
+    segments: list[Segments],
     arrays: dict[str, Array],
 ) -> None:
     """Add the points in the ground, linearised; a point outside costs one comparison."""
@@ -139,14 +138,14 @@ def add_contacts(
     law = derive(stiffness.linearised_contact, friction=draft.tail.friction)
     weights = Vectors({**weight, **drag})
     ground = ContactLinearisation(state.torso(R), weights, arrays["bristles"], law, points)
-    for group in [name for name in draft.tail.contacts if name != "tail"]:
+    for group in [name for name in draft.tail.contacts if name not in points.columns]:
         with draft.loop("k", draft.tail.groups[group]) as k:
             number = k + points.first[group]
             keep_point(draft, f, ground, number)
             with draft.when(f("depth", number)):
                 stiffen(draft, f, ground, number)
-    if points.S:
-        add_tail_contacts(draft, f, ground)
+    for _ in touching(draft):
+        add_chain_contacts(draft, f, ground)
 
 
 def keep_point(draft: Draft, f: Factors, ground: ContactLinearisation, number: Index) -> None:
@@ -166,38 +165,41 @@ def stiffen(draft: Draft, f: Factors, ground: ContactLinearisation, number: Inde
     draft.step(stiffness.stiffened_torso, ground.torso, motion, spring, **rows)
 
 
-def add_tail_contacts(draft: Draft, f: Factors, ground: ContactLinearisation) -> None:
-    """Add tail points like those of the torso, with their columns of the tail's coordinates."""
-    tail, points = draft.tail, ground.points
-    S, force = draft.array("S_segment", 12, tail.segments), draft.vector("force_column", 3)
+def add_chain_contacts(draft: Draft, f: Factors, ground: ContactLinearisation) -> None:
+    """Add points of a chain like those of the torso, with their columns of its coordinates."""
+    chain, columns = draft.tail, ground.points.columns[draft.tail.group]
+    S, force = draft.array("S_segment", 6 * chain.width, chain.segments), draft.vector("force_column", 3)
+    jacobian = draft.of_segment(loads.point_jacobian_tail)
     for stretch, i in each_segment(draft):
         draft.fill(S[i], 0)
         with points_of(draft, stretch, i) as g:
-            number = g + points.first["tail"]
-            draft.copy(S[i], points.columns[g], adds=True)
+            number, place = g + ground.points.first[chain.group], Place(chain, i, g)
+            draft.copy(S[i], columns[g], adds=True)
             keep_point(draft, f, ground, number)
-            draft.fill(f("J", g), 0)
+            draft.fill(f(f"J_{chain.group}", g), 0)
             with draft.when(f("depth", number)):
                 stiffen(draft, f, ground, number)
                 arm = {"arm": f("arm", number)}
                 with draft.loop("l", i + 1) as segment:
-                    rows = {f"J_{axis}": f.row(g, k, segment) for k, axis in enumerate("xyz")}
-                    draft.step(loads.point_jacobian_tail, {"S": S[segment]}, arm, **rows)
+                    rows = {f"J_{axis}": f.row(place, k, segment) for k, axis in enumerate("xyz")}
+                    draft.step(jacobian, {"S": S[segment]}, arm, **rows)
                 spring = {"R": ground.torso.R, "spring": f("spring", number)} | arm
-                stiffen_tail(draft, f, g, coordinate(i + 1), spring, force)
+                stiffen_chain(draft, f, place, spring, force)
 
 
-def stiffen_tail(
-    draft: Draft, f: Factors, point: Index, count: Index, spring: dict[str, Ref], force: Ref
+def stiffen_chain(
+    draft: Draft, f: Factors, place: Place, spring: dict[str, Ref], force: Ref
 ) -> None:
-    """Add the stiffness of a tail point to the first rows of the tail in S."""
-    with draft.loop("k", count) as k:
-        reads = spring | {"J_k": f.column(point, k)}
-        row = f.entry("S", TORSO_NV + k, 0, TORSO_NV)
+    """Add the stiffness of a chain's point to the chain's rows in S."""
+    before = place.chain.coordinates_before
+    with draft.loop("k", place.coordinates) as k:
+        reads = spring | {"J_k": f.column(place, k)}
+        row = f.entry("S", TORSO_NV + before + k, 0, TORSO_NV)
         draft.step(stiffness.stiffened_column, reads, force=force, S_row_=row)
         with draft.loop("l", k + 1) as other:
-            reads = {"J_k": f.column(point, other), "force": force}
-            draft.step(stiffness.coupled_columns, reads, S_entry_=f.tail_entry(k, other))
+            reads = {"J_k": f.column(place, other), "force": force}
+            entry = f.tail_entry(k + before, other + before)
+            draft.step(stiffness.coupled_columns, reads, S_entry_=entry)
 
 
 # ---- points that slide ---------------------------------------------------------------------------
@@ -224,7 +226,7 @@ def add_sliding(draft: Draft, f: Factors, R: Ref) -> None:
     slip = draft.vector("slip", 1)
     shear = Shear(draft.array("push", nv), draft.array("lift", nv))
 
-    def respond(number: Index, segment: Index | None) -> None:
+    def respond(number: Index, place: Place | None) -> None:
         spring = {"spring": f("spring", number)}
         with draft.when(f("depth", number)):
             draft.step(stiffness.sliding, spring, slip=slip)
@@ -232,20 +234,24 @@ def add_sliding(draft: Draft, f: Factors, R: Ref) -> None:
                 at = {"R": R, "arm": f("arm", number)}
                 draft.step(stiffness.sheared_torso, at, spring, **shear.entries(0, TORSO_NV))
                 count: Index | int = TORSO_NV
-                if segment is not None:
-                    shear_tail(draft, f, number, segment, shear)
-                    count = coordinate(segment) + (TORSO_NV + coordinate(1))
+                if place is not None:
+                    shear_chain(draft, f, place, spring, shear)
+                    count = place.coordinates + (TORSO_NV + place.chain.coordinates_before)
                 shear_triangles(draft, f, count, shear)
 
     each_contact(draft, respond)
 
 
-def shear_tail(draft: Draft, f: Factors, number: Index, segment: Index, shear: Shear) -> None:
-    """Compute the tail's part of both columns of a tail point."""
-    point = number + -first_tail_point(draft.tail)
-    with draft.loop("k", coordinate(segment + 1)) as k:
-        reads = {"J_k": f.column(point, k), "spring": f("spring", number)}
-        draft.step(stiffness.sheared_column, reads, **shear.entries(TORSO_NV + k, 1))
+def shear_chain(
+    draft: Draft, f: Factors, place: Place, spring: dict[str, Ref], shear: Shear
+) -> None:
+    """Compute the chain's part of both columns of its point; those of chains before are zero."""
+    before = place.chain.coordinates_before
+    for zeros in shear.entries(TORSO_NV, before).values() if before else ():
+        draft.copy(zeros, draft.zero(before))
+    with draft.loop("k", place.coordinates) as k:
+        reads = spring | {"J_k": f.column(place, k)}
+        draft.step(stiffness.sheared_column, reads, **shear.entries(TORSO_NV + before + k, 1))
 
 
 def shear_triangles(draft: Draft, f: Factors, count: Index | int, shear: Shear) -> None:

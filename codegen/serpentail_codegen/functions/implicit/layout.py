@@ -3,8 +3,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from serpentail_scene.layout import PER_SEGMENT
-
 from ...ir.program import Array, Index, Ref
 from ..draft import Draft
 from ..sweeps.pieces import each_point
@@ -40,30 +38,39 @@ class Factors:
         first = self.tail.torso_nv
         return self.entry("S", first + k, first + other)
 
-    def row(self, point: Index | int, axis: int, segment: Index | int) -> Ref:
-        """Return how a tail point moves along an axis with the two coordinates of a segment."""
-        first = self.first("J") + 3 * self.tail.nt * point + axis
-        return self.array.part(first + 3 * PER_SEGMENT * segment, PER_SEGMENT, 3)
+    def row(self, at: "Place", axis: int, segment: Index | int) -> Ref:
+        """Return how a chain's point moves along an axis with the coordinates of a segment."""
+        first, width = self.column(at, 0).offset + axis, at.chain.width
+        return self.array.part(first + 3 * width * segment, width, 3)
 
-    def column(self, point: Index | int, k: Index | int) -> Ref:
-        """Return how a tail point moves with tail coordinate k."""
-        return self.array.part(self.first("J") + 3 * self.tail.nt * point + 3 * k, 3)
-
-
-def first_tail_point(tail: Tail) -> int:
-    """Number of the tail's first point."""
-    return tail.groups.get("feet", 0)
+    def column(self, at: "Place", k: Index | int) -> Ref:
+        """Return how a chain's point moves with coordinate k of the chain."""
+        first = self.first(f"J_{at.chain.group}")
+        return self.array.part(first + 3 * at.chain.nt * at.point + 3 * k, 3)
 
 
-def each_contact(draft: Draft, respond: Callable[[Index, Index | None], None]) -> None:
-    """Call ``respond(number, segment)`` for all points; tail points are given with their
-    segment.
-    """
-    first, tail = 0, draft.tail
-    for group, count in tail.groups.items():
-        if group == "tail":
-            for i, g in each_point(draft):
-                respond(g + first, i)
+@dataclass(frozen=True)
+class Place:
+    """Where a point is that can touch the ground: its chain, the segment, its number there."""
+
+    chain: Tail
+    segment: Index
+    point: Index
+
+    @property
+    def coordinates(self) -> Index:
+        """Number of the chain's coordinates that move the point."""
+        return self.chain.width * (self.segment + 1)
+
+
+def each_contact(draft: Draft, respond: Callable[[Index, Place | None], None]) -> None:
+    """Call ``respond(number, place)`` for all points; those of feet and torso have no place."""
+    first, chains = 0, {chain.group: chain for chain in draft.tail.chains}
+    for group, count in draft.tail.groups.items():
+        if group in chains:
+            with draft.on(chains[group]):
+                for i, g in each_point(draft):
+                    respond(g + first, Place(chains[group], i, g))
         else:
             with draft.loop("j", count) as j:
                 respond(j + first, None)

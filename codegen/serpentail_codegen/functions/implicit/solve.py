@@ -12,8 +12,8 @@ from ...ir.program import Array, Index, Ref
 from ...mechanics import contact, passive
 from ...mechanics import contact_stiffness as stiffness
 from ..draft import Draft
-from ..layout import block, coordinate
-from .layout import Factors, each_contact, first_tail_point
+from ..layout import block
+from .layout import Factors, Place, each_contact
 
 
 def assemble_solve(draft: Draft, arrays: dict[str, Array]) -> None:
@@ -82,16 +82,15 @@ class Shift:
     rotation: Ref
 
     def at(
-        self, draft: Draft, f: Factors, number: Index, segment: Index | None, motion: Ref
+        self, draft: Draft, f: Factors, number: Index, place: Place | None, motion: Ref
     ) -> None:
-        """Store how a point moves: a point of the torso, or tail point ``number`` in a segment."""
+        """Store how a point moves: a point of the torso, or of a chain."""
         reads = {"shift": block(self.v, VELOCITY), "turn": self.rotation, "arm": f("arm", number)}
         draft.step(stiffness.point_shift, reads, motion=motion)
-        if segment is None:
+        if place is None:
             return
-        point = number + -first_tail_point(draft.tail)
-        with draft.loop("k", coordinate(segment + 1)) as k:
-            reads = {"J_k": f.column(point, k), "coupling": draft.tail.coordinate_v(self.v, k)}
+        with draft.loop("k", place.coordinates) as k:
+            reads = {"J_k": f.column(place, k), "coupling": place.chain.coordinate_v(self.v, k)}
             draft.step(stiffness.tail_shift, reads, motion_=motion)
 
 
@@ -114,24 +113,23 @@ def contact_response(draft: Draft, f: Factors, arrays: dict[str, Array]) -> Arra
     pressed = draft.array("pressed", 1, draft.tail.points)
     draft.fill(load, 0)
 
-    def respond(number: Index, segment: Index | None) -> None:
+    def respond(number: Index, place: Place | None) -> None:
         with draft.when(f("depth", number)):
             # how the point moves, and its force
-            at_q.at(draft, f, number, segment, motions["motion_q"])
-            at_v.at(draft, f, number, segment, motions["motion_v"])
+            at_q.at(draft, f, number, place, motions["motion_q"])
+            at_v.at(draft, f, number, place, motions["motion_v"])
             point = {"spring": f("spring", number), "lag": arrays["r_u"].part(2 * number, 2)}
             writes = {"force": force, "pressed": pressed[number]}
             draft.step(stiffness.contact_response, motions, point, **writes)
 
-            # the force on the torso, and on the tail's coordinates
+            # the force on the torso, and on the chain's coordinates
             reads = {"arm": f("arm", number), "force": force}
             draft.step(contact.load_about_torso, reads, load_=load)
-            if segment is None:
+            if place is None:
                 return
-            with draft.loop("k", coordinate(segment + 1)) as k:
-                column = f.column(number + -first_tail_point(draft.tail), k)
-                reads = {"J_k": column, "force": force}
-                draft.step(stiffness.tail_response, reads, rhs_=draft.tail.coordinate_v(x, k))
+            with draft.loop("k", place.coordinates) as k:
+                reads = {"J_k": f.column(place, k), "force": force}
+                draft.step(stiffness.tail_response, reads, rhs_=place.chain.coordinate_v(x, k))
 
     each_contact(draft, respond)
     reads = {"R": f("R"), "load": load}
@@ -143,11 +141,11 @@ def solve_bristles(draft: Draft, f: Factors, arrays: dict[str, Array], pressed: 
     """k_u of all points."""
     at, motion = shift(draft, f, arrays["k_v"]), draft.vector("motion_k", 3)
 
-    def respond(number: Index, segment: Index | None) -> None:
+    def respond(number: Index, place: Place | None) -> None:
         lag, k_u = arrays["r_u"].part(2 * number, 2), arrays["k_u"].part(2 * number, 2)
         draft.step(stiffness.relaxed, {"relax": f("relax"), "lag": lag}, k_u=k_u)
         with draft.when(f("depth", number)):
-            at.at(draft, f, number, segment, motion)
+            at.at(draft, f, number, place, motion)
             reads = {
                 "spring": f("spring", number),
                 "motion": motion,

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from itertools import accumulate
 from typing import Any, cast
 
+from serpentail_scene.keys import LIMBS
 from serpentail_scene.parameters import name_in
 
 from ...functions.tail import Tail
@@ -20,6 +21,7 @@ TURNED_AT = {  # where along a tail its turn grows, and by what
     "articulated": "at each joint by the segment's rates",
     "continuum": "at each sample by its part of the bend",
     "mixed": "at each joint by the segment's rates, at each sample by its part of the bend",
+    **dict.fromkeys(LIMBS, "at each joint"),
 }
 # ros34pw2's error in flight at one tolerance, over that of tsit5: measured, docs/simulation.md
 AIR = 5.0
@@ -86,11 +88,7 @@ def simulation_context(
         # of an index that counts the tail's numbers of q, of v
         "before_q": "" if tail.fixed else "7 + ",
         "before_v": "" if tail.fixed else "6 + ",
-        "turned_at": TURNED_AT[tail.kind],
-        "own_lengths": own_lengths(scene),
-        "part": 1.0
-        if tail.kind == "articulated"
-        else 1 / tail.links,  # of a segment's turn, a piece
+        "chains": {chain.group: reach(scene, chain) for chain in tail.chains},
         "ledger": ledger,
         "damped": own_damping(scene, tail),
         "damped_chains": damped_chains(tail),
@@ -134,12 +132,56 @@ class Lengths:
     values: tuple[float, ...]
 
 
-def own_lengths(scene: Scene) -> list[Lengths]:
-    """Return the lengths of links and arcs that have their own; a mixed tail has both."""
+def own_lengths(scene: Scene, owner: str = "") -> list[Lengths]:
+    """Return the lengths of a chain's links, arcs or bodies that have their own; a mixed tail has
+    both.
+    """
     found = []
-    for parameter in ("link_lengths", "arc_lengths"):
+    for parameter in ("link_lengths", "arc_lengths", "link_tips"):
         if parameter in scene.parameters:
             value = scene.parameters[parameter]
             name = parameter if scene.kind == "mixed" else "lengths"
-            found.append(Lengths(name, parameter, value if isinstance(value, tuple) else (value,)))
+            values = value if isinstance(value, tuple) else (value,)
+            found.append(Lengths(name, name_in(owner, parameter), values))
     return found
+
+
+@dataclass(frozen=True)
+class Reach:
+    """How a chain's points may move: where its turn grows; ``part`` of a segment's turn at each
+    piece; parameters of mount, length and lengths; how many bodies are before each stretch.
+    """
+
+    tail: Tail
+    lengths: list[Lengths]
+
+    @property
+    def turned_at(self) -> str:
+        """Where the turn grows, and by what."""
+        return TURNED_AT[self.tail.kind]
+
+    @property
+    def part(self) -> float:
+        """Part of a segment's turn at each piece."""
+        return 1.0 if self.tail.kind == "articulated" else 1 / self.tail.links
+
+    @property
+    def mount(self) -> str:
+        """Name of the parameter for the mount."""
+        return name_in(self.tail.owner, "tail_mount")
+
+    @property
+    def length(self) -> str:
+        """Name of the parameter for the length."""
+        return name_in(self.tail.owner, "tail_length")
+
+    @property
+    def bodies(self) -> list[int]:
+        """Number of bodies before each stretch of a limb."""
+        counts = [0 if s.kind.endswith("bare") else s.stop - s.first for s in self.tail.stretches]
+        return list(accumulate(counts, initial=0))
+
+
+def reach(scene: Scene, chain: Tail) -> Reach:
+    """Return how the points of a chain may move."""
+    return Reach(chain, own_lengths(scene.parts[chain.owner], chain.owner))
