@@ -52,10 +52,11 @@ def near_ground(model, seed, count=20):
     rng = np.random.default_rng(seed)
     q, v, _, tau = random_states(model.segments, seed, count, "random")
     q, v, tau = q[:, : model.nq], v[:, : model.nv], tau[:, : model.nv - 6]
-    q[:, 2] = rng.uniform(-0.05, 0.15, count)
+    feet = "feet" in model.contacts
+    q[:, 2] = rng.uniform(-0.05, 0.15 if feet else 0.02, count)
     q[:, 7:] *= 0.5
     lowest, highest = [3, -1.5, 3, -1.5, *[-80] * 4], [4.2, 0, 4.2, 0, *[80] * 4]
-    legs = rng.uniform(lowest, highest, (count, 8)) if "feet" in model.contacts else [None] * count
+    legs = rng.uniform(lowest, highest, (count, 8)) if feet else [None] * count
     points = sum(entry["count"] for entry in model.manifest["contacts"])
     return q, v, tau, rng.normal(0, 2e-3, (count, 2 * points)), legs
 

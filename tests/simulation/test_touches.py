@@ -24,7 +24,7 @@ METHODS = [
     {"method": "implicit_euler"},
 ]
 NAMES = ["-".join(map(str, how.values())) for how in METHODS]
-TAILS = {"links": "ground_m2_n2", "arcs": "ground_arcs"}
+TAILS = {"links": "ground_m2_n2", "arcs": "ground_arcs", "tree": "tree_ground"}
 QUICK = 20
 FREE = {"controller": None, "t_span": 0.3}
 
@@ -34,7 +34,8 @@ def animal(tail="links"):
 
 
 def flown(model, q, v, **how):
-    return st.simulate(model, q, v, **{"t_span": SPAN, "controller": PASSIVE, "legs": LEGS} | how)
+    legs = {"legs": LEGS} if "feet" in model.contacts else {}
+    return st.simulate(model, q, v, **{"t_span": SPAN, "controller": PASSIVE} | legs | how)
 
 
 @cache

@@ -82,7 +82,8 @@ class Model(ModelMethods, ModelStates, NearNames):
     coordinates, velocities, torques : list of str
         Names of their numbers, such as "z", "vz", "alpha_1", "alpha_1_dot" and "tau_alpha_1".
     contacts : dict
-        Number of points that can touch the ground, for each group: "feet", "tail", "torso".
+        Number of points that can touch the ground, for each group: "feet", "tail", other chains
+        such as "hind_left", "torso".
     parameters : mapping
         Parameter values by name, SI; read-only.
     parameter_vector : ndarray

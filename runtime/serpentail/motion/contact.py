@@ -7,8 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from serpentail_scene.keys import GROUPS
-
 from ..basics.checks import shown
 from ..basics.near_names import NearNames
 from ..basics.short_repr import brief
@@ -20,8 +18,8 @@ Array = NDArray[np.float64]
 class Contact(NearNames):
     """Points of a motion that can touch the ground, and the ground's forces on them.
 
-    There are K samples of P points: A, M and T of the right foot, then of the left; the tail's;
-    the torso's.
+    There are K samples of P points: A, M and T of the right foot, then of the left; the tail's,
+    then those of other chains, joint after joint; the torso's.
 
     Attributes
     ----------
@@ -32,7 +30,8 @@ class Contact(NearNames):
     bristles : ndarray, shape (K, P, 2)
         Stretch of the friction springs (m, world x and y).
     groups : dict of str to int
-        Number of points of "feet", "tail" and "torso", in this order.
+        Number of points of each group in this order: "feet", "tail", other chains such as
+        "hind_left", "torso".
     legs : ndarray, shape (K, 4), or None
         gamma and delta of the right leg, then of the left (rad); None without feet.
     """
@@ -49,11 +48,11 @@ class Contact(NearNames):
             array = np.array(value, float)
             array.setflags(write=False)
             object.__setattr__(self, name, array)
-        known = isinstance(self.groups, dict) and set(self.groups) <= set(GROUPS)
+        known = isinstance(self.groups, dict) and all(isinstance(n, str) for n in self.groups)
         if not known or not all(type(n) is int and n > 0 for n in self.groups.values()):
             raise ValueError(
-                f"contact.groups: value {shown(self.groups)}: needs a count of points of each of "
-                f"{', '.join(GROUPS)}"
+                f"contact.groups: value {shown(self.groups)}: needs a count of points of each "
+                'group, such as {"feet": 6, "tail": 3}'
             )
         samples, count = len(self.points), sum(self.groups.values())
         widths = {"points": (count, 3), "forces": (count, 3), "bristles": (count, 2), "legs": (4,)}
@@ -88,7 +87,7 @@ class Contact(NearNames):
         Parameters
         ----------
         group : str
-            "feet", "tail" or "torso".
+            "feet", "tail", "torso" or a chain, such as "hind_left".
 
         Returns
         -------
