@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
+from serpentail.model.weight import weight_of
 from serpentail_codegen.scene.parse import parse_scene
 from tests.functions.test_trees import FORWARD
 from tests.references.metrics import (
@@ -63,6 +64,18 @@ def test_it_does_not_matter_which_chain_is_the_tail():
     most = FORWARD * equilibrated_condition(H)
     expected = one.forward_dynamics(q, v, tau)[swap]
     assert block_error(other.forward_dynamics(q2, v2, tau2), expected) < most
+
+
+@pytest.mark.slow  # it compiles a model
+def test_legs_with_mass_push_with_less_than_20_body_weights():
+    """Torques bounded by half of a jerboa's; work, impulses and the motion agree."""
+    rat = st.scenario("rat_kick")
+    run = rat.simulate()
+    peak = run.info["peaks"]["all"][0] / weight_of(rat.model.parameters)
+    assert 10 < peak < 20
+    assert run.info["imbalance"]["relative"] < 1e-4
+    last = {event["group"]: event["kind"] for event in run.events}
+    assert last == dict.fromkeys(rat.model.contacts, "take_off")
 
 
 def test_hinges_about_x_and_z_are_a_segment_of_one_link():

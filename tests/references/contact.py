@@ -121,7 +121,7 @@ class Chains:
         """Return the points, chain by chain."""
         out, left = [], list(q_t)
         for one in self.chains:
-            pitch, roll, yaw = (turn(x * axis) for x, axis in zip(one.mount_angles, np.eye(3)))
+            pitch, roll, yaw = map(turn, np.diag(one.mount_angles))
             R, found = yaw @ pitch @ roll, [np.array(one.mount)]
             for segment in one.segments:
                 if hasattr(segment, "axis"):

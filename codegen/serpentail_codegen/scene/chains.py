@@ -20,7 +20,7 @@ OF_CHAINS = {key_in_chain(p.name): p for p in FOUND}
 # keys of a scene with several chains that do not work yet: which values, and what to do
 REFUSED: dict[str, tuple[Callable[[Any], bool], str]] = {
     "contacts": (
-        lambda x: "feet" in x,
+        lambda x: isinstance(x, list | tuple) and "feet" in x,
         '"feet" are legs without mass: name the chain that touches the ground',
     ),
     "coordinates": (lambda x: x == "polar", 'use "bend", or remove the chains'),
@@ -31,7 +31,7 @@ REFUSED: dict[str, tuple[Callable[[Any], bool], str]] = {
 }
 ENDS = ("", "_dot")  # of the names of coordinates and of their rates
 REQUIRED = ("tail_mount", "tail_mass", "tail_length")  # where a chain has them
-TAKEN = ("tail", "torso", "tau", "omega")  # words that names of other numbers begin with
+TAKEN = ("tail", "torso", "feet", "tau", "omega")  # words that other names begin with
 
 
 @dataclass(frozen=True)

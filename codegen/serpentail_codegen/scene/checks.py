@@ -132,10 +132,12 @@ def lacking(needs: str, contacts: Collection[str]) -> str:
 
 
 def contacts_in_order(
-    contacts: Collection[str], chains: Collection[str]
+    contacts: Collection[str], chains: Any
 ) -> tuple[tuple[str, ...], list[Problem]]:
-    """Return the groups of contact points in their order, and a problem for each that is none."""
-    groups = (*GROUPS[:2], *chains, *GROUPS[2:])
+    """Return the groups of contact points in their order, and a problem for each that is none;
+    ``chains``: tables by name.
+    """
+    groups = (*GROUPS[:2], *(chains if isinstance(chains, Mapping) else ()), *GROUPS[2:])
     unknown = [
         Problem("contacts", name, f"needs {CONTACTS.text}; {suggest(name, groups)}")
         for name in contacts

@@ -77,7 +77,7 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
     chains = chains_of(values, parse_scene)
     problems += chains.problems
     values |= {"chains": chains.chains, "parameters": chains.parameters}
-    ordered, unknown = contacts_in_order(contacts, [chain.name for chain in chains.chains])
+    ordered, unknown = contacts_in_order(contacts, values["chain"])
     problems += unknown
     tail = tail_description(kind, values)
     values |= tail.values

@@ -82,8 +82,7 @@ class Model(ModelMethods, ModelStates, NearNames):
     coordinates, velocities, torques : list of str
         Names of their numbers, such as "z", "vz", "alpha_1", "alpha_1_dot" and "tau_alpha_1".
     contacts : dict
-        Number of points that can touch the ground, for each group: "feet", "tail", other chains
-        such as "hind_left", "torso".
+        Number of points of each group that can touch the ground: "feet", "tail", "torso", chains.
     parameters : mapping
         Parameter values by name, SI; read-only.
     parameter_vector : ndarray

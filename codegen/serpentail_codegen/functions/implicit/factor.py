@@ -168,7 +168,10 @@ def stiffen(draft: Draft, f: Factors, ground: ContactLinearisation, number: Inde
 def add_chain_contacts(draft: Draft, f: Factors, ground: ContactLinearisation) -> None:
     """Add points of a chain like those of the torso, with their columns of its coordinates."""
     chain, columns = draft.tail, ground.points.columns[draft.tail.group]
-    S, force = draft.array("S_segment", 6 * chain.width, chain.segments), draft.vector("force_column", 3)
+    S, force = (
+        draft.array("S_segment", 6 * chain.width, chain.segments),
+        draft.vector("force_column", 3),
+    )
     jacobian = draft.of_segment(loads.point_jacobian_tail)
     for stretch, i in each_segment(draft):
         draft.fill(S[i], 0)

@@ -81,9 +81,7 @@ class Shift:
     v: Array
     rotation: Ref
 
-    def at(
-        self, draft: Draft, f: Factors, number: Index, place: Place | None, motion: Ref
-    ) -> None:
+    def at(self, draft: Draft, f: Factors, number: Index, place: Place | None, motion: Ref) -> None:
         """Store how a point moves: a point of the torso, or of a chain."""
         reads = {"shift": block(self.v, VELOCITY), "turn": self.rotation, "arm": f("arm", number)}
         draft.step(stiffness.point_shift, reads, motion=motion)
