@@ -139,9 +139,7 @@ class Chains:
 
 
 class Contacts:
-    """The points of a model, or of an animal of several chains that is the same; ``groups`` as in
-    its manifest.
-    """
+    """The points of a model, or of an animal that is the same; ``groups`` as in its manifest."""
 
     def __init__(self, model, animal=None):
         self.parameters = model.parameters

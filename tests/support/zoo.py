@@ -148,11 +148,10 @@ LIMBS = {
     },
 }
 # without passive parts: hinges and arcs, also of mirrored chains, on the ground
-TOUCHING = {
-    "leg": LIMBS["leg"] | {"joints": [{"name": "swing", "axis": "y"}, LIMBS["leg"]["joints"][1]]},
-    "fin": CHAINS["second"] | {"pair": True, "mount_angles": [0.4, -0.2, 1.3]},
-    "arm": LIMBS["arm"],
-}
+STRIDE = [{"name": "swing", "axis": "y"}, LIMBS["leg"]["joints"][1]]
+FIN = CHAINS["second"] | {"pair": True, "mount_angles": [0.4, -0.2, 1.3]}
+TOUCHING = {"leg": LIMBS["leg"] | {"joints": STRIDE}, "fin": FIN, "arm": LIMBS["arm"]}
+TOUCHING = {"chain": TOUCHING, "contacts": ["torso", "arm", "fin", "leg", "tail"]}
 
 
 def _links(segments: int, links: int, **keys: Any) -> dict[str, Any]:
@@ -225,12 +224,7 @@ ZOO: dict[str, dict[str, Any]] = {
     # several chains
     "tree": _own("articulated", OWN_LINKS[:2], chain=CHAINS),
     "limbs": _own("articulated", OWN_LINKS[1:2], chain=LIMBS),
-    "tree_ground": _own(
-        "articulated",
-        OWN_LINKS[1:2],
-        chain=TOUCHING,
-        contacts=["torso", "arm", "fin", "leg", "tail"],
-    ),
+    "tree_ground": _own("articulated", OWN_LINKS[1:2], **TOUCHING),
     # other gravity
     "slope": _links(1, 3, slope={"angle": "25 deg", "toward": "-x"}, contacts=["torso"]),
     # other numbers
