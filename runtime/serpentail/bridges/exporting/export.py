@@ -57,8 +57,8 @@ def export(model: Model, kind: str, path: str | os.PathLike[str] | None = None) 
     """
     one_of("kind", kind, SUFFIXES, ExportError)
     checked_model(model, ExportError)
-    if kind != "bundle":
-        remedy = 'export a "bundle", or a scene without tables [chain.NAME]'
+    if kind == "fmu":
+        remedy = 'export an "mjcf" or a "bundle", or a scene without tables [chain.NAME]'
         refuse_several(model, f"kind: value {kind!r}", remedy, ExportError)
     name = name_of(model) if kind == "bundle" else model.name
     target = checked_path(kind, f"{name}{SUFFIXES[kind][0]}" if path is None else path)

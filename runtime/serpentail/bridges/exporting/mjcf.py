@@ -11,7 +11,7 @@ from ...basics.checks import shown
 from ...basics.errors import ExportError
 from ...model.model import Model
 from ...model.weight import fall
-from .chain import AXES, Capsule, Chain, Link, along, chain_of, origin, text, torso_capsule
+from .bodies import Bodies, Capsule, Link, along, bodies_of, origin, text, torso_capsule
 from .export import xml_file
 
 LEAST = 1e-15  # kg, kg m^2: MuJoCo takes none of a moving body that is not above it (mjMINVAL)
@@ -28,15 +28,15 @@ STOPS = (
 
 def mjcf(model: Model) -> bytes:
     """Return the file; ExportError if the tail is not a chain of links that MuJoCo can read."""
-    chain, p = chain_of(model, "mjcf"), model.parameters
-    if len(chain.links) > MOST_LINKS:
+    bodies, p = bodies_of(model, "mjcf"), model.parameters
+    if len(bodies.links) > MOST_LINKS:
         raise ExportError(
             f"kind: value 'mjcf': needs {MOST_LINKS} links or fewer, since MuJoCo reads no deeper "
-            f'files, and {model.name} has {len(chain.links)}: export a "urdf", or fewer links'
+            f'files, and {model.name} has {len(bodies.links)}: export a "urdf", or fewer links'
         )
-    _refuse_slight("torso_mass", chain.torso_mass)
-    _refuse_slight("torso_inertia", chain.torso_inertia)
-    for link in chain.links:
+    _refuse_slight("torso_mass", bodies.torso_mass)
+    _refuse_slight("torso_inertia", bodies.torso_inertia)
+    for link in bodies.links:
         _refuse_slight(f"mass of {link.name}", link.mass)
         _refuse_slight(f"inertia of {link.name}", link.inertia)
     root = Xml.Element("mujoco", model=model.name)
@@ -49,14 +49,15 @@ def mjcf(model: Model) -> bytes:
     Xml.SubElement(default, "equality", STIFF)
     torso = Xml.SubElement(Xml.SubElement(root, "worldbody"), "body", name="torso")
     Xml.SubElement(torso, "freejoint", name="torso", align="false")
-    _inertial(torso, (0.0, 0.0, 0.0), chain.torso_mass, chain.torso_inertia)
+    _inertial(torso, (0.0, 0.0, 0.0), bodies.torso_mass, bodies.torso_inertia)
     _capsule(torso, torso_capsule(model))
-    body = torso
-    for link in chain.links:
-        body = _add_link(body, link)
-    Xml.SubElement(body, "site", name="tip", pos=text(chain.links[-1].end))
-    _add_ties(root, chain)
-    _add_passive(root, chain)
+    placed = {"torso": torso}
+    for link in bodies.links:
+        placed[link.name] = _add_link(placed[link.before], link)
+    for name, last in bodies.tips:
+        Xml.SubElement(placed[last.name], "site", name=name, pos=text(last.end))
+    _add_ties(root, bodies)
+    _add_passive(root, bodies)
     return xml_file(root)
 
 
@@ -91,41 +92,42 @@ def _capsule(torso: Xml.Element, capsule: Capsule) -> None:
 
 
 def _add_link(before: Xml.Element, link: Link) -> Xml.Element:
-    """Return the body of a link, added to the one before it; a site marks its joints."""
+    """Return the body of a link, added to the one before it; sites mark its joints."""
     body = Xml.SubElement(before, "body", name=link.name, pos=text(link.place))
     if any(link.turn):
         from scipy.spatial.transform import Rotation
 
         x, y, z, w = Rotation.from_euler("xyz", link.turn).as_quat()
         body.set("quat", text((w, x, y, z)))
-    for name, axis in AXES:
-        Xml.SubElement(body, "joint", name=link.joint(name), type="hinge", axis=text(axis))
+    for joint in link.joints:
+        rotor = {"armature": text(joint.rotor)} if joint.rotor else {}
+        words = {"name": joint.name, "type": "hinge", "axis": text(joint.axis)}
+        Xml.SubElement(body, "joint", words | rotor)
     _inertial(body, link.center, link.mass, link.inertia)
-    ends = {"fromto": text((0.0, 0.0, 0.0, *link.end)), "size": text(link.radius)}
-    Xml.SubElement(body, "geom", {"name": link.name, "type": "capsule", **ends})
-    Xml.SubElement(body, "site", name=f"joint_{link.segment}_{link.number}")
+    if link.along:
+        ends = {"fromto": text((0.0, 0.0, 0.0, *link.end)), "size": text(link.radius)}
+        Xml.SubElement(body, "geom", {"name": link.name, "type": "capsule", **ends})
+    for point in link.points:
+        Xml.SubElement(body, "site", name=point)
     return body
 
 
-def _add_ties(root: Xml.Element, chain: Chain) -> None:
+def _add_ties(root: Xml.Element, bodies: Bodies) -> None:
     """Couple the joints of each segment, and add motors to those of its first link."""
     equality = Xml.SubElement(root, "equality")
     actuator = Xml.SubElement(root, "actuator")
-    for link in chain.links:
-        for name, _ in AXES:
-            if link.number == 1:
-                joint = link.joint(name)
-                Xml.SubElement(actuator, "motor", name=f"tau_{name}_{link.segment}", joint=joint)
-            else:
-                tied = {"joint1": link.joint(name), "joint2": link.joint(name, 1)}
-                Xml.SubElement(equality, "joint", tied)
+    for joint in [joint for link in bodies.links for joint in link.joints]:
+        if not joint.free:
+            Xml.SubElement(equality, "joint", joint1=joint.name, joint2=joint.first)
+        elif joint.driven:
+            Xml.SubElement(actuator, "motor", name=f"tau_{joint.coordinate}", joint=joint.name)
 
 
-def _add_passive(root: Xml.Element, chain: Chain) -> None:
+def _add_passive(root: Xml.Element, bodies: Bodies) -> None:
     """Add springs, damping and stops; behind its width a stop is a spring from half of it on."""
     joints = {joint.get("name"): joint for joint in root.iter("joint")}
     tendon = Xml.SubElement(root, "tendon")
-    for joint, own in chain.passive.items():
+    for joint, own in bodies.passive.items():
         numbers = {"stiffness": own.stiffness, "springref": own.rest, "damping": own.damping}
         joints[joint].attrib |= {key: text(value) for key, value in numbers.items() if value}
         if half := own.stop_width / 2:

@@ -5,14 +5,13 @@ from xml.etree import ElementTree as Xml
 
 from ...basics.errors import ExportError
 from ...model.model import Model
-from .chain import (
-    AXES,
+from .bodies import (
     Capsule,
     Link,
     Passive,
     Vector,
     along,
-    chain_of,
+    bodies_of,
     origin,
     text,
     torso_capsule,
@@ -29,8 +28,8 @@ FIXED = (0.0, 0.0, 0.0)
 
 def urdf(model: Model) -> bytes:
     """Return the file; ExportError if the tail has springs, or is not a chain of rigid links."""
-    chain, capsule = chain_of(model, "urdf"), torso_capsule(model)
-    if any(own.stiffness for own in chain.passive.values()):
+    bodies, capsule = bodies_of(model, "urdf"), torso_capsule(model)
+    if any(own.stiffness for own in bodies.passive.values()):
         raise ExportError(
             f"kind: value 'urdf': needs a tail without springs ({model.name}), which URDF lacks: "
             'export an "mjcf", or load the model with tail_stiffness = 0'
@@ -39,40 +38,43 @@ def urdf(model: Model) -> bytes:
     robot.append(Xml.Comment(origin(model, STOPS)))
     # the torso
     torso = Xml.SubElement(robot, "link", name="torso")
-    _inertial(torso, FIXED, chain.torso_mass, chain.torso_inertia)
+    _inertial(torso, FIXED, bodies.torso_mass, bodies.torso_inertia)
     _rod(torso, FIXED, capsule)
     for end in (capsule.half, -capsule.half):
         _solid(torso, along(capsule.axis, end), 2, "sphere", radius=text(capsule.radius))
-    # the tail, each link on the one before it
-    before = "torso"
-    for link in chain.links:
-        _add_link(robot, before, link, chain.passive)
-        before = link.name
-    Xml.SubElement(robot, "link", name="tip")
-    joint = Xml.SubElement(robot, "joint", name="tail_end", type="fixed")
-    _between(joint, chain.links[-1].end, before, "tip")
+    # the chains, each link on the one before it
+    for link in bodies.links:
+        _add_link(robot, link, bodies.passive)
+    for name, last in bodies.tips:
+        Xml.SubElement(robot, "link", name=name)
+        end = "tail_end" if name == "tip" else f"{name}_end"
+        _between(Xml.SubElement(robot, "joint", name=end, type="fixed"), last.end, last.name, name)
     return xml_file(robot)
 
 
-def _add_link(robot: Xml.Element, before: str, link: Link, passive: dict[str, Passive]) -> None:
-    """Add a cross without mass, which alpha turns, and the link, which beta turns on it."""
-    cross = f"cross_{link.segment}_{link.number}"
-    Xml.SubElement(robot, "link", name=cross)
+def _add_link(robot: Xml.Element, link: Link, passive: dict[str, Passive]) -> None:
+    """Add crosses without mass, which all joints but the last turn, and the link."""
+    parent, place, turn, last = link.before, link.place, link.turn, len(link.joints) - 1
+    children = [link.cross + f"_{k}" * (k > 0) for k in range(last)] + [link.name]
+    for cross in children[:-1]:
+        Xml.SubElement(robot, "link", name=cross)
     body = Xml.SubElement(robot, "link", name=link.name)
     _inertial(body, link.center, link.mass, link.inertia)
-    _rod(body, (0.0, -link.length / 2, 0.0), Capsule(1, link.length / 2, link.radius))
-    ends = ((link.place, link.turn, before, cross), (FIXED, FIXED, cross, link.name))
-    for (name, axis), (place, turn, parent, child) in zip(AXES, ends, strict=True):
-        joint = Xml.SubElement(robot, "joint", name=link.joint(name), type="revolute")
+    if link.along:
+        half = -link.end[1] / 2
+        _rod(body, (0.0, -half, 0.0), Capsule(1, half, link.radius))
+    for hinge, child in zip(link.joints, children, strict=True):
+        joint = Xml.SubElement(robot, "joint", name=hinge.name, type="revolute")
         _between(joint, place, parent, child, turn)
-        Xml.SubElement(joint, "axis", xyz=text(axis))
-        own, limits = passive[link.joint(name, 1)], {"lower": -HALF_TURN, "upper": HALF_TURN}
+        parent, place, turn = child, FIXED, FIXED
+        Xml.SubElement(joint, "axis", xyz=text(hinge.axis))
+        own, limits = passive[hinge.first], {"lower": -HALF_TURN, "upper": HALF_TURN}
         if own.stop_width:
             limits = {"lower": own.stop_lower, "upper": own.stop_upper}
         limits |= {"effort": NO_LIMIT, "velocity": NO_LIMIT}
         Xml.SubElement(joint, "limit", {key: text(value) for key, value in limits.items()})
-        if link.number > 1:
-            Xml.SubElement(joint, "mimic", joint=link.joint(name, 1), multiplier="1", offset="0")
+        if not hinge.free:
+            Xml.SubElement(joint, "mimic", joint=hinge.first, multiplier="1", offset="0")
         elif own.damping:
             Xml.SubElement(joint, "dynamics", damping=text(own.damping), friction="0")
 
