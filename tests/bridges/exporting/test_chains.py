@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import serpentail as st
+from serpentail.model.weight import total_mass
 from tests.support import zoo
 from tests.support.rows import row
 
@@ -12,7 +13,7 @@ pytest.importorskip("pinocchio")
 import mujoco
 import pinocchio as pin
 
-TAILS = ("m1_n1", "m1_n3", "m3_n4", "own_links", "weightless", "elastic")
+TAILS = ("m1_n1", "m1_n3", "m3_n4", "own_links", "weightless", "elastic", "limbs")
 CHANGED = {
     "torso_mass": 0.1234567890123,
     "torso_inertia": (7.1e-5, 4.3e-5, 6.9e-5),
@@ -27,8 +28,10 @@ def tails():
     """Yield names and tails, each with its scene's parameters and with others."""
     for name in TAILS:
         model = zoo.model(name)
-        if name == "own_links":  # inertias of the zoo's are not all those of a body
-            model = model.with_parameters(link_inertias=np.linspace([3, 2, 4], [2, 1, 2], 7) * 1e-8)
+        if name in ("own_links", "limbs"):  # inertias of the zoo's are not all those of a body
+            links = len(np.reshape(model.parameters["link_inertias"], (-1, 3)))
+            inertias = np.linspace([3, 2, 4], [2, 1, 2], links) * 1e-8
+            model = model.with_parameters(link_inertias=inertias)
         independent = {parameter["name"] for parameter in model.manifest["parameters"]}
         changes = {key: value for key, value in CHANGED.items() if key in independent}
         yield name, model
@@ -41,9 +44,15 @@ def configurations(model, count=5):
         yield q, q[3:7] / np.linalg.norm(q[3:7])
 
 
+def without_springs(model):
+    """A model without what URDF lacks: springs and rotors."""
+    names = [
+        n for n in model.parameters if n.endswith(("tail_stiffness", "leg_stiffness", "rotors"))
+    ]
+    return model.with_parameters(**dict.fromkeys(names, 0))
+
+
 def pinocchio_model(model, folder):
-    if "tail_stiffness" in model.parameters:  # URDF has no springs
-        model = model.with_parameters(tail_stiffness=0)
     path = st.export(model, "urdf", folder / "rat.urdf")
     return pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer(), True)
 
@@ -54,17 +63,18 @@ def pinocchio_state(model, read, q, turned):
     state, turn = np.zeros(read.nq), np.eye(read.nv)
     state[:3], state[3:7] = q[:3], (*xyz, w)
     turn[:3, :3] = pin.Quaternion(*turned).toRotationMatrix().T
-    for k in range(model.nv - 6):
-        joint = read.joints[read.getJointId(f"{('alpha', 'beta')[k % 2]}_{k // 2 + 1}_1")]
+    for k, name in enumerate(model.names.tail):
+        joint = read.joints[read.getJointId(name if read.existJointName(name) else f"{name}_1")]
         state[joint.idx_q] = q[7 + k]
         turn[joint.idx_v, 6:] = np.eye(model.nv - 6)[k]
     return state, turn
 
 
 def test_pinocchio_finds_inertia_and_points_of_the_model(tmp_path):
-    for name, model in tails():
-        read = pinocchio_model(model, tmp_path)
-        links = [(i + 1, j + 1) for i, count in enumerate(model.joints_each) for j in range(count)]
+    for name, model in ((name, without_springs(model)) for name, model in tails()):
+        read, counts = pinocchio_model(model, tmp_path), model.joints_each
+        counts = counts[model.layout["tail"].segments]
+        links = [(i + 1, j + 1) for i, count in enumerate(counts) for j in range(count)]
         data, names = read.createData(), [f"link_{i}_{j}" for i, j in links]
         assert (read.nq, read.nv) == (model.nq, model.nv), name
         for q, turned in configurations(model):
@@ -76,11 +86,11 @@ def test_pinocchio_finds_inertia_and_points_of_the_model(tmp_path):
             assert (np.abs(H - expected) <= 1e-14 * np.outer(scale, scale)).all(), name
             pin.framesForwardKinematics(read, data, state)
             places = [data.oMf[read.getFrameId(each)].translation for each in [*names, "tip"]]
-            assert np.abs(places - model.tail_points(q)).max() < 1e-12, name
+            assert np.abs(places - model.tail_points(q)[: len(places)]).max() < 1e-12, name
 
 
 def test_pinocchio_finds_limits_and_damping_and_needs_the_models_torques(tmp_path):
-    model = zoo.model("elastic").with_parameters(tail_stiffness=0)
+    model = without_springs(zoo.model("elastic"))
     read, p, rng = pinocchio_model(model, tmp_path), model.parameters, np.random.default_rng(5)
     lower, upper, damping = (
         np.array(p[f"tail_{x}"]) for x in ("stop_lower", "stop_upper", "damping")
@@ -111,7 +121,8 @@ def mujoco_model(model, folder):
 
 def of_links(model, angles):
     """Angles or rates of the free chain; each link of a segment turns as the segment's first."""
-    return np.repeat(np.reshape(angles, (-1, 2)), model.joints_each, axis=0).ravel()
+    each = zip(np.split(angles, model.layout.firsts[1:]), model.joints_each, strict=True)
+    return np.concatenate([np.tile(own, count) for own, count in each])
 
 
 def tie_of(model):
@@ -155,7 +166,6 @@ def check_mujoco(model, folder):
     read = mujoco_model(model, folder)
     data, tau = mujoco.MjData(read), np.random.default_rng(3).normal(size=model.nv - 6)
     tie = tie_of(model)
-    first = np.cumsum([0, *model.joints_each[:-1]])
     data.ctrl[:] = tau
     for q, turned in configurations(model):
         data.qpos[:] = np.concatenate([q[:3], turned, of_links(model, q[7:])])
@@ -166,12 +176,10 @@ def check_mujoco(model, folder):
         mujoco.mj_fullM(read, data, full)
         expected = model.mass_matrix(q)
         assert np.abs(tie.T @ full @ tie - expected).max() <= 1e-12 * np.abs(expected).max()
-        ties = np.add.reduceat(np.reshape(data.qfrc_actuator[6:], (-1, 2)), first)
-        np.testing.assert_array_equal(ties.ravel(), tau)
+        np.testing.assert_array_equal(tie.T[6:] @ data.qfrc_actuator, tau)
     p = model.parameters
     assert read.opt.gravity.tolist() == [0, 0, -p.get("gravity", 0.0)]
-    tail = p["tail_mass"] if "tail_mass" in p else sum(np.ravel(p["link_masses"]))
-    assert read.body_subtreemass[1] == pytest.approx(p["torso_mass"] + tail, rel=1e-14)
+    assert read.body_subtreemass[1] == pytest.approx(total_mass(p), rel=1e-14)
 
 
 def check_flight(model, folder):

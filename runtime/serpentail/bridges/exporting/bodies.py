@@ -192,7 +192,8 @@ def _hinged(model: Model, chain: ChainLayout) -> list[Link]:
 
 
 def _refuse_other(model: Model, kind: str) -> None:
-    """ExportError unless a model is a free chain of rigid links."""
+    """ExportError unless a model consists of rigid links and moves freely."""
+    p = model.parameters
     if {*model.kinds} - {"articulated", HINGE}:
         needs = "an articulated tail, because a continuum tail is not a chain of rigid links"
         remedy = 'generate a scene with kind = "articulated" and some links'
@@ -200,11 +201,12 @@ def _refuse_other(model: Model, kind: str) -> None:
             remedy += ', or export an "fmu"'
     elif model.fixed:
         needs, remedy = "a torso that moves", 'generate the scene with base = "free"'
-    elif "tail_rotor" in model.parameters:
+    elif "tail_rotor" in p:
         needs, remedy = "a tail without rotors", 'leave out tail_rotor, or export an "fmu"'
-    elif kind == "urdf" and any(name.endswith("_rotors") for name in model.parameters):
-        needs, remedy = "limbs without rotors, which URDF lacks", 'export an "mjcf"'
-    elif "air_density" in model.parameters:
+    elif kind == "urdf" and any(np.any(p[n]) for n in p if n.endswith("_rotors")):
+        needs = "limbs without rotors, which URDF lacks"
+        remedy = 'export an "mjcf", or load the model with 0 for them'
+    elif "air_density" in p:
         needs, remedy = "a model without air", 'leave out air_density, or export an "fmu"'
     else:
         return
