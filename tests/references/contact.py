@@ -118,7 +118,6 @@ class Chains:
         self.chains = animal._all
 
     def at(self, q_t):
-        """Return the points, chain by chain."""
         out, left = [], list(q_t)
         for one in self.chains:
             pitch, roll, yaw = map(turn, np.diag(one.mount_angles))
@@ -142,8 +141,8 @@ class Contacts:
     """The points of a model, or of an animal that is the same; ``groups`` as in its manifest."""
 
     def __init__(self, model, animal=None):
-        self.parameters = model.parameters
-        self.points = Chains(animal) if animal else Points(model)
+        points = Chains(animal) if animal else Points(model)
+        self.parameters, self.points = model.parameters, points
         self.groups = [entry["group"] for entry in model.manifest["contacts"]]
         self.friction, self.nv = model.manifest["scene"]["friction"], model.nv
 

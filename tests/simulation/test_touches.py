@@ -17,8 +17,7 @@ SPAN = 0.12  # s
 CLOCK = 1e-4  # s between the samples of the free flights that tell the truth
 LEGS = st.Legs.fixed(np.radians(210), np.radians(-15))
 PASSIVE = st.Damping(1e-3)
-# a tree's bones and wheel are too light for such damping in explicit steps
-CALM = st.Damping([1e-3] * 2 + [1e-5] * 4 + [1e-3] * 4 + [1e-5] * 3)
+CALM = st.Damping([1e-3] * 2 + [1e-5] * 4 + [1e-3] * 4 + [1e-5] * 3)  # bones and wheel are light
 ADAPTIVE = ("ros34pw2", "tsit5", "switching")
 METHODS = [
     *({"method": m, "rtol": r} for m in ADAPTIVE for r in (1e-3, 1e-4, 1e-6)),

@@ -29,9 +29,8 @@ def tails():
     for name in TAILS:
         model = zoo.model(name)
         if name in ("own_links", "limbs"):  # inertias of the zoo's are not all those of a body
-            links = len(np.reshape(model.parameters["link_inertias"], (-1, 3)))
-            inertias = np.linspace([3, 2, 4], [2, 1, 2], links) * 1e-8
-            model = model.with_parameters(link_inertias=inertias)
+            rows = np.linspace([3, 2, 4], [2, 1, 2], 7 if name == "own_links" else 2) * 1e-8
+            model = model.with_parameters(link_inertias=rows)
         independent = {parameter["name"] for parameter in model.manifest["parameters"]}
         changes = {key: value for key, value in CHANGED.items() if key in independent}
         yield name, model
