@@ -103,9 +103,8 @@ def bodies_of(model: Model, kind: str) -> Bodies:
     tips: list[tuple[str, Link]] = []
     passive: dict[str, Passive] = {}
     for chain in model.layout.chains:
-        own = (
-            _hinged(model, chain) if HINGE in model.kinds[chain.segments] else _linked(model, chain)
-        )
+        made = _hinged if HINGE in model.kinds[chain.segments] else _linked
+        own = made(model, chain)
         links += own
         tips.append((f"{_start(chain)}tip", own[-1]))
         p, count = values_of(chain, model.parameters), len(chain.names)
@@ -113,8 +112,8 @@ def bodies_of(model: Model, kind: str) -> Bodies:
         firsts = [joint.first for link in own for joint in link.joints if joint.free]
         rows = np.array(columns).T.tolist()
         passive |= dict(zip(firsts, map(Passive._make, rows), strict=True))
-    p = model.parameters
-    return Bodies(tuple(links), tuple(tips), passive, p["torso_mass"], p["torso_inertia"])
+    torso = (model.parameters[f"torso_{name}"] for name in ("mass", "inertia"))
+    return Bodies(tuple(links), tuple(tips), passive, *torso)
 
 
 def _start(chain: ChainLayout) -> str:

@@ -47,8 +47,9 @@ def urdf(model: Model) -> bytes:
         _add_link(robot, link, bodies.passive)
     for name, last in bodies.tips:
         Xml.SubElement(robot, "link", name=name)
-        end = "tail_end" if name == "tip" else f"{name}_end"
-        _between(Xml.SubElement(robot, "joint", name=end, type="fixed"), last.end, last.name, name)
+        fixed = "tail_end" if name == "tip" else f"{name}_end"
+        joint = Xml.SubElement(robot, "joint", name=fixed, type="fixed")
+        _between(joint, last.end, last.name, name)
     return xml_file(robot)
 
 
