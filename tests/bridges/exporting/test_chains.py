@@ -48,7 +48,7 @@ def without_springs(model):
     names = [
         n for n in model.parameters if n.endswith(("tail_stiffness", "leg_stiffness", "rotors"))
     ]
-    return model.with_parameters(**dict.fromkeys(names, 0))
+    return model.with_parameters(**{n: np.zeros_like(model.parameters[n]) for n in names})
 
 
 def pinocchio_model(model, folder):
@@ -82,7 +82,7 @@ def test_pinocchio_finds_inertia_and_points_of_the_model(tmp_path):
             H = turn.T @ (upper + np.triu(upper, 1).T) @ turn
             expected = model.mass_matrix(q)
             scale = np.sqrt(np.diag(expected))  # of each coordinate: the tail's moments are small
-            assert (np.abs(H - expected) <= 1e-14 * np.outer(scale, scale)).all(), name
+            assert (np.abs(H - expected) <= 2e-14 * np.outer(scale, scale)).all(), name
             pin.framesForwardKinematics(read, data, state)
             places = [data.oMf[read.getFrameId(each)].translation for each in [*names, "tip"]]
             assert np.abs(places - model.tail_points(q)[: len(places)]).max() < 1e-12, name
