@@ -136,7 +136,7 @@ def test_unsound_contacts_are_named():
     points, two = np.zeros((41, 2, 3)), {"feet": 2}
     sound = {"points": points, "forces": points, "bristles": points[..., :2], "groups": two}
     for name, value, words in (
-        *(("groups", g, "groups: value") for g in ([], {"ear": 2}, {"feet": 0}, {"feet": 2.0})),
+        *(("groups", g, "groups: value") for g in ([], {3: 2}, {"feet": 0}, {"feet": 2.0})),
         ("groups", {"feet": 3}, r"points has shape \(41, 2, 3\): give \(41, 3, 3\)"),
         ("forces", points[:, :1], r"forces has shape \(41, 1, 3\): give \(41, 2, 3\)"),
         ("bristles", points, r"bristles has shape .*: give \(41, 2, 2\)"),
