@@ -69,8 +69,7 @@ def test_it_does_not_matter_which_chain_is_the_tail():
 @pytest.mark.slow  # it compiles a model
 def test_legs_with_mass_push_with_less_than_20_body_weights():
     """Torques bounded by half of a jerboa's; work, impulses and the motion agree."""
-    rat = st.scenario("rat_kick")
-    run = rat.simulate()
+    run = (rat := st.scenario("rat_kick")).simulate()
     assert 10 < run.info["peaks"]["all"][0] / weight_of(rat.model.parameters) < 20
     assert run.info["imbalance"]["relative"] < 1e-4
     assert {each["group"] for each in run.events} == {*rat.model.contacts}
