@@ -135,7 +135,7 @@ def needed(scene: Scene) -> list[str]:
     names = scene.functions
     flight = ["forward_dynamics", *["tracked_dynamics"] * ("pfl" in names)]
     called = ["contact_points", "contact_rates"] if scene.contacts else flight
-    called += ["air_force"] * bool(scene.widths)
+    called += ["air_force"] * bool(scene.widths) + ["tendon_torques"] * bool(scene.shape.tendons)
     margins = ["margins", "margins_vjp"] * bool(scene.contacts)
     transposed = ["implicit_solve_transposed"] * ("implicit" in names)
     parts = {

@@ -14,6 +14,7 @@ from .rules import (
     COUNT,
     FINITE,
     FLAG,
+    FRACTION,
     NOT_NEGATIVE,
     POSITIVE,
     TABLES,
@@ -119,6 +120,7 @@ KEYS = {
     "weightless": SceneKey(False, FLAG),
     "slope": SceneKey(None, ANY),  # of the ground
     "chain": SceneKey({}, table("chain.NAME")),  # besides the tail
+    "tendon": SceneKey({}, table("tendon.NAME")),  # that pull the tail
 }
 
 
@@ -135,11 +137,15 @@ class Only:
 
 
 OF_LINKS = ("link_masses", "link_lengths", "link_centers", "link_inertias")
+OF_GUIDES = ("tendon_guides", "tendon_ends", "tendon_roots")
 OF_ARCS = ("arc_masses", "arc_lengths")
 OF_PLACED = ("link_masses", "link_tips", "link_offsets", "link_inertias")
 ONLY = {
     "articulated": Only(
-        ("links",), ("links",), ("link_radius", "link_inertia", *OF_LINKS), ("joint",)
+        ("links",),
+        ("links",),
+        ("link_radius", "link_inertia", *OF_LINKS, *OF_GUIDES),
+        ("joint",),
     ),
     "continuum": Only(("samples", "bend_range"), (), OF_ARCS, ("bend", "polar")),
     "mixed": Only(("samples", "bend_range"), (), (*OF_LINKS, *OF_ARCS), ("mixed",)),
@@ -255,3 +261,13 @@ SLOPE = {
     "toward": one_word("x", "y", "-x", "-y"),
 }
 TAPER = {name: SEGMENT[name] for name in ("length", "radii", "density", "mass")}
+# of the tables `tendon.NAME`
+TENDON = {
+    "offset": Key("m", size=2),
+    "radius": Key("m", POSITIVE),
+    "tension": Key("N", POSITIVE),
+    "guides": Key("1", FRACTION),
+    "end_offset": Key("m", size=2),
+    "root": Key("m", NOT_NEGATIVE),
+}
+TENDON_COUNTS = ("to", "count")

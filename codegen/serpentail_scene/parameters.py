@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from math import pi
 from typing import Any
 
-from .rules import BODY_INERTIA, FINITE, NOT_NEGATIVE, POSITIVE, NumberRule
+from .rules import BODY_INERTIA, FINITE, FRACTION, NOT_NEGATIVE, POSITIVE, NumberRule
 
 Value = float | tuple[float, ...]
 
@@ -19,7 +19,8 @@ class Parameter:
     ``needs`` is a group of contact points, "contacts" for any of them, a part of the passive tail,
     or "air"; empty: every scene has the parameter.  ``tail`` says which tails have it: "equal",
     tails of equal pieces; "link" or "arc", tails whose pieces have their own values, ``size``
-    numbers each; "geared", limbs with rotors; "tilted", tails on turned axes; "free", tails of a
+    numbers each; "geared", limbs with rotors; "tendon", tails with
+    tendons; "guided", those with tendons whose guides differ; "tilted", tails on turned axes; "free", tails of a
     torso that moves; "weight", all but weightless ones and those of "sloped" scenes; empty: all.
     """
 
@@ -34,13 +35,13 @@ class Parameter:
 
     @property
     def of_pieces(self) -> bool:
-        """Tell if each link or arc has its own values."""
-        return self.tail in ("link", "arc", "geared")
+        """Tell if each link, arc or tendon has its own values."""
+        return self.tail in ("link", "arc", "geared", *OF_TENDONS)
 
     @property
     def of_chain(self) -> bool:
         """Tell if each chain of a tree has this parameter, as the tail does."""
-        return self.needs in ("", *PARTS) and self.tail not in ("free", "weight", "sloped")
+        return self.needs in ("", *PARTS) and self.tail not in OF_ANIMAL
 
     @property
     def spread(self) -> bool:
@@ -59,6 +60,8 @@ class Parameter:
         )
 
 
+OF_TENDONS = ("tendon", "guided")  # tails whose tendons have their own values
+OF_ANIMAL = ("free", "weight", "sloped", *OF_TENDONS)
 Row = tuple[str, int, Value | None, str, NumberRule, str]
 
 
@@ -158,6 +161,20 @@ PARAMETERS = (
         ("torso_semi_axes", 3, (0.0315, 0.0495, 0.027), "m", POSITIVE,
          "semi-axes of the torso, an ellipsoid centred at B"),
         needs="torso",
+    ),
+    *_rows(
+        ("tendon_offsets", 2, None, "m", FINITE,
+         "x and z of each tendon's guides in the axes of links or arcs; if they differ, of its first"),
+        ("tendon_limits", 1, None, "N", POSITIVE, "largest tension of each tendon"),
+        ("tendon_guides", 1, None, "1", FRACTION, "place of each tendon's guide along the links"),
+        tail="tendon",
+    ),
+    *_rows(
+        ("tendon_ends", 2, None, "m", FINITE,
+         "x and z of each tendon's last guide; linear from guide to guide"),
+        ("tendon_roots", 1, None, "m", NOT_NEGATIVE,
+         "distance of each tendon's first guide, on the torso, before the mount"),
+        tail="guided",
     ),
 )
 # Air around the animal: a scene has it if it names one of these. Size 0: one number at the root and

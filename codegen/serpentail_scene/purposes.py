@@ -8,7 +8,8 @@ from .parameters import AIR_NAMES, PARTS, parts_of
 from .signatures.table import AIRBORNE, ALL, DERIVATIVES, EXACT_DERIVATIVES, FIXED, NEEDS, OF_TREES
 
 MOTION = ("forward_dynamics", "energy", "momentum", "tail_points", "center_of_mass")
-RUNS = (*MOTION, "rollout", "implicit", "contact_points", "leg_points", "air_force")
+TENDONS = ("tendon_lengths", "tendon_torques")
+RUNS = (*MOTION, "rollout", "implicit", "contact_points", "leg_points", "air_force", *TENDONS)
 PURPOSES: dict[str, tuple[str, ...]] = {
     "simulate": RUNS,
     "plan": (*RUNS, "mass_matrix", "pfl", *AIRBORNE),
@@ -22,6 +23,7 @@ PURPOSES: dict[str, tuple[str, ...]] = {
         *(*MOTION, "mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics_external"),
         *("tail_point_jacobians", "contact_points", "leg_points", "contact_dynamics", "pfl"),
         "air_force",
+        *TENDONS,
     ),
     # what CasADi, JAX and PyTorch differentiate compiled functions by
     "derivatives": (
@@ -69,6 +71,7 @@ def possible(tables: Mapping[str, Any], names: Collection[str], polar: bool = Tr
     """
     contacts = _entries(tables.get("contacts"))
     present = [*contacts, *["air"] * bool({*AIR_NAMES} & {*_keys(tables.get("parameters"))})]
+    present += ["tendons"] * bool(tables.get("tendon"))
     without = {name for name, group in NEEDS.items() if group not in present}
     without -= {name for name, group in NEEDS.items() if group == "contacts" and contacts}
     if polar and tables.get("coordinates") == "polar":

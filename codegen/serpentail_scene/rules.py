@@ -46,8 +46,11 @@ NOT_NEGATIVE = NumberRule("not_negative", "0 or above", least=0)
 BODY_INERTIA = NumberRule(
     "body_inertia", "above 0, none above the sum of the other two", above=0, of_body=True
 )
+FRACTION = NumberRule("fraction", "above 0 and up to 1", above=0, most=1)
 # of parameters
-NUMBER_RULES = {rule.name: rule for rule in (FINITE, POSITIVE, NOT_NEGATIVE, BODY_INERTIA)}
+NUMBER_RULES = {
+    rule.name: rule for rule in (FINITE, POSITIVE, NOT_NEGATIVE, BODY_INERTIA, FRACTION)
+}
 
 
 def within(least: float, most: float) -> NumberRule:

@@ -15,6 +15,8 @@ from .keys import (
     SEGMENT,
     SLOPE,
     TAPER,
+    TENDON,
+    TENDON_COUNTS,
     TORSOS,
     Key,
     foreign_to,
@@ -57,6 +59,9 @@ def scene_schema(verbs: Mapping[str, Key]) -> Schema:
     of_chain["kind"] = {"enum": [*KINDS, "limb"]}
     joint = Key(keys=JOINT | JOINT_WORDS | {"name": Key(form=KEYS["name"].rule.schema)})
     of_chain |= {"joints": key_schema(Key(each=joint)), "drive": DRIVE.schema}
+    of_tendon = {name: key_schema(key) for name, key in TENDON.items()}
+    of_tendon |= dict.fromkeys(TENDON_COUNTS, COUNT.schema)
+    keys["tendon"] = {"type": "object", "additionalProperties": _table(of_tendon, ["tension"])}
     needed = ["kind", "mount"]
     keys["chain"] = {"type": "object", "additionalProperties": _table(of_chain, needed)}
     for name, key in KEYS.items():

@@ -30,6 +30,7 @@ MEASURES: dict[str, tuple[str, dict[str, Fraction]]] = {
             **{"g cm2": MILLI * CENTI**2, "g mm2": MILLI * MICRO},
         },
     ),
+    "N": ("a force", {"N": ONE, "mN": MILLI, "kN": KILO}),
     "N m": ("a torque", {"N m": ONE, "N cm": CENTI, "mN m": MILLI, "N mm": MILLI}),
     "W": ("a power", {"W": ONE, "mW": MILLI}),
     "N m/s": ("a torque per time", {"N m/s": ONE, "mN m/s": MILLI, "N mm/s": MILLI}),

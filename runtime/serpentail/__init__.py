@@ -19,7 +19,7 @@ _HOME = {
     "scenario": "scenes.simulate",
     "Scenario": "scenes.scenario",
     **dict.fromkeys(
-        ["Damping", "TorqueTable", "TorqueCurve", "Phases"],
+        ["Damping", "TorqueTable", "TorqueCurve", "TensionTable", "TensionCurve", "Phases"],
         "simulation.controllers.controller",
     ),
     "NativeTorque": "simulation.controllers.parts",

@@ -4,7 +4,7 @@ table.
 
 from serpentail_scene.signatures.table import SIGNATURES
 
-from . import air, contact, pfl
+from . import air, contact, pfl, tendons
 from .airborne import curvature as airborne
 from .derivatives import by_parameters, hessian, jacobians, rates
 from .derivatives.differentiated import FUNCTIONS
@@ -17,6 +17,7 @@ _FOUND = FUNCTIONS | signed(
     | by_parameters.ASSEMBLIES
     | hessian.ASSEMBLIES
     | air.ASSEMBLIES
+    | tendons.ASSEMBLIES
     | contact.ASSEMBLIES
     | pfl.ASSEMBLIES
     | {"implicit_factor": factor.assemble_factor, "implicit_solve": solve.assemble_solve}

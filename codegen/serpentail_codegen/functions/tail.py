@@ -147,6 +147,11 @@ class Tail(Sizes):
         return self.stretches[-1].pieces_before(self.segments)
 
     @property
+    def tendons(self) -> int:
+        """Number of tendons."""
+        return len(self.shape.tendons)
+
+    @property
     def tail_points(self) -> int:
         """Number of points of all chains: N joints and the tip of each, or the root and N samples
         of arcs.

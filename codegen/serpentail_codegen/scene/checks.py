@@ -24,6 +24,10 @@ from .problems import Problem, suggest
 MOST_SEGMENTS = 100
 MOST_LINKS = 10_000  # or samples, of all segments
 MOST_STRAIGHT = (20, 100)  # segments, and pieces in all, of straight lines
+GIVEN = {  # what functions need besides contacts
+    "air": "needs air: give parameters.air_density",
+    "tendons": "needs tendons: give a table [tendon.NAME]",
+}
 SINGLE = (2.0**-126, (2 - 2.0**-23) * 2.0**127)  # least normal and largest number of a float
 
 
@@ -163,12 +167,12 @@ def contact_problems(
     if "friction" in table and not contacts:
         problems.append(Problem("friction", table["friction"], remedy))
     wanted = values["functions"] if isinstance(values["functions"], list | tuple) else ()
-    present = (*contacts, *["air"] * any(name in parameters for name in AIR_NAMES))
+    present = [*contacts, *["air"] * any(name in parameters for name in AIR_NAMES)]
+    present += ["tendons"] * bool(values["tendon"])
     lacks = {name: lacking(needs, present) for name, needs in NEEDS.items() if name in wanted}
     for name, group in [(name, group) for name, group in lacks.items() if group]:
-        other = f'needs {group}: add "{group}" to `contacts`'
-        other = "needs air: give parameters.air_density" if group == "air" else other
-        problems.append(Problem("functions", name, other if contacts or group == "air" else remedy))
+        other = GIVEN.get(group, f'needs {group}: add "{group}" to `contacts`')
+        problems.append(Problem("functions", name, other if contacts or group in GIVEN else remedy))
     return problems
 
 

@@ -38,7 +38,10 @@ from .scene import Scene
 from .segments import are_tables, have_values
 from .slope import with_slope
 from .tail_tables import tail_description
+from .tendons import tendons_of
 from .variant import EQUAL
+
+JSON = ("body", "chain", "tendon")  # keys that a Scene has as text
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -81,6 +84,9 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
     problems += unknown
     tail = tail_description(kind, values)
     values |= tail.values
+    tendons = tendons_of(values, kind)
+    values |= tendons.values
+    problems += tendons.problems
     problems += [*tail.problems, *key_problems(values), *kind_problems(table, kind)]
     problems += function_problems(values["functions"]) + contact_problems(table, values, contacts)
     problems += polar_problems(table, kind, contacts, values["functions"])
@@ -91,7 +97,7 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
     body = body_table(values["body"], values["parameters"])
     named = body.with_torso(values["parameters"], contacts)
     problems += body.problems
-    for key in ("body", "chain"):
+    for key in JSON:
         values[key] = json.dumps(values[key], default=str) if values[key] else ""
     try:
         values["parameters"] = resolve_parameters(
@@ -147,15 +153,22 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
     # keys that this kind of tail, or a flight, does not have
     foreign = {*foreign_to(scene.kind)[0]}
     foreign |= set() if scene.contacts else {"contacts", "friction"}
-    foreign |= {"shape", "tables", "body", "unscaled", "size", "chains", "chain"}  # these follow
+    foreign |= {
+        "shape",
+        "tables",
+        "body",
+        "unscaled",
+        "size",
+        "chains",
+        "chain",
+        "tendon",
+    }  # these follow
     usual = {name: KEYS[name].default for name in ("base", "weightless")}
     foreign |= {name for name, value in usual.items() if getattr(scene, name) == value}
     names = [field.name for field in fields(Scene) if field.name not in foreign]
     table = {name: getattr(scene, name) for name in names}
     tables = json.loads(scene.tables or "{}")
-    table |= tables | {
-        key: json.loads(text) for key in ("body", "chain") if (text := getattr(scene, key))
-    }
+    table |= tables | {key: json.loads(text) for key in JSON if (text := getattr(scene, key))}
     if are_tables(table["segments"]):
         table.pop("links", None)
     table |= {key: list(table[key]) for key in ("functions", "contacts", "targets") if key in table}

@@ -32,6 +32,8 @@ HAS_NOT = {  # why a tail or a base has no such parameters
     "free": "a fixed base does not move",
     "weight": "gravity_vector or weightless = true replaces it",
     "sloped": "this scene is weightless",
+    "tendon": "this tail has no tendons, which tables [tendon.NAME] give",
+    "guided": "the guides of all links are alike",
 }
 MEANINGS = {  # in a mixed tail
     "arc_masses": "mass of each arc",

@@ -84,6 +84,7 @@ class Scene:
     tables: str = ""  # the keys `segments` and `taper` of the file, as JSON; empty: a count
     chains: tuple[Chain, ...] = ()  # besides the tail
     chain: str = ""  # the tables `chain` of the file, as JSON
+    tendon: str = ""  # the tables `tendon` of the file, as JSON
 
     @property
     def passive(self) -> tuple[str, ...]:

@@ -16,6 +16,8 @@ class Shape:
     fixed: the torso never moves.
     weightless: there is no gravity.
     sloped: gravity has a direction of its own.
+    tendons: up to which segment each one goes, counted from 1.
+    guided: the guides of tendons differ from link to link.
     """
 
     counts: tuple[int, ...] = ()
@@ -27,6 +29,8 @@ class Shape:
     fixed: bool = False
     weightless: bool = False
     sloped: bool = False
+    tendons: tuple[int, ...] = ()
+    guided: bool = False
 
     @property
     def own(self) -> bool:
@@ -39,6 +43,7 @@ class Shape:
         """
         present = {"equal": not self.own, "link": self.links, "arc": self.arcs}
         present |= {"": 1, "tilted": self.tilted, "geared": self.rotors}
+        present |= {"tendon": len(self.tendons), "guided": len(self.tendons) * self.guided}
         weight = not (self.weightless or self.sloped)
         present |= {"free": not self.fixed, "weight": weight, "sloped": self.sloped}
         return int(present[tail])

@@ -62,6 +62,8 @@ ACCELERATIONS = Argument("accelerations", ("nt",),
     "desired accelerations of the tail coordinates (rad/s^2)")
 MULTIPLIER = nv_numbers("multiplier", "weights lambda, one for each row of the force or of v_dot")
 
+TENSIONS = Argument("tension", ("tendons",), "tensions of the tendons (N)")
+
 # What plain functions return
 H = nv_by_nv("H", "inertia matrix, symmetric and positive definite (kg, kg m, kg m^2)")
 POINTS = Argument("points", ("tail_points", 3),

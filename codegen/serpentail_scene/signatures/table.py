@@ -33,7 +33,7 @@ FIXED = (
     *("energy", "momentum", "tail_points", "center_of_mass"),
     *("inverse_dynamics_derivatives", "forward_dynamics_derivatives"),
     *("inverse_dynamics_parameter_derivatives", "forward_dynamics_parameter_derivatives"),
-    *("pfl", "implicit", "rollout", "mount_wrench"),
+    *("pfl", "implicit", "rollout", "mount_wrench", "tendon_lengths", "tendon_torques"),
 )
 # of several chains
 OF_TREES = (

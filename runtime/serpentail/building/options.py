@@ -62,6 +62,14 @@ class ParameterOptions(TypedDict, total=False):
     motor_torque: Quantities
     motor_speed: Quantities
     motor_power: Quantities
+    tendon_offsets: Quantities
+    tendon_limits: Quantities
+    tendon_guides: Quantities
+    tendon_ends: Quantities
+    tendon_roots: Quantities
+
+
+IN_SCENES = {"tail": "kind", "tendons": "tendon"}  # what scenes call keys
 
 
 class SceneKeys(TypedDict, total=False):
@@ -88,6 +96,7 @@ class SceneKeys(TypedDict, total=False):
     slope: Mapping[str, Any]
     targets: Sequence[str]
     chain: Mapping[str, Mapping[str, Any]]
+    tendons: Mapping[str, Mapping[str, Any]]
     name: str
 
 
@@ -106,7 +115,7 @@ def separated(
     keys, parameters = {}, {}
     for name, value in options.items():
         if name in SceneKeys.__annotations__:
-            keys["kind" if name == "tail" else name] = value
+            keys[IN_SCENES.get(name, name)] = value
         elif name in ParameterOptions.__annotations__ or name.startswith(
             tuple(f"{chain}_" for chain in chains)
         ):
@@ -119,7 +128,7 @@ def separated(
 def _unknown(name: str, value: object) -> ModelError:
     """Return the error about a name that is neither a scene key nor a parameter."""
     known = Options.__annotations__
-    name_of = "tail" if name == "kind" else name  # as it is called in a scene
+    name_of = {own: name for name, own in IN_SCENES.items()}.get(name, name)
     remedy = did_you_mean(name_of, known) or f"give some of {', '.join(known)}"
     return ModelError(
         f"{name}: value {shown(value)}: is neither a scene key nor a parameter; {remedy}"

@@ -201,6 +201,38 @@ class ModelFunctions:
         """
         return self.kernels["bias_force_world"](q, v, out=out)
 
+    def tendon_lengths(self, q: ArrayLike, *, out: Out = None) -> tuple[Array, Array]:
+        """Compute the lengths of the tendons, and their derivatives.
+
+        Parameters
+        ----------
+        q : array_like, shape (nq,)
+
+        Returns
+        -------
+        lengths : ndarray, shape (tendons,)
+            Length of each tendon from its first guide (m).
+        B : ndarray, shape (tendons, 2m)
+            Derivatives of the lengths by the tail coordinates (m/rad).
+        """
+        return self.kernels["tendon_lengths"](q, out=out)
+
+    def tendon_torques(self, q: ArrayLike, tension: ArrayLike, *, out: Out = None) -> Array:
+        """Compute the torques of tensions, -B^T tension.
+
+        Parameters
+        ----------
+        q : array_like, shape (nq,)
+        tension : array_like, shape (tendons,)
+            Tensions of the tendons (N).
+
+        Returns
+        -------
+        tau : ndarray, shape (2m,)
+            Torques conjugate to the tail coordinates (N m).
+        """
+        return self.kernels["tendon_torques"](q, tension, out=out)
+
     def mount_wrench(
         self, q: ArrayLike, v: ArrayLike, v_dot: ArrayLike, *, out: Out = None
     ) -> tuple[Array, Array]:

@@ -94,6 +94,17 @@ class Asked:
             raise ValueError("mount_wrench: this motion has no model: use model.mount_wrench")
         return mount_wrenches(self.model, self)
 
+    @property
+    def tensions(self) -> Array:
+        """Tensions (K, tendons) of the tendons, N, in a run of ``simulate`` by a table or curve of
+        tensions; ``Plan.tension`` has those of a plan. ValueError is raised for other motions.
+        """
+        again = vars(self).get(AGAIN)
+        found = again.tensions(self.t) if hasattr(again, "tensions") else None
+        if found is None:
+            raise ValueError("tensions: this motion was not simulated with tensions: use tau")
+        return found
+
     def vjp(
         self,
         q: ArrayLike | None = None,

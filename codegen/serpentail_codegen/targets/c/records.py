@@ -20,7 +20,10 @@ def records(has: SimulationFeatures) -> dict[str, list[Field]]:
     """Return the C records by name."""
     return {
         "piecewise": PIECEWISE,
-        "controller": CONTROLLER[:2] + (PFL if has.pfl else []) + CONTROLLER[2:],
+        "controller": CONTROLLER[:2]
+        + (TENSIONS if has.tendons else [])
+        + (PFL if has.pfl else [])
+        + CONTROLLER[2:],
         "drive": DRIVE + (LEGS if has.legs else []),
         "run": START
         + (BRISTLES[:1] if has.contacts else [])
@@ -74,6 +77,9 @@ CONTROLLER = fields("""
     torque function: your torques (N m), added; NULL: none
     void *context: first argument of `function`
     real clock: time of the run at which the clock of `function` is 0 (s)
+""")
+TENSIONS = fields("""
+    const piecewise *tensions: a channel (N) for each tendon, whose torques are added; NULL: none
 """)
 PFL = fields("""
     const piecewise *reference: NT channels (rad) that Eq. 46 tracks; its torques are added; NULL:

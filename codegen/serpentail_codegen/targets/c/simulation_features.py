@@ -27,6 +27,7 @@ class SimulationFeatures:
     legs: bool
     air: bool
     gradients: bool  # derivatives of whole runs
+    tendons: int
 
     @property
     def ledger(self) -> tuple[tuple[str, int], ...]:
@@ -76,5 +77,5 @@ def simulation_features(tail: Tail, names: Collection[str], factors: int) -> Sim
     factors.
     """
     groups, legs = tuple(tail.groups.items()), "feet" in tail.contacts
-    air, gradients = tail.widths > 0, "rates_vjp" in names
-    return SimulationFeatures("pfl" in names, factors, tail.points, groups, legs, air, gradients)
+    more = tail.widths > 0, "rates_vjp" in names, tail.tendons
+    return SimulationFeatures("pfl" in names, factors, tail.points, groups, legs, *more)

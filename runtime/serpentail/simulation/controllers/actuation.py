@@ -16,6 +16,7 @@ from .ctrl_c import CtrlC
 from .parts import NativeTorque, Parts, TorqueFunction
 from .piecewise import Piecewise
 from .schedules import Legs
+from .tensions import refuse_tensions
 
 
 class Actuation:
@@ -72,7 +73,10 @@ class Actuation:
         return any(
             each is not None
             for parts in self.parts
-            for each in (parts.damping, parts.torques, parts.pfl, parts.native, parts.user)
+            for each in (
+                *(parts.damping, parts.torques, parts.tensions),
+                *(parts.pfl, parts.native, parts.user),
+            )
         )
 
     @property
@@ -111,6 +115,8 @@ class Actuation:
         if parts.torques is not None:
             powers = parts.torques.coefficients.swapaxes(1, 2)
             refuse_driven(self.model, "controller", powers, SimulationError)
+        if parts.tensions is not None:
+            refuse_tensions(self.model, parts.tensions)
 
     def _available(self, parts: Parts) -> Parts:
         """Return the parts for this model: PFL in Python if its C is missing."""
@@ -136,8 +142,9 @@ class Actuation:
         members: dict[str, Any] = {}
         if parts.damping is not None:
             members["damping"] = self.records.array(parts.damping)
-        if parts.torques is not None:
-            members["torques"] = self._table(parts.torques)
+        for name in ("torques", "tensions"):
+            if (curve := getattr(parts, name)) is not None:
+                members[name] = self._table(curve)
         if parts.pfl is not None:
             law = parts.pfl
             members |= {"reference": self._table(law.curve), "kp": law.kp, "kd": law.kd}

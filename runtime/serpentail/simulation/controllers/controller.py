@@ -19,7 +19,7 @@ from .piecewise import Piecewise, checked_nodes, linear
 from .sampled import Sampled
 
 CHOICES = (
-    "None, Damping, TorqueTable, TorqueCurve, Pfl, Gains, Mpc, Sampled, Phases, NativeTorque or "
+    "None, Damping, TorqueTable, TorqueCurve, TensionTable, TensionCurve, Pfl, Gains, Mpc, Sampled, Phases, NativeTorque or "
     "a function (t, q, v)"
 )
 
@@ -100,6 +100,60 @@ class TorqueCurve:
         return Parts(_damping(self.damping, nt), self.torques)
 
 
+@dataclass(frozen=True)
+class TensionTable:
+    """Tensions of tendons at given times, linear between them, and joint damping.
+
+    Parameters
+    ----------
+    times : array_like, shape (K,)
+        Increasing times (s). Before the first and after the last, the tensions are held.
+    tensions : array_like, shape (K, tendons)
+        Tensions (N), from 0 to the limit of each tendon.
+    damping : float or sequence of float, default 0
+        Damping (N m s), as of ``Damping``, in addition.
+
+    Examples
+    --------
+    >>> import serpentail as st
+    >>> law = st.TensionTable([0.0, 0.1], [["0 N", "2 N"], ["1 N", "0 N"]])
+    """
+
+    times: Quantities
+    tensions: Quantities
+    damping: Quantities = 0.0
+    __repr__ = brief
+
+    def parts(self, nt: int) -> Parts:
+        """Return its parts for 2m tail coordinates."""
+        width = np.shape(self.tensions)[-1] if np.ndim(self.tensions) == 2 else 1
+        given = (self.times, self.tensions)
+        nodes = checked_nodes("TensionTable", "tensions", given, width, "N")
+        return Parts(_damping(self.damping, nt), tensions=linear(*nodes))
+
+
+@dataclass(frozen=True, eq=False)
+class TensionCurve:
+    """Tensions of tendons as piecewise polynomials of time, and joint damping.
+
+    Parameters
+    ----------
+    tensions : Piecewise
+        Tensions (N), one channel for each tendon, from 0 to its limit.
+    damping : float or sequence of float, default 0
+        Damping (N m s), as of ``Damping``, in addition.
+    """
+
+    tensions: Piecewise
+    damping: Quantities = 0.0
+
+    def parts(self, nt: int) -> Parts:
+        """Return its parts for 2m tail coordinates."""
+        if not isinstance(self.tensions, Piecewise):
+            raise refusal("TensionCurve: tensions", self.tensions, "a Piecewise", SimulationError)
+        return Parts(_damping(self.damping, nt), tensions=self.tensions)
+
+
 @dataclass(frozen=True, eq=False)
 class Phases:
     """Controllers that act one after another, each on its own clock.
@@ -152,7 +206,8 @@ def remembers(controller: Any) -> bool:
     return any(isinstance(law, Sampled) for law in each)
 
 
-Single = Damping | TorqueTable | TorqueCurve | Pfl | Sampled | NativeTorque | TorqueFunction
+Tables = Damping | TorqueTable | TorqueCurve | TensionTable | TensionCurve
+Single = Tables | Pfl | Sampled | NativeTorque | TorqueFunction
 Controller = Single | Phases | None
 
 

@@ -39,6 +39,7 @@ class Parts:
 
     damping: np.ndarray | None = None
     torques: Piecewise | None = None
+    tensions: Piecewise | None = None
     pfl: "Pfl | None" = None
     native: "NativeTorque | None" = None
     user: TorqueFunction | None = None
@@ -53,6 +54,7 @@ class Parts:
         return replace(
             self,
             torques=None if self.torques is None else self.torques.later(begin),
+            tensions=None if self.tensions is None else self.tensions.later(begin),
             pfl=None if self.pfl is None else self.pfl.later(begin),
             user=None if user is None else lambda t, q, v: user(t - begin, q, v),
             clock=begin,
@@ -61,8 +63,8 @@ class Parts:
     def kinks(self) -> list[float]:
         """Return the times at which these torques have a jump or a kink."""
         times: list[float] = []
-        if self.torques is not None:
-            times += self.torques.kinks(2).tolist()
+        for curve in (self.torques, self.tensions):
+            times += [] if curve is None else curve.kinks(2).tolist()
         if self.pfl is not None:
             times += self.pfl.curve.kinks(3).tolist()
         return times

@@ -147,7 +147,7 @@ def refuse(again: RunAgain) -> None:
     """SimulationError about a run that has no derivatives."""
     model, parts = again.start.model, parts_of(again.controller, again.start.model.layout.nt)
     scene = model.manifest["scene"]
-    law = parts.pfl or parts.native or parts.user or parts.state
+    law = parts.pfl or parts.native or parts.user or parts.state or parts.tensions
     wrong = {
         f"method {again.method.name!r}": again.method.name not in METHODS,
         "controller: what is no Damping, TorqueTable or TorqueCurve": law is not None,

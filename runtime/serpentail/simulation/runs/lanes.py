@@ -29,7 +29,7 @@ def fit_lanes(runs: RunSet) -> bool:
     if any(name.startswith("motor_") for name in runs.model.parameters):
         return False
     parts = [parts for each in runs.actuations.distinct for parts in each.parts]
-    return all(each.pfl is each.native is each.user is None for each in parts)
+    return all(each.pfl is each.native is each.user is each.tensions is None for each in parts)
 
 
 def worth_lanes(model: Model, runs: int, steps: int) -> bool:
