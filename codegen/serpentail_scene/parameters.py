@@ -19,9 +19,9 @@ class Parameter:
     ``needs`` is a group of contact points, "contacts" for any of them, a part of the passive tail,
     or "air"; empty: every scene has the parameter.  ``tail`` says which tails have it: "equal",
     tails of equal pieces; "link" or "arc", tails whose pieces have their own values, ``size``
-    numbers each; "geared", limbs with rotors; "tendon", tails with
-    tendons; "guided", those with tendons whose guides differ; "tilted", tails on turned axes; "free", tails of a
-    torso that moves; "weight", all but weightless ones and those of "sloped" scenes; empty: all.
+    numbers each; "geared", limbs with rotors; "tendon", tails with tendons; "guided", those whose
+    guides differ; "tilted", tails on turned axes; "free", tails of a torso that moves; "weight",
+    all but weightless ones and those of "sloped" scenes; empty: all.
     """
 
     name: str
@@ -164,7 +164,7 @@ PARAMETERS = (
     ),
     *_rows(
         ("tendon_offsets", 2, None, "m", FINITE,
-         "x and z of each tendon's guides in the axes of links or arcs; if they differ, of its first"),
+         "x and z of each tendon's guides in the axes of links or arcs, or of its first guide"),
         ("tendon_limits", 1, None, "N", POSITIVE, "largest tension of each tendon"),
         ("tendon_guides", 1, None, "1", FRACTION, "place of each tendon's guide along the links"),
         tail="tendon",

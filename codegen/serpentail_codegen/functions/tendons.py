@@ -28,8 +28,8 @@ def each_slope(
         own, adds = _own(draft, k), {"slope_": slope}
         adds |= {"length_": lengths.part(k, 1)} if lengths else {}
         if draft.tail.shape.guided:
-            reads = own("tendon_offsets", "tendon_roots")
-            draft.step(tendon.first_guide, reads, **draft.scratch(inner=3))
+            first = own("tendon_offsets", "tendon_roots")
+            draft.step(tendon.first_guide, first, **draft.scratch(inner=3))
         for stretch, i in each_segment(draft, stop=to):
             draft.fill(slope, 0)
             if joints is None:
@@ -49,14 +49,14 @@ def each_slope(
 
 
 def _own(draft: Draft, k: int) -> Own:
-    return lambda *names: Instead({name: draft.entry(name, k, SIZES[name]) for name in names})
+    at = Index() + k
+    return lambda *names: Instead({name: draft.entry(name, at, SIZES[name]) for name in names})
 
 
 def _pieces(draft: Draft) -> Pieces:
     if draft.tail.shape.own:
-        return lambda g: draft.entry(
-            "arc_lengths" if draft.tail.shape.arcs else "link_lengths", g, 1
-        )
+        name = "arc_lengths" if draft.tail.shape.arcs else "link_lengths"
+        return lambda g: draft.entry(name, g, 1)
     share = draft.fixed("share", [Fraction(1, draft.tail.pieces)])
     length = draft.store(tendon.piece_length, {"share": share}, piece=1)["piece"]
     return lambda _: length
@@ -86,7 +86,7 @@ def _cross(draft: Draft, own: Own, reads: dict[str, Ref], adds: dict[str, Ref]) 
     """Add a tendon's run to the guide of the next link."""
     run, piece = draft.scratch(inner=3, outer=3), {"piece": reads["piece"]}
     places = own("tendon_offsets", "tendon_ends", "tendon_guides")
-    draft.step(tendon.guide, places, {"along": reads["along"]}, piece, **run.only("outer"))
+    draft.step(tendon.next_guide, places, {"along": reads["along"]}, piece, **run.only("outer"))
     draft.step(_times(1), {"joint": reads["joint"]}, run, **adds)
     draft.step(tendon.next_run, run.only("outer"), piece, **run.only("inner"))
 

@@ -21,7 +21,7 @@ def first_guide(let, tendon_offsets: V2, tendon_roots: V1) -> dict:
     return {"inner": Matrix([tendon_offsets[0], tendon_roots[0], tendon_offsets[1]])}
 
 
-def guide(
+def next_guide(
     let, tendon_offsets: V2, tendon_ends: V2, tendon_guides: V1, along: V1, piece: V1
 ) -> dict:
     """Guide on a link, from its joint; ``along``: 0 at the first guide, 1 at the last."""

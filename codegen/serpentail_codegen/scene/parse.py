@@ -82,12 +82,11 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
     values |= {"chains": chains.chains, "parameters": chains.parameters}
     ordered, unknown = contacts_in_order(contacts, values["chain"])
     problems += unknown
-    tail = tail_description(kind, values)
-    values |= tail.values
-    tendons = tendons_of(values, kind)
-    values |= tendons.values
-    problems += tendons.problems
-    problems += [*tail.problems, *key_problems(values), *kind_problems(table, kind)]
+    for describe in (tail_description, tendons_of):
+        found = describe(kind, values)
+        values |= found.values
+        problems += found.problems
+    problems += [*key_problems(values), *kind_problems(table, kind)]
     problems += function_problems(values["functions"]) + contact_problems(table, values, contacts)
     problems += polar_problems(table, kind, contacts, values["functions"])
     problems += fixed_problems(values, contacts)
@@ -153,16 +152,7 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
     # keys that this kind of tail, or a flight, does not have
     foreign = {*foreign_to(scene.kind)[0]}
     foreign |= set() if scene.contacts else {"contacts", "friction"}
-    foreign |= {
-        "shape",
-        "tables",
-        "body",
-        "unscaled",
-        "size",
-        "chains",
-        "chain",
-        "tendon",
-    }  # these follow
+    foreign |= {"shape", "tables", "unscaled", "size", "chains", *JSON}  # these follow
     usual = {name: KEYS[name].default for name in ("base", "weightless")}
     foreign |= {name for name, value in usual.items() if getattr(scene, name) == value}
     names = [field.name for field in fields(Scene) if field.name not in foreign]

@@ -1,7 +1,7 @@
 """Reads the tables `[tendon.NAME]` of a scene: where tendons run, and how strongly they pull."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import cos, pi, sin
 from typing import Any
 
@@ -12,6 +12,7 @@ from serpentail_scene.tendons import names_of_tendons
 from .checks import parameters_in, segments_in
 from .problems import Problem
 from .segment_tables import Numbers, numbers_of
+from .tail_tables import TailDescription
 
 EXAMPLE = 'needs a table, such as {offset = "4, 0 mm", tension = "5 N"}'
 GUIDES = ("guides", "end_offset", "root")  # keys that only links have
@@ -25,19 +26,11 @@ NEEDED = {
 MIDDLE = (0.5,)  # of a link: where its guide is
 
 
-@dataclass(frozen=True)
-class Tendons:
-    """Values of the scene that follow from its tendons: shape and parameters; and problems."""
-
-    values: Mapping[str, Any]
-    problems: tuple[Problem, ...] = ()
-
-
-def tendons_of(values: Mapping[str, Any], kind: str) -> Tendons:
+def tendons_of(kind: str, values: Mapping[str, Any]) -> TailDescription:
     """Return what the tables say; parameters that the scene names replace theirs."""
     tables, shape = values["tendon"], values["shape"]
     if not isinstance(tables, Mapping) or not tables:
-        return Tendons({})
+        return TailDescription({})
     problems = _refused(values, kind)
     found = [(name, _numbers(f"tendon.{name}", name, t, problems)) for name, t in tables.items()]
     guided = bool(shape.own or shape.counts or any({*GUIDES[1:]} & {*own} for _, own in found))
@@ -46,18 +39,18 @@ def tendons_of(values: Mapping[str, Any], kind: str) -> Tendons:
         problems += _each_problem(f"tendon.{name}", tables[name], own, kind, guided)
         problems += _end_problem(f"tendon.{name}", tables[name], segments_in(values))
     if problems or not isinstance(values["parameters"], Mapping):
-        return Tendons({}, tuple(problems))
+        return TailDescription({}, tuple(problems))
     names = names_of_tendons(tables)
     if len({*names}) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
         remedy = f"{twice} would be two tendons: give one another name"
-        return Tendons({}, (Problem("tendon", names, remedy),))
+        return TailDescription({}, (Problem("tendon", names, remedy),))
 
     # each tendon of a ring by itself
     each = [one for name, own in found for one in _ring(tables[name], own)]
-    to = [
-        t.get("to", segments_in(values)) for t in tables.values() for _ in range(t.get("count", 1))
-    ]
+    m, counts = segments_in(values), [table.get("count", 1) for table in tables.values()]
+    ends = [table.get("to", m) for table in tables.values()]
+    to = [end for end, count in zip(ends, counts, strict=True) for _ in range(count)]
     given = {
         "tendon_offsets": [own["offset"] for own in each],
         "tendon_limits": [own["tension"] for own in each],
@@ -68,7 +61,7 @@ def tendons_of(values: Mapping[str, Any], kind: str) -> Tendons:
         given["tendon_ends"] = [own.get("end_offset", own["offset"]) for own in each]
         given["tendon_roots"] = [own["root"] for own in each]
     shape = replace(shape, tendons=tuple(to), guided=guided)
-    return Tendons({"shape": shape, "parameters": {**given, **values["parameters"]}})
+    return TailDescription({"shape": shape, "parameters": {**given, **values["parameters"]}})
 
 
 def _numbers(place: str, name: str, table: Any, problems: list[Problem]) -> Numbers:

@@ -99,7 +99,7 @@ class Asked:
         """Tensions (K, tendons) of the tendons, N, in a run of ``simulate`` by a table or curve of
         tensions; ``Plan.tension`` has those of a plan. ValueError is raised for other motions.
         """
-        again = vars(self).get(AGAIN)
+        again: Any = vars(self).get(AGAIN)
         found = again.tensions(self.t) if hasattr(again, "tensions") else None
         if found is None:
             raise ValueError("tensions: this motion was not simulated with tensions: use tau")

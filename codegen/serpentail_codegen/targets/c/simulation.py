@@ -73,10 +73,8 @@ def simulation_context(
 ) -> dict[str, Any]:
     """Return the values for a simulation's templates; ``works``: workspace of each function."""
     single = scene.real == "float"
-    ledger, table = (
-        sum(size for _, size in has.ledger),
-        max(4 * tail.nt, 2 * tail.nv, tail.nt + 3 * tail.tendons),
-    )
+    ledger = sum(size for _, size in has.ledger)
+    table = max(4 * tail.nt, 2 * tail.nv, tail.nt + 3 * tail.tendons)
     size = tail.nq + tail.nv + 2 * has.contacts + ledger
     slots = SLOTS[has.contacts > 0]
     states = slots * size + tail.nt + table + (12 + 2 * LOOKS) * has.contacts + 4
