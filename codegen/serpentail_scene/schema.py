@@ -60,7 +60,7 @@ def scene_schema(verbs: Mapping[str, Key]) -> Schema:
     joint = Key(keys=JOINT | JOINT_WORDS | {"name": Key(form=KEYS["name"].rule.schema)})
     of_chain |= {"joints": key_schema(Key(each=joint)), "drive": DRIVE.schema}
     of_tendon = {name: key_schema(key) for name, key in TENDON.items()}
-    of_tendon |= dict.fromkeys(TENDON_COUNTS, COUNT.schema)
+    of_tendon |= {name: dict(COUNT.schema) for name in TENDON_COUNTS}
     keys["tendon"] = {"type": "object", "additionalProperties": _table(of_tendon, ["tension"])}
     needed = ["kind", "mount"]
     keys["chain"] = {"type": "object", "additionalProperties": _table(of_chain, needed)}

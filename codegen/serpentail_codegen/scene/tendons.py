@@ -116,7 +116,7 @@ def _ring(table: Mapping[str, Any], own: Numbers) -> list[Mapping[str, tuple[flo
 
 def _refused(values: Mapping[str, Any], kind: str) -> list[Problem]:
     """Return a problem for each entry that a tail with tendons does not have."""
-    wrong = {"kind": kind} if kind not in ("articulated", "continuum") else {}
+    wrong: dict[str, Any] = {"kind": kind} if kind not in ("articulated", "continuum") else {}
     wrong |= {"coordinates": "polar"} if values["coordinates"] == "polar" else {}
     wrong |= {"chain": None} if values["chain"] else {}
     named = parameters_in(values)

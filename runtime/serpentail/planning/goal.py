@@ -7,6 +7,7 @@ import numpy as np
 
 HALF_TURN = "half turn"  # of each segment, a bound of its angles
 MOTOR = "motor"  # a bound that is the model's own, if its scene describes motors
+LIMIT = "limit"  # a bound that is the model's own
 
 
 @dataclass(frozen=True)
@@ -73,6 +74,9 @@ class Bounds:
     speed : float or array_like, default "motor"
         Speed (rad/s) of each motor without load: the largest torque falls from ``torque`` at rest
         to 0 there, and beyond it brakes. "motor": ``motor_speed`` of the model; no bound without.
+    tension : float or array_like, default "limit"
+        Tensions of the tendons (N), one number or one for each, instead of what motors give.
+        "limit": ``tendon_limits`` of the model. Between nodes, too, a tension stays 0 or above.
     power : float or array_like, default "motor"
         Mechanical power of each motor (W), torque times rate. "motor": ``motor_power`` of the
         model; no bound without.
@@ -90,3 +94,4 @@ class Bounds:
     torque_rate: Any = None
     speed: Any = MOTOR
     power: Any = MOTOR
+    tension: Any = LIMIT

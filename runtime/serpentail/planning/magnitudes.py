@@ -12,8 +12,9 @@ from ..basics.checks import number, numbers, refusal, shown
 from ..basics.errors import PlanningError, UnusualSize
 from ..basics.plausible_values import warn_of_unusual
 from ..model.model import Model
+from ..model.tendons import tendons_of
 from ..model.weight import fall, total_mass
-from .goal import HALF_TURN, MOTOR, Bounds
+from .goal import HALF_TURN, LIMIT, MOTOR, Bounds
 
 HUGE = 1e100  # beyond it squares overflow
 LONGEST = 5.0  # s: a fall from 120 m
@@ -21,7 +22,7 @@ HIGHEST = 1e4  # m: no plan is of a fall from higher up
 STRONGEST = 30.0  # weights at the tail's length: more torque than any motor of the body has
 DEGREES = 360.0  # of an angle's bound in rad: a larger one is not meant as degrees
 UNITS = {"angle": "rad", "rate": "rad/s", "torque": "N m", "torque_rate": "N m/s"}
-UNITS |= {"speed": "rad/s", "power": "W"}
+UNITS |= {"speed": "rad/s", "power": "W", "tension": "N"}
 USUAL = {"torque": 0.02, "speed": None, "power": None}  # of models without motors
 FRAMES = 6  # from a warning to the call of st.plan
 
@@ -58,12 +59,14 @@ def checked_bounds(model: Model, bounds: Any) -> Bounds:
         raise PlanningError(f"bounds: value {shown(bounds)}: needs a serpentail.Bounds")
     if isinstance(bounds.angle, str) and bounds.angle == HALF_TURN:
         bounds = replace(bounds, angle=np.repeat(np.pi / model.joints_each, PER_SEGMENT))
+    bounds = _of_tendons(model, bounds)
     own = [n for n in USUAL if isinstance(x := getattr(bounds, n), str) and x == MOTOR]
     usual = {n: model.parameters.get(f"motor_{n}", USUAL[n]) for n in own}
     bounds = replace(bounds, **usual)
+    count = len(tendons_of(model))
     found = {
-        entry.name: _bound(entry.name, getattr(bounds, entry.name), model.layout.nt)
-        for entry in fields(Bounds)
+        n: _bound(n, getattr(bounds, n), count if n == "tension" else model.layout.nt)
+        for n in (entry.name for entry in fields(Bounds))
     }
     angle, torque = found["angle"], found["torque"]
     if found["speed"] is not None and torque is None:
@@ -80,6 +83,22 @@ def checked_bounds(model: Model, bounds: Any) -> Bounds:
         told += f'"{most} mN m"? None sets no bound'
         warnings.warn(told, UnusualSize, stacklevel=FRAMES)
     return Bounds(**found)
+
+
+def _of_tendons(model: Model, bounds: Bounds) -> Bounds:
+    """Return bounds of tensions in place of those of motors, where tendons pull the tail."""
+    usual = isinstance(bounds.tension, str) and bounds.tension == LIMIT
+    if not tendons_of(model):
+        if not usual and bounds.tension is not None:
+            raise refusal("bounds.tension", bounds.tension, "a model with tendons", PlanningError)
+        return replace(bounds, tension=None)
+    for name in ("torque", "torque_rate", "speed", "power"):
+        value = getattr(bounds, name)
+        if value is not None and not (isinstance(value, str) and value == MOTOR):
+            needs = "a tail without tendons: bound their tension instead"
+            raise refusal(f"bounds.{name}", value, needs, PlanningError)
+    tension = model.parameters["tendon_limits"] if usual else bounds.tension
+    return replace(bounds, torque=None, speed=None, power=None, tension=tension)
 
 
 def _bound(name: str, value: Any, tail: int) -> np.ndarray | None:

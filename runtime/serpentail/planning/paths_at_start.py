@@ -14,6 +14,7 @@ from .program.body import BodyFunctions
 from .program.point import PathPoint, asked, point_of
 from .result.excess import SLACK
 from .result.full_state import com_at_start
+from .tendons import TENSION, input_of, torque_expression
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -63,9 +64,12 @@ def _start(model: Model, problem: PlanningProblem) -> "tuple[PathPoint, ca.SX]":
     body = BodyFunctions(model, Design(), None)
 
     # torques, and times
-    torque, duration = ca.SX.sym("torque", model.layout.nt), ca.SX.sym("duration")
+    name, size = input_of(model)
+    own, duration = ca.SX.sym(name, size), ca.SX.sym("duration")
     least, most = problem.duration
-    blocks |= {"torque": torque, "time": ca.SX(0)}
+    blocks |= {name: own, "time": ca.SX(0)}
+    if name == TENSION:
+        blocks["torque"] = torque_expression(body, blocks["tail"], own)
     blocks["duration"] = duration if least < most else ca.SX(most)
     point = point_of(body, blocks, ca.SX(ca.DM(np.append(com, com_velocity))), problem.legs)
-    return point, ca.vertcat(torque, duration)
+    return point, ca.vertcat(own, duration)

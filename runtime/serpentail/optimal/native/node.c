@@ -8,8 +8,10 @@
 
 /* Sizes, and where in the scratch is what. */
 typedef struct {
-    int zeta, y, e, terms, air, air_y; /* of (x, omega, u, p), of terms, of airborne zeta and y */
+    int zeta, y, e, terms; /* of (x, omega, u, p), of terms */
+    int air, air_y, raw, pulled; /* of airborne zeta and y; with torques; of (q_t, tensions) */
     double *z, *tau, *air_out, *air_J, *air_H, *air_mu, *e_in, *out, *out_J, *out_H, *out_mu, *work;
+    double *raw_J, *raw_H, *half, *pull, *pull_in, *pull_J, *pull_H, *pull_mu;
 } Places;
 
 /* Length of the airborne state, with which x begins. */
@@ -24,7 +26,9 @@ static Places places_of(const Node *node, double *scratch)
     const int m = node->tail;
     at.zeta = zeta_of(node);
     at.y = y_of_node(node);
-    at.air = m > 0 ? airborne_of(node) + m : 0;
+    at.pulled = node->tendons > 0 ? m + node->tendons : 0;
+    at.raw = m > 0 ? airborne_of(node) + m : 0;
+    at.air = at.pulled > 0 ? airborne_of(node) + node->tendons : at.raw;
     at.air_y = m > 0 ? airborne_of(node) + TURN : 0;
     at.e = at.zeta + (m > 0 ? TURN : 0);
     at.terms = (m > 0 ? 0 : node->states) + node->rows + 1;
@@ -39,7 +43,20 @@ static Places places_of(const Node *node, double *scratch)
     at.out_mu = at.out + at.terms;
     at.out_J = at.out_mu + at.terms;
     at.out_H = at.out_J + (size_t)at.terms * at.e;
-    at.work = at.out_H + (size_t)at.e * at.e;
+    at.pull = at.out_H + (size_t)at.e * at.e;
+    at.pull_mu = at.pull + (at.pulled > 0 ? m : 0);
+    at.pull_in = at.pull_mu + (at.pulled > 0 ? m : 0);
+    at.pull_J = at.pull_in + at.pulled;
+    at.pull_H = at.pull_J + (size_t)m * at.pulled;
+    at.half = at.pull_H + (size_t)at.pulled * at.pulled;
+    at.work = at.half + (at.pulled > 0 ? (size_t)at.raw * at.air : 0);
+    at.raw_J = at.air_J;
+    at.raw_H = at.air_H;
+    if (at.pulled > 0) {
+        at.raw_J = at.work;
+        at.raw_H = at.raw_J + (size_t)at.air_y * at.raw;
+        at.work = at.raw_H + (size_t)at.raw * at.raw;
+    }
     return at;
 }
 
@@ -59,10 +76,24 @@ static int finite(const double *values, size_t count)
     return 1;
 }
 
-/* zeta in SI; the torques in truth are tau - damping q_t_dot, in tau. */
-static void in_si(const Node *node, const double *x, const double *u, const double *p,
-                  double *z, double *tau)
+/* Torques of tensions, 0 where all is finite; order 2: weighed by pull_mu. */
+static int evaluate_pull(const Node *node, Places at, int order)
 {
+    const double *arg[8] = {at.pull_in, at.pull_mu};
+    double *res[8] = {at.pull, at.pull_J, at.pull_H};
+    const int m = node->tail;
+    memcpy(at.pull_in, at.z + ATTITUDE, (size_t)m * sizeof *at.z);
+    memcpy(at.pull_in + m, at.z + airborne_of(node), (size_t)node->tendons * sizeof *at.z);
+    return (order == 2 ? node->pull_twice : order == 1 ? node->pull_slopes : node->pull)(
+               arg, res, NULL, NULL, 0)
+        || !finite(at.pull, (size_t)m);
+}
+
+/* zeta in SI; the torques in truth are tau - damping q_t_dot, in tau. */
+static int in_si(const Node *node, Places at, const double *x, const double *u, const double *p,
+                 int slopes)
+{
+    double *z = at.z, *tau = at.tau;
     const int states = node->states, controls = node->controls, m = node->tail;
     for (int j = 0; j < states; j++) {
         z[j] = node->units[j] * x[j];
@@ -73,9 +104,14 @@ static void in_si(const Node *node, const double *x, const double *u, const doub
     for (int j = 0; j < node->constants; j++) {
         z[states + controls + j] = node->units[states + controls + j] * p[j];
     }
-    for (int a = 0; a < m; a++) {
-        tau[a] = z[airborne_of(node) + a] - node->damping * z[ATTITUDE + m + a];
+    if (at.pulled > 0 && evaluate_pull(node, at, slopes) != 0) {
+        return 1;
     }
+    const double *given = at.pulled > 0 ? at.pull : z + airborne_of(node);
+    for (int a = 0; a < m; a++) {
+        tau[a] = given[a] - node->damping * z[ATTITUDE + m + a];
+    }
+    return 0;
 }
 
 /* The place of entry j of zeta in e. */
@@ -136,6 +172,51 @@ static void damp_rows(const Node *node, double *H, int columns)
         add(columns, -node->damping, H + (size_t)(torques + a) * columns,
             H + (size_t)(rates + a) * columns);
     }
+}
+
+/* Rows by (x, torques) as rows by (x, tensions). */
+static void chain_columns(const Node *node, Places at, const double *raw, int count, double *rows)
+{
+    const int m = node->tail, own = airborne_of(node);
+    for (int i = 0; i < count; i++) {
+        const double *from = raw + (size_t)i * at.raw;
+        double *to = rows + (size_t)i * at.air;
+        memcpy(to, from, (size_t)own * sizeof *to);
+        memset(to + own, 0, (size_t)node->tendons * sizeof *to);
+        for (int a = 0; a < m; a++) {
+            const double *slope = at.pull_J + (size_t)a * at.pulled;
+            add(m, from[own + a], slope, to + ATTITUDE);
+            add(node->tendons, from[own + a], slope + m, to + own);
+        }
+    }
+}
+
+/* H by (x, torques) as that by (x, tensions): P^T H P and the torques' own curvature. */
+static int chain_curvature(const Node *node, Places at)
+{
+    const int m = node->tail, own = airborne_of(node);
+    memset(at.pull_mu, 0, (size_t)m * sizeof *at.pull_mu);
+    for (int i = 0; i < at.air_y; i++) {
+        add(m, at.air_mu[i], at.raw_J + (size_t)i * at.raw + own, at.pull_mu);
+    }
+    if (evaluate_pull(node, at, 2) != 0) {
+        return 1;
+    }
+    chain_columns(node, at, at.raw_H, at.raw, at.half);
+    memcpy(at.air_H, at.half, (size_t)own * at.air * sizeof *at.half);
+    memset(at.air_H + (size_t)own * at.air, 0,
+           (size_t)node->tendons * at.air * sizeof *at.half);
+    for (int i = 0; i < at.pulled; i++) {
+        const int row = i < m ? ATTITUDE + i : own + i - m;
+        double *H = at.air_H + (size_t)row * at.air;
+        for (int a = 0; a < m; a++) {
+            add(at.air, at.pull_J[(size_t)a * at.pulled + i], at.half + (size_t)(own + a) * at.air,
+                H);
+        }
+        add(m, 1.0, at.pull_H + (size_t)i * at.pulled, H + ATTITUDE);
+        add(node->tendons, 1.0, at.pull_H + (size_t)i * at.pulled + m, H + own);
+    }
+    return 0;
 }
 
 static void write_values(const Node *node, Places at, double *y)
@@ -233,11 +314,11 @@ static int evaluate_airborne(const Node *node, Places at, int order)
         return node->rates(node->parameters, at.z, at.tau, node->momentum, at.air_out, at.work);
     }
     if (order == 1) {
-        return node->slopes(node->parameters, at.z, at.tau, node->momentum, at.air_out, at.air_J,
+        return node->slopes(node->parameters, at.z, at.tau, node->momentum, at.air_out, at.raw_J,
                             at.work);
     }
     return node->curvature(node->parameters, at.z, at.tau, node->momentum, at.air_mu, at.air_out,
-                           at.air_J, at.air_H, at.work);
+                           at.raw_J, at.raw_H, at.work);
 }
 
 /* omega's weights: with terms that depend on omega, of these at omega. */
@@ -263,7 +344,9 @@ int node_evaluate(const Node *node, const double *x, const double *u, const doub
 {
     const Places at = places_of(node, scratch);
     const int order = H != NULL ? 2 : J != NULL ? 1 : 0;
-    in_si(node, x, u, p, at.z, at.tau);
+    if (in_si(node, at, x, u, p, order > 0) != 0) {
+        return 1;
+    }
     if (order == 2) {
         write_weights(node, at, mu);
         if (node->tail > 0 && weigh_turn(node, at, fraction) != 0) {
@@ -274,10 +357,16 @@ int node_evaluate(const Node *node, const double *x, const double *u, const doub
         if (evaluate_airborne(node, at, order) != 0) {
             return 1;
         }
-        damp_columns(node, at.air_J, order > 0 ? at.air_y : 0, at.air);
+        damp_columns(node, at.raw_J, order > 0 ? at.air_y : 0, at.raw);
         if (order == 2) {
-            damp_columns(node, at.air_H, at.air, at.air);
-            damp_rows(node, at.air_H, at.air);
+            damp_columns(node, at.raw_H, at.raw, at.raw);
+            damp_rows(node, at.raw_H, at.raw);
+        }
+        if (at.pulled > 0 && order > 0) {
+            chain_columns(node, at, at.raw_J, at.air_y, at.air_J);
+        }
+        if (at.pulled > 0 && order == 2 && chain_curvature(node, at) != 0) {
+            return 1;
         }
     }
     if (evaluate_terms(node, at, fraction, order) != 0) {

@@ -47,6 +47,8 @@ typedef struct {
     Terms values, by_zeta, twice; /* NULL: no rows and no cost */
     const double *units;         /* (x, u, p) */
     const double *y_units;       /* (rates, rows, cost) */
+    int tendons;                 /* 0: the inputs after the airborne state are the torques; else */
+    Terms pull, pull_slopes, pull_twice; /* they are tensions, and torques are these of (q_t, T) */
 } Node;
 
 static inline int zeta_of(const Node *node)

@@ -1,5 +1,6 @@
 """The program of a plan: flight on a mesh from a start to a goal, within bounds."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,7 @@ from ..air import drift_of_states, in_air
 from ..design import refuse_unused
 from ..problem import PlanningProblem
 from ..result.full_state import com_at_start
+from ..tendons import TENSION
 from .cache import memoised
 from .end import end_rows, given_entries
 from .nodes import (
@@ -100,7 +102,7 @@ def plan_program(
     least, most = problem.duration
     constants = np.zeros(node.constants)
     constants[-1] = most
-    controls = "torque_rate" if variables.torque_is_state else "torque"
+    controls = "torque_rate" if variables.torque_is_state else variables.input
     optimal = OptimalProblem(
         node=node,
         mesh=mesh,
@@ -109,7 +111,8 @@ def plan_program(
         start=_start(model, problem) / variables.scale(variables.states) if known else None,
         constants=constants,
         duration_is_free=least < most,
-        control_limits=_limits(getattr(problem.bounds, controls), variables.units[controls]),
+        control_limits=_limits(getattr(problem.bounds, controls), variables.units[controls])
+        * np.array([[controls != TENSION], [1]]),
         bounded=bounded,
         state_limits=limits,
         constant_limits=_with_room(_constant_limits(problem, variables)),
@@ -151,18 +154,18 @@ def _start(model: Model, problem: PlanningProblem) -> np.ndarray:
 
 def _flight_terms(flight: FlightDynamics) -> NodeTerms:
     """Return the terms of the flight's nodes: path constraints and cost."""
-    problem, unit = flight.problem, flight.variables.units["torque"]
+    problem, units = flight.problem, flight.variables.units
     legs = None if problem.legs is None else tuple(problem.legs.curve.at(0.0)[0])
     key = ("flight", *flight.key, problem.objective, problem.smoothing, problem.rows, legs)
 
     def make() -> NodeTerms:
         symbols = flight.symbols(SOFTENING)
-        parts, own = _parts(symbols, problem, unit)
+        parts, own = _parts(symbols, problem, units)
         rates = _rates(flight, symbols)
         _refuse_unused(flight.variables, symbols, [*parts, own, rates])
         return terms_with(symbols, parts, rates, own)
 
-    return memoised((*key, tuple(unit)), make)
+    return memoised((*key, tuple(units["torque"]), tuple(units[flight.variables.input])), make)
 
 
 def _rates(flight: FlightDynamics, symbols: NodeSymbols) -> "ca.SX":
@@ -174,7 +177,7 @@ def _rates(flight: FlightDynamics, symbols: NodeSymbols) -> "ca.SX":
 
 
 def _parts(
-    symbols: NodeSymbols, problem: PlanningProblem, unit: np.ndarray
+    symbols: NodeSymbols, problem: PlanningProblem, units: Mapping[str, np.ndarray]
 ) -> "tuple[list[ca.SX], ca.SX]":
     """Return the path constraints and the cost of a node."""
     import casadi as ca
@@ -184,7 +187,7 @@ def _parts(
         ca.vec(asked(f"path[{k}]", function, point))
         for k, (function, _, _) in enumerate(problem.rows)
     ]
-    return rows, cost(problem, point, symbols.blocks["softening"], unit)
+    return rows, cost(problem, point, symbols.blocks["softening"], units)
 
 
 def _falls(model: Model, problem: PlanningProblem, compiled: bool) -> bool:
@@ -193,7 +196,7 @@ def _falls(model: Model, problem: PlanningProblem, compiled: bool) -> bool:
 
     variables = variables_of(model, problem, True)
     symbols = symbols_of(model, variables, compiled, SOFTENING)
-    rows, own = _parts(symbols, problem, variables.units["torque"])
+    rows, own = _parts(symbols, problem, variables.units)
     flying = ca.vertcat(symbols.blocks["com"], symbols.blocks["com_velocity"])
     return bool(ca.depends_on(ca.vertcat(*rows, own), flying))
 

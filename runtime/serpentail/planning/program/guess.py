@@ -17,6 +17,7 @@ from ...simulation.controllers.controller import TorqueTable
 from ..air import drift_of_states, in_air
 from ..flight import State, flight
 from ..problem import PlanningProblem
+from ..tendons import TENSION, input_of, tensions_near
 from .build import PlanProgram, conserved_at
 
 ROUGH = 1e-4  # rtol of a guess, whose damping can be stiff
@@ -74,6 +75,9 @@ def of_trajectory(model: Model, motion: Trajectory, damping: float = 0.0) -> Gue
         "tail_rate": tail_rate,
         "torque": motion.tau + damping * tail_rate,
     }
+    name, _ = input_of(model)
+    if name == TENSION:
+        samples[name] = tensions_near(model, samples["tail"], samples["torque"], 0.0)
     if in_air(model):
         samples |= drift_of_states(model, motion.q, motion.v)
     t = motion.t - motion.t[0]
@@ -99,7 +103,7 @@ def samples_of(motion: GuessMotion, program: PlanProgram) -> MeshSamples:
         apart = np.diff(times)[:, None] * duration / motion.duration
         controls = np.diff(blocks["torque"], axis=0) / apart
     else:
-        controls = blocks["torque"][1:]
+        controls = blocks[variables.input][1:]
     shape = (mesh.intervals, len(rule.nodes), -1)
     conserved = conserved_at(motion.model, motion.start)
     conserved["design"] = variables.design.of(motion.model.parameters)

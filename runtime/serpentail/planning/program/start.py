@@ -134,7 +134,8 @@ def _at_start(symbols: "NodeSymbols", k: int, path: Any, point: Any) -> "ca.SX":
     import casadi as ca
 
     values = ca.vec(asked(f"path[{k}]", path[0], point))
-    return ca.SX(0, 1) if ca.depends_on(values, symbols.blocks["torque"]) else values
+    driven = [symbols.blocks[n] for n in ("torque", "tension") if n in symbols.blocks]
+    return ca.SX(0, 1) if any(ca.depends_on(values, x) for x in driven) else values
 
 
 def _path_limits(problem: "PlanningProblem", entries: tuple[int, ...]) -> np.ndarray:

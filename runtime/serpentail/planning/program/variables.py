@@ -1,6 +1,6 @@
 """The variables of a plan's program: blocks of states, controls and constants, and their units."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,7 @@ from ...model.model import Model
 from ..air import DRIFT, in_air
 from ..design import Design
 from ..problem import PlanningProblem
+from ..tendons import TENSION, input_of
 
 Blocks = tuple[tuple[str, int], ...]  # (name, size) of blocks
 UNIT_OF_BOUND = 0.05  # of a torque's bound: plans of least effort are far inside
@@ -37,6 +38,11 @@ class PlanVariables:
     design: Design
 
     @property
+    def input(self) -> str:
+        """What drives the tail: "torque" or "tension"."""
+        return input_in(self.units)
+
+    @property
     def torque_is_state(self) -> bool:
         """Whether torques are states, whose rates are the controls."""
         return "torque" in dict(self.states)
@@ -60,6 +66,11 @@ class PlanVariables:
         return {name: values[..., place] for name, place in self.places(blocks).items()}
 
 
+def input_in(units: Mapping[str, np.ndarray]) -> str:
+    """Return what drives a tail: "tension" if that has a unit, else "torque"."""
+    return TENSION if TENSION in units else "torque"
+
+
 def variables_of(model: Model, problem: PlanningProblem, falls: bool) -> PlanVariables:
     """Return the variables of a problem; falls: whether anything depends on the COM's flight."""
     tail, unit = model.layout.nt, torque_unit(problem)
@@ -69,7 +80,9 @@ def variables_of(model: Model, problem: PlanningProblem, falls: bool) -> PlanVar
     if in_air(model):
         states += DRIFT
         units |= {"airspeed": np.ones(3), "spin": np.full(3, UNITS["torso_rate"])}
-    controls: Blocks = (("torque", tail),)
+    controls: Blocks = (input_of(model),)
+    if problem.bounds.tension is not None:
+        units[TENSION] = UNIT_OF_BOUND * problem.bounds.tension
     if problem.bounds.torque_rate is not None:
         states, controls = (*states, *controls), (("torque_rate", tail),)
         units["torque_rate"] = UNIT_OF_RATE * problem.bounds.torque_rate

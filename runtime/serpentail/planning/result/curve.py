@@ -19,7 +19,8 @@ class Curve:
     """Collocation polynomials of all intervals, by block, SI.
 
     ends (N + 1,): s. starts (N, size): states at the beginning of intervals; increments (N, K,
-    size): their rates at the nodes times the interval's duration; nodes (N, K, size): torques.
+    size): their rates at the nodes times the interval's duration; nodes (N, K, size): torques, or
+    tensions.
     """
 
     ends: np.ndarray
@@ -88,7 +89,7 @@ def curve(program: PlanProgram, samples: MeshSamples) -> Curve:
     blocks = variables.split(variables.states, states)
     torque = blocks.pop("torque")[:, 1:] if variables.torque_is_state else None
     if torque is None:
-        torque = samples.controls * variables.units["torque"]
+        torque = samples.controls * variables.units[variables.input]
     starts = {name: values[:, 0] for name, values in blocks.items()}
     increments = {name: np.einsum("ij,kjx->kix", rule.states, x) for name, x in blocks.items()}
     ends = mesh.ends * samples.duration
@@ -98,4 +99,4 @@ def curve(program: PlanProgram, samples: MeshSamples) -> Curve:
         grown = np.cumsum(np.einsum("j,njx->nx", rule.weights, steps), axis=0)[:-1]
         starts["place"] = program.problem.q0[POSITION] + np.vstack([np.zeros(3), grown])
         increments["place"] = steps
-    return Curve(ends, rule, starts, increments, {"torque": torque})
+    return Curve(ends, rule, starts, increments, {variables.input: torque})

@@ -20,9 +20,9 @@ Excess = dict[str, np.ndarray]
 def excess(program: PlanProgram, curve: Curve, samples: MeshSamples, start: State) -> Excess:
     """Return by what part (N,) of a bound each interval exceeds it, by name; 0 or less inside it.
 
-    Names: "torque", "torque_rate", "angle", "rate", "path", if they are bounded. For a path
-    constraint, or one of the motors' speed and power, it is a part of the larger limit. start: of
-    the motion.
+    Names: "torque", "torque_rate", "tension", "angle", "rate", "path", if they are bounded. For a
+    path constraint, or one of the motors' speed and power, it is a part of the larger limit. start:
+    of the motion.
     """
     bounds, N = program.problem.bounds, program.mesh.intervals
     k, s = np.repeat(np.arange(N), SAMPLES), np.tile(np.linspace(0, 1, SAMPLES), N)
@@ -31,6 +31,7 @@ def excess(program: PlanProgram, curve: Curve, samples: MeshSamples, start: Stat
         name: _beyond(blocks[block] / bound, N)
         for name, block, bound in (
             ("torque", "torque", bounds.torque),
+            ("tension", "tension", bounds.tension),
             ("angle", "tail", bounds.angle),
             ("rate", "tail_rate", bounds.rate),
         )
@@ -100,7 +101,7 @@ def path_values(
     parts = [blocks[name] for name, _ in variables.states]
     if program.compiled:
         parts.append(full_state(program.model, start, times, blocks)[1][:, OMEGA])
-    own = blocks["torque"]
+    own = blocks[variables.input]
     parts.append(0 * own if variables.torque_is_state else own)
     constants = samples.constants * variables.scale(variables.constants)
     fractions = (times / samples.duration)[:, None]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from serpentail_scene.layout import TAIL_V
+from serpentail_scene.layout import TAIL_Q, TAIL_V
 
 from ...basics.errors import PlanningError, SimulationError
 from ...basics.near_names import NearNames
@@ -21,13 +21,14 @@ from ...motion.trajectory import Trajectory
 from ...optimal.mesh import TimeMesh
 from ...optimal.rules import CollocationRule
 from ...optimal.solution import Solution
-from ...simulation.controllers.controller import Controller, Damping, TorqueCurve
+from ...simulation.controllers.controller import Controller, Damping
 from ..air import refuse_air
 from ..flight import flight
 from ..problem import PlanningProblem
+from ..tendons import TENSION, refuse_tendons, torques_of
 from .curve import Curve
 from .full_state import full_state
-from .truth import planned_torques
+from .truth import planned_law
 
 if TYPE_CHECKING:
     from ..gains.gains import Gains
@@ -174,7 +175,7 @@ class Plan(NearNames):
         if model is None:
             return [self.trajectory]
         damping = self.problem.damping
-        laws = (TorqueCurve(planned_torques(self.curve), damping), Damping(damping))
+        laws = (planned_law(self.curve, damping), Damping(damping))
         return [self.trajectory, *(self._flown(model, law) for law in laws)]
 
     def _flown(self, model: Model, law: Controller) -> Trajectory:
@@ -204,19 +205,44 @@ class Plan(NearNames):
         ndarray, shape (n, 2m)
             Torques (N m).
         """
-        return self.curve.at(np.atleast_1d(np.asarray(times, float)))["torque"]
+        return torques_of(self.trajectory.model, self._at(times))
 
-    def controller(self, t: float, _q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def tension(self, times: ArrayLike) -> np.ndarray:
+        """Evaluate the planned tensions.
+
+        Parameters
+        ----------
+        times : array_like, shape (n,)
+            Times from the start (s).
+
+        Returns
+        -------
+        ndarray, shape (n, tendons)
+            Tensions (N).
+
+        Raises
+        ------
+        PlanningError
+            The plan is of a tail without tendons.
+        """
+        if TENSION not in self.curve.nodes:
+            raise PlanningError("tension: this plan has no tendons: use torque")
+        return self._at(times)[TENSION]
+
+    def _at(self, times: ArrayLike) -> dict[str, np.ndarray]:
+        return self.curve.at(np.atleast_1d(np.asarray(times, float)))
+
+    def controller(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Return the open-loop torques, a controller for ``simulate``.
 
-        They are the planned torques less the problem's damping.
+        They are the planned torques, or those of the planned tensions, less the problem's damping.
 
         Parameters
         ----------
         t : float
             Time from the start (s).
-        _q : array_like, shape (nq,)
-            Not used.
+        q : array_like, shape (nq,)
+            Configuration, on which the torques of tensions depend.
         v : ndarray, shape (nv,)
             Velocity.
 
@@ -225,13 +251,16 @@ class Plan(NearNames):
         ndarray, shape (2m,)
             Torques (N m).
         """
-        return self.torque(min(max(t, 0.0), self.duration))[0] - self.problem.damping * v[TAIL_V]
+        planned = self._at(min(max(t, 0.0), self.duration))
+        torques = torques_of(self.trajectory.model, planned | {"tail": q[None, TAIL_Q]})
+        return torques[0] - self.problem.damping * v[TAIL_V]
 
 
 def refuse_unfit(name: str, model: Model, plan: Plan, functions: Iterable[str]) -> None:
     """ModelError or PlanningError if a model cannot fly a plan by a controller of this name."""
     model.refuse_fixed(name)
     refuse_air(model, name)
+    refuse_tendons(model, name)
     if "airspeed" in plan.curve.starts:
         raise PlanningError(f"{name}: the plan was made in air: give one of a model without air")
     model.need(*functions)
@@ -275,4 +304,4 @@ def sampled(model: Model, problem: PlanningProblem, curve: Curve) -> Trajectory:
     kinetic, potential = model.energy(q, v)
     linear, angular = model.momentum(q, v)
     measures = (kinetic, potential, linear, angular)
-    return Trajectory(times, q, v, blocks["torque"], *measures, info, model=model)
+    return Trajectory(times, q, v, torques_of(model, blocks), *measures, info, model=model)

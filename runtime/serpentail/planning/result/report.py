@@ -15,6 +15,7 @@ from ..flight import flight
 from ..free_variables import chosen, start_found
 from ..problem import PlanningProblem
 from ..program.objective import objective_unit
+from ..tendons import TENSION
 from .curve import Curve
 from .excess import largest
 from .truth import attitude_errors, work
@@ -79,7 +80,8 @@ def truth(search: "Search", best: "Round", planned: Trajectory) -> dict[str, Any
         "dyn_err": None,
     }
     needed = TRACKING_COST * float(planned.t[-1])
-    if not search.settings.solver.track or search.leaves_no_time(needed):
+    pulled = TENSION in best.curve.nodes  # PFL would give torques that tendons cannot
+    if pulled or not search.settings.solver.track or search.leaves_no_time(needed):
         return errors
     try:
         motion = tracked(best.model, problem, planned)
@@ -112,12 +114,13 @@ def slopes(best: "Round") -> dict[str, Any]:
 
 def objective_unit_of(best: "Round") -> float:
     """SI units of the program's objective."""
-    return objective_unit(best.problem, best.program.variables.units["torque"])
+    return objective_unit(best.problem, best.program.variables.units)
 
 
 def effort(curve: Curve) -> float:
-    """Integral of tau^2 (N^2 m^2 s) by the rule's quadrature."""
-    squares = np.sum(curve.nodes["torque"] ** 2, axis=2)
+    """Integral of tau^2 (N^2 m^2 s), or of tensions squared (N^2 s), by the rule's quadrature."""
+    (inputs,) = curve.nodes.values()
+    squares = np.sum(inputs**2, axis=2)
     return float(np.diff(curve.ends) @ squares @ curve.rule.weights)
 
 

@@ -11,10 +11,11 @@ from ...basics.attitude import angle_deg, tilt_deg
 from ...basics.errors import SimulationError
 from ...model.model import Model
 from ...motion.resample import smooth
-from ...simulation.controllers.controller import TorqueCurve
+from ...simulation.controllers.controller import Controller
 from ...simulation.controllers.piecewise import Piecewise
 from ..flight import end_of_flight, flight
 from ..problem import PlanningProblem
+from ..tendons import law_of, torques_of
 from .curve import Curve
 
 SAMPLE = 1e-3  # s, the most between samples of a flight
@@ -22,23 +23,27 @@ SHORT_INTERVAL = 0.02  # s: rates of shorter ones are weighed as if they were as
 
 
 def applied(
-    model: Model, torques: Piecewise, damping: float, q: np.ndarray, v: np.ndarray
+    model: Model, law: Controller, duration: float, q: np.ndarray, v: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return q, v after applying planned torques from the state q, v; nan if they diverge.
+    """Return q, v after applying a plan's law from the state q, v; nan if they diverge.
 
-    The plan's own polynomials are the torques; steps end where the polynomials join.
+    Its polynomials are the plan's own; steps end where they join.
     """
-    duration = float(torques.times[-1])
-    law = TorqueCurve(torques, damping)
     try:
         return end_of_flight(model, (q, v), law, duration)
     except SimulationError:  # bent or rotating beyond the model's range
         return np.full_like(q, np.nan), np.full_like(v, np.nan)
 
 
+def planned_law(curve: Curve, damping: float) -> Controller:
+    """Return the controller of a plan's torques or tensions, and of damping."""
+    return law_of(curve.nodes, planned_torques(curve), damping)
+
+
 def planned_torques(curve: Curve) -> Piecewise:
-    """Return the torques of a curve."""
-    coefficients = np.swapaxes(curve.nodes["torque"], 1, 2) @ curve.rule.powers()
+    """Return the torques or tensions of a curve."""
+    (inputs,) = curve.nodes.values()
+    coefficients = np.swapaxes(inputs, 1, 2) @ curve.rule.powers()
     widths = np.diff(curve.ends)[:, None, None]
     return Piecewise(curve.ends, coefficients / widths ** np.arange(coefficients.shape[2]))
 
@@ -47,7 +52,7 @@ def open_loop(
     model: Model, curve: Curve, damping: float, start: tuple[np.ndarray, np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return q (nq,), v (nv,) at the end, the planned torques applied from the start."""
-    return applied(model, planned_torques(curve), damping, *start)
+    return applied(model, planned_law(curve, damping), curve.duration, *start)
 
 
 def end_errors(
@@ -90,8 +95,7 @@ def work(
     The energy is the integral of the sum of all absolute powers tau q_t_dot, by Gauss's rule with
     four nodes, between which torques do not jump. Both are nan if the motion diverges.
     """
-    torques = planned_torques(curve)
-    law, sample = TorqueCurve(torques, damping), min(SAMPLE, curve.duration / 4)
+    law, sample = planned_law(curve, damping), min(SAMPLE, curve.duration / 4)
     try:
         motion = flight(model, start, law, curve.duration, method="tsit5", output_step=sample)
     except SimulationError:
@@ -103,8 +107,9 @@ def work(
     between = (starts[:, None] + widths[:, None] * (1 + nodes) / 2).ravel()
     # the largest may be where torques jump, just before or after
     times = np.concatenate([between, np.nextafter(curve.ends[1:], 0), curve.ends[:-1]])
-    rates = smooth(motion.t, motion.v[:, TAIL_V], times)
-    power = np.abs(torques.at(times)[0] * rates).sum(axis=1)
+    tail, rates = (smooth(motion.t, x, times) for x in (motion.q[:, TAIL_Q], motion.v[:, TAIL_V]))
+    inputs = {name: planned_torques(curve).at(times)[0] for name in curve.nodes}
+    power = np.abs(torques_of(model, {"tail": tail, **inputs}) * rates).sum(axis=1)
     energy = np.outer(widths, weights / 2).ravel() @ power[: between.size]
     return float(energy), float(power.max())
 
@@ -117,10 +122,11 @@ def local_errors(
     q, v (N + 1, ..): planned, at the ends.  An error is the largest of the attitude's angle (rad),
     the tail's angles (rad) and rates (rad/s, weighed by the interval).
     """
-    errors, torques, rates = np.zeros(len(q) - 1), planned_torques(curve), slice(OMEGA.start, None)
+    errors, inputs, rates = np.zeros(len(q) - 1), planned_torques(curve), slice(OMEGA.start, None)
     for k, width in enumerate(np.diff(curve.ends)):
-        piece = Piecewise(np.array([0.0, width]), torques.coefficients[k : k + 1])
-        true_q, true_v = applied(model, piece, damping, q[k], v[k])
+        piece = Piecewise(np.array([0.0, width]), inputs.coefficients[k : k + 1])
+        law = law_of(curve.nodes, piece, damping)
+        true_q, true_v = applied(model, law, float(width), q[k], v[k])
         if not np.isfinite(true_q).all():
             errors[k] = np.pi
             continue

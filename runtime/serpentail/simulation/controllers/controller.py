@@ -19,8 +19,8 @@ from .piecewise import Piecewise, checked_nodes, linear
 from .sampled import Sampled
 
 CHOICES = (
-    "None, Damping, TorqueTable, TorqueCurve, TensionTable, TensionCurve, Pfl, Gains, Mpc, Sampled, "
-    "Phases, NativeTorque or a function (t, q, v)"
+    "None, Damping, TorqueTable, TorqueCurve, TensionTable, TensionCurve, Pfl, Gains, Mpc, "
+    "Sampled, Phases, NativeTorque or a function (t, q, v)"
 )
 
 

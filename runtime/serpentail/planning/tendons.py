@@ -1,0 +1,81 @@
+"""Plans of tails that tendons pull: tensions are unknowns in place of torques."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..basics.errors import PlanningError
+from ..model.model import Model
+from ..model.tendons import tendons_of
+from ..optimal.terms import Terms, terms_of
+from ..simulation.controllers.controller import TensionCurve, TorqueCurve
+from ..simulation.controllers.piecewise import Piecewise
+from .program.body import BodyFunctions
+from .program.cache import memoised
+from .program.coordinates import IDENTITY_POSE
+
+if TYPE_CHECKING:
+    import casadi as ca
+
+TENSION = "tension"
+Blocks = Mapping[str, np.ndarray]
+
+
+def input_of(model: Model) -> tuple[str, int]:
+    """Return name and size of what drives the tail in plans of a model."""
+    count = len(tendons_of(model))
+    return (TENSION, count) if count else ("torque", model.layout.nt)
+
+
+def law_of(inputs: Blocks, curve: Piecewise, damping: float) -> TensionCurve | TorqueCurve:
+    """Return the controller of planned inputs."""
+    return (TensionCurve if TENSION in inputs else TorqueCurve)(curve, damping)
+
+
+def torques_of(model: Model | None, blocks: Blocks) -> np.ndarray:
+    """Return the torques (K, 2m), N m, of blocks (K, ..) of a plan."""
+    if TENSION not in blocks:
+        return blocks["torque"]
+    if model is None:
+        raise PlanningError("torque: a plan of tendons from a pickle has no model: use tension")
+    return model.tendon_torques(_upright(blocks["tail"]), blocks[TENSION])
+
+
+def tensions_near(model: Model, tail: np.ndarray, torque: np.ndarray, least: float) -> np.ndarray:
+    """Return tensions (K, tendons), ``least`` (N) or more, for torques (K, 2m) that they can give
+    at tail coordinates (K, 2m); other torques are missed.
+    """
+    B = model.tendon_lengths(_upright(tail))[1]
+    return np.maximum(-np.einsum("kij,ki->kj", np.linalg.pinv(B), torque), least)
+
+
+def _upright(tail: np.ndarray) -> np.ndarray:
+    """Return q (K, nq) of tails (K, 2m) on a torso at the origin."""
+    return np.column_stack([np.tile(IDENTITY_POSE, (len(tail), 1)), tail])
+
+
+def torque_expression(body: BodyFunctions, tail: "ca.SX", tension: "ca.SX") -> "ca.SX":
+    """Return the torques (2m,) of tensions (CasADi)."""
+    import casadi as ca
+
+    return body.call("tendon_torques", ca.vertcat(ca.DM(IDENTITY_POSE), tail), tension)
+
+
+def pull_terms(model: Model, body: BodyFunctions) -> Terms:
+    """Return the torques as terms of tail coordinates and tensions."""
+
+    def made() -> Terms:
+        import casadi as ca
+
+        tail, tension = (ca.SX.sym(n, k) for n, k in (("tail", model.layout.nt), input_of(model)))
+        torque = torque_expression(body, tail, tension)
+        return terms_of(ca.vertcat(tail, tension), ca.SX(0, 1), torque)
+
+    return memoised(("pull", model), made)
+
+
+def refuse_tendons(model: Model, what: str) -> None:
+    """PlanningError if tendons pull the tail of a model."""
+    if tendons_of(model):
+        raise PlanningError(f"{what}: tendons pull the tail: this needs a model without them")
