@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     import casadi as ca
 
 TENSION = "tension"
+SLACKEST = 0.02  # of its limit, in a guess: from tensions near 0 solvers take many iterations
 Blocks = Mapping[str, np.ndarray]
 
 
@@ -42,11 +43,12 @@ def torques_of(model: Model | None, blocks: Blocks) -> np.ndarray:
     return model.tendon_torques(_upright(blocks["tail"]), blocks[TENSION])
 
 
-def tensions_near(model: Model, tail: np.ndarray, torque: np.ndarray, least: float) -> np.ndarray:
-    """Return tensions (K, tendons), ``least`` (N) or more, for torques (K, 2m) that they can give
+def tensions_near(model: Model, tail: np.ndarray, torque: np.ndarray) -> np.ndarray:
+    """Return tensions (K, tendons), N, well above 0, for torques (K, 2m) that they can give
     at tail coordinates (K, 2m); other torques are missed.
     """
     B = model.tendon_lengths(_upright(tail))[1]
+    least = SLACKEST * np.atleast_1d(model.parameters["tendon_limits"])
     return np.maximum(-np.einsum("kij,ki->kj", np.linalg.pinv(B), torque), least)
 
 

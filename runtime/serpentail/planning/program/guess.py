@@ -77,7 +77,7 @@ def of_trajectory(model: Model, motion: Trajectory, damping: float = 0.0) -> Gue
     }
     name, _ = input_of(model)
     if name == TENSION:
-        samples[name] = tensions_near(model, samples["tail"], samples["torque"], 0.0)
+        samples[name] = tensions_near(model, samples["tail"], samples["torque"])
     if in_air(model):
         samples |= drift_of_states(model, motion.q, motion.v)
     t = motion.t - motion.t[0]
