@@ -17,11 +17,11 @@ from typing import Any
 import serpentail as st
 from serpentail_codegen.scene.parse import parse_scene
 from serpentail_codegen.scene.scene import Scene
-from serpentail_scene.signatures.table import VALUES
+from serpentail_scene.signatures.table import NEEDS, VALUES
 from tests.support import models
 
 GROUND = {"contacts": ["feet", "tail", "torso"]}
-FLYING = [*(name for name in VALUES if name != "air_force"), "rollout"]
+FLYING = [*(name for name in VALUES if name not in NEEDS), "rollout"]
 FEW = ["mass_matrix", "forward_dynamics", "energy", "contact_dynamics"]
 FEW += ["pfl", "rollout", "implicit"]
 # derivatives of flight are those of the same tail without contact
@@ -50,6 +50,12 @@ AIR = {
 }
 TAIL_IN_AIR = {n: AIR[n] for n in ("air_density", "wind", "tail_drag")}
 WIDTHS = [6, 10, 20, 8, 4, 7, 9, 12]  # mm
+RING = {"ring": {"count": 3, "radius": 0.004, "tension": 5}}
+TAPERING = {
+    "left": {"offset": "4, 1 mm", "end_offset": "2, 1 mm", "root": "5 mm", "tension": "4 N"},
+    "up": {"offset": "-1, 4 mm", "root": "3 mm", "tension": 5, "guides": 0.7, "to": 2},
+    "low": {"offset": "0, -4 mm", "end_offset": "1, -2 mm", "root": 0, "tension": 3, "to": 1},
+}
 TORSO = {"torso_mass": 0.11, "torso_inertia": [7e-5, 4e-5, 7.5e-5]}
 MOUNTED = {"tail_mount": [0.002, -0.04, 0], "mount_angles": [0.3, -0.6, 0.9]}
 OWN_LINKS = [
@@ -207,6 +213,10 @@ ZOO: dict[str, dict[str, Any]] = {
     "air_mixed": _own("mixed", MIXED, parameters=TORSO | MOUNTED | AIR | widths(7)),
     "air_fixed": _links(2, 2, base="fixed", parameters=TAIL_IN_AIR),
     "air_ground": _links(1, 3, parameters=AIR, functions=["air_force", *LANDING], **GROUND),
+    # pulled by tendons, whose guides are alike, or of links of their own and to some segments
+    "tendons": _links(2, 2, tendon=RING),
+    "tendons_own": _own("articulated", OWN_LINKS, tendon=TAPERING),
+    "tendons_arcs": _arcs(2, tendon=RING),
     # on the ground
     "ground_m1_n1": _links(1, 1, **GROUND),
     "ground": _links(1, 3, **GROUND),

@@ -18,6 +18,7 @@ from ..planning.planner import plan
 from ..planning.problem import checked_goal
 from ..planning.result.full_state import com_at_start
 from ..planning.result.plan import Plan
+from ..planning.tendons import refuse_tendons
 from ..simulation.controllers.controller import Controller
 from ..simulation.controllers.pfl import Pfl
 from .phase import BEFORE, Phase
@@ -44,6 +45,7 @@ def planned_flight(model: Model, phase: Phase, state: State, angles: np.ndarray)
 
     angles (2,): gamma, delta (rad) of the legs at the landing.
     """
+    refuse_tendons(model, "plan of a phase")
     attempts: list[tuple[Plan, float | None]] = []
     for arguments in phase.plan:
         attempts.append(_attempt(model, phase, arguments, state, angles))

@@ -17,6 +17,7 @@ from ..basics.errors import ExtraMissing, SerpentailError
 from ..basics.extras import needed
 from ..model.model import Model
 from ..model.passive import idle
+from ..model.tendons import tendons_of
 from . import (
     air_laws,
     airborne_laws,
@@ -25,6 +26,7 @@ from . import (
     derivative_laws,
     frame_laws,
     passive_laws,
+    tendon_laws,
     value_laws,
 )
 from .law import Law, rid_of
@@ -32,7 +34,7 @@ from .states import Case, states
 
 FILES = (
     *(value_laws, frame_laws, call_laws, derivative_laws),
-    *(contact_laws, passive_laws, air_laws, airborne_laws),
+    *(contact_laws, passive_laws, air_laws, tendon_laws, airborne_laws),
 )
 LAWS = tuple(each for file in FILES for each in vars(file).values() if isinstance(each, Law))
 OF = {"free": "a torso that moves"}
@@ -100,6 +102,7 @@ def unchecked(entry: Law, model: Model) -> str:
     kinds += [] if model.fixed else ["free"]
     kinds += ["passive"] if idle(model.parameters, PARTS) else []
     kinds += ["air"] if idle(model.parameters, ("air",)) else []
+    kinds += ["tendons"] if tendons_of(model) else []
     if entry.only not in kinds:
         return f"only for {OF.get(entry.only, entry.only + ' models')}"
     if entry.casadi:

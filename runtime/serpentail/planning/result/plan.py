@@ -51,7 +51,8 @@ class Plan(NearNames):
         The planned motion and torques, before damping. Its samples include all ends of
         intervals.
     report : dict
-        JSON-ready summary: errors at the end, effort (N^2 m^2 s), energy (J), peak power (W),
+        JSON-ready summary: errors at the end, effort (N^2 m^2 s, of
+        tensions N^2 s), energy (J), peak power (W),
         times (s), counts; docs/planning.md lists its keys.
     problem : PlanningProblem
         What was asked.
@@ -89,13 +90,14 @@ class Plan(NearNames):
         ended = "success" if self.success else f"no success ({told['status']})"
         chosen = ", ".join(f"{name} {_digits(x)}" for name, x in self.design.items())
         names = "effort", "energy_J", "peak_power_W", *TRUTH
+        squared = "N^2 s" if TENSION in self.curve.nodes else "N^2 m^2 s"
         effort, energy, power, to_plan, to_goal = (_shown(told[name]) for name in names)
         return framed(
             [
                 f"Plan of {self.trajectory.info['model']}, {moved}: {ended}",
                 f"{self.duration:.6g} s, {self.mesh.intervals} intervals by Radau's rule of "
                 f"degree {self.rule.degree}, {len(self.trajectory.t)} samples; {SI}",
-                f"effort {effort} N^2 m^2 s, energy {energy} J, peak power {power} W",
+                f"effort {effort} {squared}, energy {energy} J, peak power {power} W",
                 f"true attitude at the end: {to_plan} deg from the plan, {to_goal} from the goal",
                 f"rounds: {told['rounds']}, iterations: {told['iterations']}; processor time "
                 f"{told['call_cpu_s']:.3g} s, of it {told['solve_cpu_s']:.3g} s in the solver",
