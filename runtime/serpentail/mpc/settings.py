@@ -10,7 +10,8 @@ from ..basics.errors import PlanningError
 from ..model.model import Model
 from ..planning.goal import Bounds
 from ..planning.magnitudes import checked_bounds
-from ..planning.result.plan import Plan, refuse_unfit
+from ..planning.result.fit import refuse_unfit
+from ..planning.result.plan import Plan
 from .kernel import FUNCTIONS
 
 NEEDED = dict(
