@@ -17,6 +17,8 @@ from .scenes.scenario import Scenario as Scenario
 from .simulation.controllers.controller import Damping as Damping
 from .simulation.controllers.controller import TorqueTable as TorqueTable
 from .simulation.controllers.controller import TorqueCurve as TorqueCurve
+from .simulation.controllers.controller import TensionTable as TensionTable
+from .simulation.controllers.controller import TensionCurve as TensionCurve
 from .simulation.controllers.controller import Phases as Phases
 from .simulation.controllers.parts import NativeTorque as NativeTorque
 from .simulation.controllers.sampled import Sampled as Sampled

@@ -7,7 +7,7 @@ from ...model.model import Model
 from ...model.tendons import tendons_of
 from .piecewise import Piecewise
 
-ROUNDING = 1e-9  # of a limit, by which tensions may go beyond it
+ROUNDING = 1e-6  # of a limit, by which tensions of a solver may go beyond it
 
 
 def refuse_tensions(model: Model, curve: Piecewise) -> None:
