@@ -33,7 +33,9 @@ LAWFUL = {*CATALOGUE} - {each.name for each in gradients.SIGNATURES}
 
 def sound(entry):
     """A sound model that a law is about."""
-    name = {"passive": "elastic", "contact": "ground", "air": "air"}.get(entry.only, "m1_n3")
+    name = {"passive": "elastic", "contact": "ground", "air": "air", "tendons": "tendons"}.get(
+        entry.only, "m1_n3"
+    )
     return rid_of(zoo.model(name), entry.without)
 
 
@@ -170,6 +172,7 @@ FAULTS = [
     ("air_force", times(-1), "air that rests takes energy"),
     ("forward_dynamics", times(FACTOR), "torques that make up for it rid a tail of it"),
     ("air_force", lambda force, *_: force + 1e-9, "air that moves along does nothing"),
+    ("tendon_lengths", lambda found, *_: (found[0], -found[1]), "lengths change with the tail"),
     ("contact_points", of_one(1), "velocities are the rates of the points"),
     ("contact_dynamics", PULLING, "the ground never pulls nor holds by more than friction"),
 ]

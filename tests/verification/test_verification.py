@@ -23,7 +23,7 @@ from tests.verification import verify_model
 
 SOUND = ("m1_n1", "arcs1", "elastic", "single_ground", "baked")
 OTHERS = [name for name in zoo.ZOO if name not in (*SOUND, "polar")]  # polar ones have no states
-KINDS = ("double", "articulated", "contact", "passive", "air")
+KINDS = ("double", "articulated", "contact", "passive", "air", "tendons")
 REASONS = {f"only for {kind} models" for kind in KINDS}
 REASONS |= {"no even m or n of links", "only for a torso that moves", verify_model.PLAIN}
 REASONS |= {"it says nothing about this model"}
@@ -123,7 +123,8 @@ def test_a_model_of_one_function_is_checked():
             asked = asked.get(name, [name.removesuffix("_factor").removesuffix("_solve")])
             touching = {"contacts": ["tail"], "feet": ["feet"]}.get(NEEDS.get(name), [])
             air = {"air_density": 1.2} if NEEDS.get(name) == "air" else {}
-            given = {"functions": asked, "contacts": touching, "parameters": air}
+            pulled = {"tendon": zoo.RING} if NEEDS.get(name) == "tendons" else {}
+            given = {**pulled, "functions": asked, "contacts": touching, "parameters": air}
             folder = models.model_folder(1, 1, **given)
             checks = verify.laws(st.load(folder))
             assert failed(checks) == set()

@@ -1,7 +1,7 @@
 """The states at which laws are checked, seeded and random, and a model's outputs there."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from serpentail_scene.signatures.table import in_group
 from ..basics.errors import ModelError
 from ..model.chains import bend_ranges
 from ..model.model import Model
+from ..model.tendons import tendons_of
 from ..model.weight import total_mass
 
 KINDS = ("random", "straight", "folded")
@@ -33,6 +34,7 @@ class Case:
     dtau: np.ndarray
     multiplier: np.ndarray
     drift: np.ndarray  # in air, velocity of B against it and omega, torso axes
+    tendons: int = field(default=0, kw_only=True)  # of the model
 
     @property
     def fixed(self) -> bool:
@@ -55,6 +57,11 @@ class Case:
         return self.f_ext[OMEGA] / 20
 
     @property
+    def tension(self) -> np.ndarray:
+        """Tensions of the tendons (N)."""
+        return np.abs(np.resize(self.multiplier, self.tendons))
+
+    @property
     def weights(self) -> np.ndarray:
         """Weights of an airborne state's rates and of omega."""
         return np.resize(self.multiplier, len(self.x) + 3)
@@ -71,7 +78,8 @@ def states(model: Model, count: int = 4, seed: int = 1) -> Iterator[Case]:
     for kind in KINDS:
         for k in range(count):
             arrays = random_arrays(model, rng, kind, k)
-            yield Case(kind, *(x.astype(real).astype(float) for x in arrays))
+            arrays = [x.astype(real).astype(float) for x in arrays]
+            yield Case(kind, *arrays, tendons=len(tendons_of(model)))
 
 
 def random_arrays(model: Model, rng: np.random.Generator, kind: str, k: int) -> list[np.ndarray]:

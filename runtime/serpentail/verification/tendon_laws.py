@@ -27,7 +27,6 @@ def lengths_change_with_the_tail(model: Model, s: Case) -> Errors:
 def tensions_have_the_power_of_their_tendons(model: Model, s: Case) -> Errors:
     """T l_dot + tau q_t_dot = 0: what tendons lose, the tail gains."""
     B, rates = model.tendon_lengths(s.q)[1].astype(float), s.v[model.layout.tail_v]
-    tension = np.abs(np.resize(s.multiplier, len(B)))
-    given = tension * (B @ rates)
-    taken = model.tendon_torques(s.q, tension) @ rates
+    given = s.tension * (B @ rates)
+    taken = model.tendon_torques(s.q, s.tension) @ rates
     return relative(given.sum(), -taken, np.abs(given).sum())
