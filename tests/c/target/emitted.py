@@ -17,14 +17,14 @@ from serpentail_codegen.ir.interpret import Run
 from serpentail_codegen.pipeline import tail_of
 from serpentail_codegen.scene.parse import parse_scene
 from serpentail_codegen.targets.c.form import in_form
-from serpentail_scene.signatures.table import ALL, VALUES
+from serpentail_scene.signatures.table import ALL, NEEDS, VALUES
 from tests.references.parameters import random_states
 from tests.support import zoo
 from tests.support.compile_once import compile_once
 from tests.support.models import folder_of
 
 KNOWN = (*VALUES, "forward_dynamics_derivatives", "rollout")
-NAMES = tuple(name for name in ALL if name in KNOWN and name != "air_force")  # needs air
+NAMES = tuple(name for name in ALL if name in KNOWN and name not in NEEDS)
 STRICT = (
     *("-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Wshadow"),
     "-Werror",
