@@ -191,7 +191,7 @@ def test_numbers_of_numpy_are_numbers_and_what_toml_cannot_say_is_named():
 
 
 def test_options_are_what_the_generator_knows():
-    keys = {"tail" if key == "kind" else key for key in KEYS}
+    keys = {{"kind": "tail", "tendon": "tendons"}.get(key, key) for key in KEYS}
     left = {"description", "parameters", "plan", "simulate", "phase", "identify", "sweep"}
     assert set(SceneKeys.__annotations__) == keys - left
     of_limbs = {"link_tips", "link_offsets", "rotors"}
