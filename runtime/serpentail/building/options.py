@@ -43,6 +43,11 @@ class ParameterOptions(TypedDict, total=False):
     delta_m: Quantity
     hip: Quantities
     torso_semi_axes: Quantities
+    tendon_offsets: Quantities
+    tendon_limits: Quantities
+    tendon_guides: Quantities
+    tendon_ends: Quantities
+    tendon_roots: Quantities
     air_density: Quantity
     wind: Quantities
     tail_widths: Quantities
@@ -62,11 +67,6 @@ class ParameterOptions(TypedDict, total=False):
     motor_torque: Quantities
     motor_speed: Quantities
     motor_power: Quantities
-    tendon_offsets: Quantities
-    tendon_limits: Quantities
-    tendon_guides: Quantities
-    tendon_ends: Quantities
-    tendon_roots: Quantities
 
 
 IN_SCENES = {"tail": "kind", "tendons": "tendon"}  # what scenes call keys
