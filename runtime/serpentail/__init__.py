@@ -45,6 +45,8 @@ _HOME = {
     "Sequence": "sequence.sequence",
     "SequenceRun": "sequence.run",
     **dict.fromkeys(["Phase", "Tracking"], "sequence.phase"),
+    "optimise": "sequence.optimise",
+    "Leap": "sequence.leap",
     **dict.fromkeys(["identify"], "identification.identify"),
     "Identification": "identification.result",
     **dict.fromkeys(["Marker", "marker_positions"], "identification.placement"),

@@ -52,15 +52,19 @@ def planned_flight(model: Model, phase: Phase, state: State, angles: np.ndarray)
         if attempts[-1][0].success:
             break
     best, landing = min(attempts, key=lambda attempt: _miss(attempt[0]))
-    tracking = phase.tracking
     if not best.success:
         advice = _advice(model, phase, [found for found, _ in attempts], state, angles)
         best = replace(best, report=best.report | {"advice": advice})
         return PlannedFlight(best, phase.controller, landing)
+    return PlannedFlight(best, tracker(model, phase, best), landing)
+
+
+def tracker(model: Model, phase: Phase, plan: Plan) -> Controller:
+    """Return what tracks a plan of a phase."""
+    tracking = phase.tracking
     if tracking.mpc is not None:
-        return PlannedFlight(best, Mpc(model, best, **tracking.mpc), landing)
-    torque = best.problem.bounds.torque
-    return PlannedFlight(best, Pfl(model, best, tracking.kp, tracking.kd, torque=torque), landing)
+        return Mpc(model, plan, **tracking.mpc)
+    return Pfl(model, plan, tracking.kp, tracking.kd, torque=plan.problem.bounds.torque)
 
 
 def _advice(

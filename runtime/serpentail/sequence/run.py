@@ -37,6 +37,8 @@ class PhaseRun(NearNames):
         What ended it, such as "duration", "airborne" or "touch_down of feet".
     plan : Plan or None
         Its plan.
+    peak : float
+        Largest force of the ground on all points together (N).
     """
 
     name: str
@@ -44,6 +46,7 @@ class PhaseRun(NearNames):
     end: float
     ended_by: str
     plan: Plan | None = None
+    peak: float = 0.0
     __repr__ = brief
 
     def info(self) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from ..basics.near_names import NearNames
 from ..basics.short_repr import brief
 from ..model.model import Model
 from ..model.state import State, parted
+from ..motion.ground import peaks
 from ..motion.trajectory import Trajectory
 from ..simulation.controllers.controller import Controller, Phases, parts_of
 from ..simulation.controllers.moves import TOUCH_DOWN
@@ -144,7 +145,7 @@ class Sequence(NearNames):
             try:
                 # what acts: the controller, or the plan for the state in which the phase begins
                 if phase.plan:
-                    angles = self._last_angles(phase, moves)
+                    angles = self.last_angles(phase, moves)
                     flight = planned_flight(self.model, phase, (start.q, start.v), angles)
                     controller, plan, landing = flight.controller, flight.plan, flight.landing
                 touches = bool(runs) and runs[-1].ended_by == TOUCH
@@ -163,7 +164,8 @@ class Sequence(NearNames):
             parts.append(motion)
             moves = [*_begun(moves, motion.info.get(LANDED_AT))]
             end = float(motion.t[-1])
-            runs.append(PhaseRun(phase.name, start.time, end, ended_by, plan))
+            peak = peaks(motion)["all"].force if motion.contact else 0.0
+            runs.append(PhaseRun(phase.name, start.time, end, ended_by, plan, peak))
             bristles = None if motion.contact is None else motion.contact.bristles[-1]
             start = PhaseStart(end, motion.q[-1], motion.v[-1], bristles)
             if phase.until is not None and ended_by == "duration":
@@ -177,7 +179,7 @@ class Sequence(NearNames):
             return {}
         return {"legs": Legs.moves(self.gamma, self.delta, moves)}
 
-    def _last_angles(self, phase: Phase, moves: Iterable[Mapping[str, Any]]) -> np.ndarray:
+    def last_angles(self, phase: Phase, moves: Iterable[Mapping[str, Any]]) -> np.ndarray:
         """Return gamma, delta (rad) after all moves up to the end of a phase."""
         gamma, delta = self.gamma or 0.0, self.delta or 0.0
         for move in (*moves, *(each for each in phase.moves if each.get("at") != TOUCH_DOWN)):

@@ -11,9 +11,11 @@ from ...basics.errors import SimulationError
 from ...basics.short_repr import brief
 
 # shares of the way over shares of the time, coefficients of their powers: at a constant rate; at a
-# constant acceleration, so that the rate is largest at the end; from rest to rest
-SHAPES = {"linear": (0, 1), "accelerate": (0, 0, 1), "quintic": (0, 0, 0, 10, -15, 6)}
-FASTEST = {"linear": 1.0, "accelerate": 2.0, "quintic": 1.875}  # their largest rates
+# constant acceleration, so that the rate is largest at the end; the reverse, as a leg that yields;
+# from rest to rest
+SHAPES = {"linear": (0, 1), "accelerate": (0, 0, 1), "decelerate": (0, 2, -1)}
+SHAPES |= {"quintic": (0, 0, 0, 10, -15, 6)}
+FASTEST = {"linear": 1.0, "accelerate": 2.0, "decelerate": 2.0, "quintic": 1.875}  # largest rates
 JUMP_TOLERANCE = 1e-9  # a jump that is smaller, over the largest value, is rounding
 
 

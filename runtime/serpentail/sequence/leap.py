@@ -1,0 +1,159 @@
+"""``Leap``: a sequence whose legs were optimised, its motion, and what it keeps and reaches."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..basics.errors import PlanningError, SimulationError
+from ..basics.near_names import NearNames
+from ..basics.short_repr import brief
+from ..model.model import Model
+from ..model.weight import weight_of
+from ..motion.landing import Landing
+from ..motion.numbers import com_rise
+from .flight import landing_time, tracker
+from .phase import BEFORE, Phase
+from .run import SequenceRun
+from .search import tilt
+from .sequence import PhaseStart, Sequence
+from .unknowns import leg_rate
+from .wanted import LIMITS, Wanted
+
+LOWER = (0.002, 0.005)  # m, of the ground at the landing
+HEAVIER = (0.9, 1.1)  # of all masses
+SLIPPERY = (0.5, 1.0)  # mu
+
+
+@dataclass(frozen=True, eq=False)
+class Leap(NearNames):
+    """A leap that ``optimise`` found.
+
+    Attributes
+    ----------
+    sequence : Sequence
+        Its phases, whose moves have the numbers that were found.
+    run : SequenceRun
+        Its motion, by ``Sequence.simulate``.
+    report : dict
+        ``measures`` of the motion: push and landing (largest forces, body weights), spin (angular
+        momentum at the take-off, kg m^2/s), tilt (largest angle from upright, rad), leg_rate
+        (rad/s), rise (m), standing and planned (bool); ``repeats``: the same measures by what was
+        changed; ``seconds``: how long it took.
+    doubts : tuple of str
+        Limits and goals that are not met: of the leap, and of its repeats.
+    """
+
+    sequence: Sequence
+    run: SequenceRun
+    report: dict[str, Any]
+    doubts: tuple[str, ...]
+    __repr__ = brief
+
+    @property
+    def success(self) -> bool:
+        """Whether the leap itself meets all; its repeats may fail."""
+        repeats = self.report.get("repeats", {})
+        return not [doubt for doubt in self.doubts if doubt.partition(": ")[0] not in repeats]
+
+
+def measures_of(sequence: Sequence, run: SequenceRun) -> dict[str, Any]:
+    """Return the measures of a whole motion, as in ``Leap.report``."""
+    model, motion = sequence.model, run.trajectory
+    landing = Landing(model, motion)
+    spin = landing.angular_momentum(0)
+    weights = [phase.peak / weight_of(model.parameters) for phase in run.phases]
+    return {
+        "push": weights[0],
+        "landing": weights[-1],
+        "spin": 0.0 if spin is None else float(np.linalg.norm(spin)),
+        "tilt": float(tilt(motion).max()),
+        "leg_rate": leg_rate((sequence.gamma, sequence.delta), sequence.phases),
+        "rise": com_rise(model, motion) or 0.0,
+        "standing": bool(run.complete and landing.landed()),
+        "planned": all(phase.plan is None or phase.plan.success for phase in run.phases),
+    }
+
+
+def missed(wanted: Wanted, measures: dict[str, Any], where: str = "") -> Iterator[str]:
+    """Yield in words which limits and goals a motion misses; where: before each."""
+    if not measures:
+        yield f"{where}it cannot be simulated"
+        return
+    if not measures["planned"]:
+        yield f"{where}flight: no plan is true"
+    if wanted.standing and not measures["standing"]:
+        yield f"{where}standing: it does not stand at the end"
+    for name, share in wanted.shares(measures).items():
+        if share > 1:
+            if name == "rise":
+                limit, unit, how = wanted.rise, "m", "less"
+            else:
+                limit, unit, how = wanted.limits[name], LIMITS[name] or "body weights", "more"
+            yield f"{where}{name}: {measures[name]:.3g} {unit}, {how} than {limit:.3g}"
+
+
+def repeats(leap: Leap, start: PhaseStart) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield the measures of a leap with the same plan on lower ground, and from the start with
+    other masses and friction: none where it fails.
+    """
+    sequence, run = leap.sequence, leap.run
+    model, (push, flight, land) = sequence.model, sequence.phases
+    held = _tracked(model, sequence, run)
+    for drop in LOWER:
+        here = state_at(run, run.phases[1].begin)
+        here.q[2] += drop
+        gamma, delta = sequence.last_angles(push, ())
+        lower = replace(sequence, phases=(held, land), gamma=gamma, delta=delta)
+        found = _measured(lower, replace(here, bristles=None))
+        yield f"ground {1e3 * drop:g} mm lower", found
+    whole = replace(sequence, phases=(push, held, land))
+    masses = [name for name in ("torso_mass", "tail_mass") if name in model.parameters]
+    for times in HEAVIER:
+        changes = {name: times * np.asarray(model.parameters[name]) for name in masses}
+        yield f"masses times {times:g}", _measured(_with(whole, changes), start)
+    for mu in SLIPPERY:
+        yield f"mu {mu:g}", _measured(_with(whole, {"mu": mu}), start)
+
+
+def _with(sequence: Sequence, changes: dict[str, Any]) -> Sequence:
+    """Return a sequence of a model with other parameters."""
+    return replace(sequence, model=sequence.model.with_parameters(**changes))
+
+
+def _tracked(model: Model, sequence: Sequence, run: SequenceRun) -> Phase:
+    """Return the flight with the plan that was found, in place of the search for one."""
+    push, flight, _ = sequence.phases
+    plan, here, moves = run.phases[1].plan, state_at(run, run.phases[1].begin), []
+    assert plan is not None
+    angles = sequence.last_angles(flight, push.moves)
+    for move in flight.moves:
+        timed = {name: value for name, value in move.items() if name != BEFORE}
+        if BEFORE in move:
+            landing = landing_time(model, (here.q, here.v), plan.problem.goal, angles)
+            timed["at"] = max(landing - move[BEFORE], 0.0)
+        moves.append(timed)
+    acts = tracker(model, flight, plan) if plan.success else flight.controller
+    return replace(flight, plan=None, controller=acts, moves=moves)
+
+
+def state_at(run: SequenceRun, time: float) -> PhaseStart:
+    """Return the state of a motion at a time (s) at which a phase begins."""
+    motion = run.trajectory
+    k = int(np.abs(motion.t - time).argmin())
+    assert motion.contact is not None
+    return PhaseStart(time, motion.q[k].copy(), motion.v[k].copy(), motion.contact.bristles[k])
+
+
+def _measured(sequence: Sequence, start: PhaseStart) -> dict[str, Any]:
+    """Return the measures of a sequence without plans; none if it fails."""
+    try:
+        run = sequence.simulate(start.q, start.v, start.bristles)
+    except (SimulationError, PlanningError):
+        return {}
+    found = measures_of(sequence, run)
+    if len(sequence.phases) < 3:  # that begins in flight
+        for name in ("push", "spin", "rise", "leg_rate"):
+            del found[name]
+    return found

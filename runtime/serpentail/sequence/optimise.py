@@ -1,0 +1,208 @@
+"""``optimise``: a leap whose legs push and land so that limits are kept and goals are met."""
+
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+from math import pi, radians
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from serpentail_scene.layout import POSITION
+
+from ..basics.checks import number, refusal
+from ..basics.errors import SimulationError
+from ..model.state import State, parted
+from ..planning.problem import checked_goal
+from ..simulation.controllers.moves import TOUCH_DOWN
+from .leap import Leap, measures_of, missed, repeats, state_at
+from .phase import AIRBORNE, BEFORE, LANDING
+from .run import SequenceRun
+from .search import Measured, landing_measures, push_measures, searched, tilt
+from .sequence import PhaseStart, Sequence
+from .unknowns import unknowns_of
+from .wanted import ENOUGH, Wanted, wanted_of
+
+LIMITS = MappingProxyType({"push": 25.0, "landing": 25.0, "tilt": radians(60)})
+GOAL: Mapping[str, Any] = MappingProxyType({"standing": True})
+SHARE, TURNS = 1 / 3, 5  # of the time, for one search; searches of push or landing
+LESS = 0.6  # of the spin and tilt of a jump for whose flight no plan is true
+GRID = 25  # angles of a leg, for its reach
+
+
+def optimise(
+    leap: Sequence,
+    q0: ArrayLike | State,
+    v0: ArrayLike | None = None,
+    bristles0: ArrayLike | None = None,
+    *,
+    limits: Mapping[str, Any] = LIMITS,
+    goal: Mapping[str, Any] = GOAL,
+    best: str | None = None,
+    time_limit: float = 60.0,
+) -> Leap:
+    """Find moves of the legs for a jump that is made for its landing.
+
+    The sequence's own moves are the first guess. The angles (within 0.9 rad) and durations (half to
+    twice) of the push and of the landing, and the angles before the landing, are searched for by
+    differential evolution, with a run for each try. The flight is planned as ever.
+
+    Parameters
+    ----------
+    leap : Sequence
+        A push (until "airborne"), a planned flight (until "landing"), and a landing with one move
+        at "touch_down"; the last move of the flight stretches the legs, ``before_landing``.
+    q0, v0, bristles0
+        The start, as of ``Sequence.simulate``.
+    limits : mapping
+        Largest values: push and landing (force of the ground, body weights), spin (angular
+        momentum at the take-off, kg m^2/s), tilt (of the torso from upright at any time, rad),
+        leg_rate (rad/s). Default: 25 body weights each, and 60 degrees.
+    goal : mapping
+        ``rise``: least rise of the centre of mass (m); ``standing``: whether it stands at the end.
+    best : {"rise", "softness", "spin"}, optional
+        What becomes best within the limits: the highest jump, the smallest forces or the least
+        spin. It takes longer. Default: the first leap that keeps 90 % of all limits.
+    time_limit : float, default 60
+        Time (s) after which no search or plan begins.
+
+    Returns
+    -------
+    Leap
+        The sequence, its motion, a report, and doubts: what is missed, also on ground 2 and 5 mm
+        lower, with masses 10 % off, and with mu 0.5 and 1, all with the same plan.
+
+    Raises
+    ------
+    SimulationError
+        An argument is wrong, or the legs are too short: a rise over a stroke s takes at least
+        1 + rise / s body weights.
+    PlanningError, StateError, ModelError, ExtraMissing
+        As of ``Sequence.simulate``.
+
+    Examples
+    --------
+    >>> found = st.optimise(leap, q0, v0, goal={"rise": 0.3})  # doctest: +SKIP
+    >>> found.success, found.doubts, found.report["measures"]  # doctest: +SKIP
+    """
+    begun, wanted = time.monotonic(), wanted_of(limits, goal, best)
+    time_limit = number("time_limit", time_limit, SimulationError, unit="s", above=0)
+    _check(leap)
+    q, v = (np.asarray(part, float) for part in parted(leap.model, q0, v0)[0])
+    start = PhaseStart(0.0, q, v, bristles0)
+    _refuse_short_legs(leap, start, wanted)
+
+    leap, aim = _freed(leap)
+
+    # the push, then the landing from where that comes down; a push again if no flight is true
+    push = partial(_push, measured=partial(push_measures, start=start, aim=aim))
+    search, asked, kept = push, wanted, []
+    for turn in range(TURNS):
+        until = min(time.monotonic() + SHARE * time_limit, begun + time_limit)
+        limits = asked if search is push else wanted
+        leap = search(leap, kept[-1].run if kept else None, limits, until)
+        run = leap.simulate(q, v, bristles0)
+        measures = measures_of(leap, run)
+        kept.append(Leap(leap, run, {"measures": measures}, tuple(missed(wanted, measures))))
+        done = kept[-1].success and (best is None or turn > 0)
+        if done or time.monotonic() - begun > time_limit:
+            break
+        search = _land if _flies(run, wanted) else push
+        if search is push:
+            less = {"spin": LESS * measures["spin"], "tilt": LESS * asked.limits.get("tilt", pi)}
+            asked = replace(asked, limits={**asked.limits, **less})
+
+    found = min(reversed(kept), key=lambda each: len(each.doubts))
+    again = dict(repeats(found, start)) if len(found.run.phases) == len(leap.phases) else {}
+    doubts = (line for name, each in again.items() for line in missed(wanted, each, f"{name}: "))
+    report = {**found.report, "repeats": again, "seconds": time.monotonic() - begun}
+    return replace(found, report=report, doubts=(*found.doubts, *doubts))
+
+
+def _freed(leap: Sequence) -> tuple[Sequence, Any]:
+    """Return a leap with one plan, the first, whose attitude at the landing is free; and that.
+
+    A jump with hardly any spin has one attitude at the landing for each posture of the tail, and no
+    plan can choose another: the push has to.
+    """
+    push, flight, land = leap.phases
+    goal = checked_goal(flight.plan[0].get("goal"), leap.model.layout.nt)
+    plan = {**flight.plan[0], "goal": replace(goal, attitude=None)}
+    return replace(leap, phases=(push, replace(flight, plan=plan), land)), goal.attitude
+
+
+def _flies(run: SequenceRun, wanted: Wanted) -> bool:
+    """Tell whether a flight is planned, comes down, and is never tilted too far."""
+    if len(run.phases) < 3 or not run.phases[1].plan.success:
+        return False
+    tilts = tilt(run.trajectory)[run.trajectory.t <= run.phases[2].begin]
+    return bool(tilts.max() < wanted.limits.get("tilt", np.inf))
+
+
+def _push(
+    leap: Sequence, run: SequenceRun | None, wanted: Wanted, end: float, measured: Measured
+) -> Sequence:
+    """Return a leap with a better push."""
+    return searched(leap, unknowns_of(leap.phases, 0), measured, wanted, end)
+
+
+def _land(
+    leap: Sequence, run: SequenceRun | None, wanted: Wanted, end: float
+) -> Sequence:
+    """Return a leap with a better landing from where a motion comes down."""
+    assert run is not None
+    touch = replace(state_at(run, run.phases[2].begin), bristles=None)
+    unknowns = [*unknowns_of(leap.phases, 1)[-2:], *unknowns_of(leap.phases, 2)]
+    measured, enough = partial(landing_measures, touch=touch), -np.inf if wanted.best else ENOUGH
+    return searched(leap, unknowns, measured, wanted, end, enough)
+
+
+def _check(leap: Any) -> None:
+    """SimulationError for what is no push, flight and landing."""
+    if not isinstance(leap, Sequence) or len(leap.phases) != 3 or leap.gamma is None:
+        raise refusal("leap", leap, "a Sequence of a model with feet, of 3 phases", SimulationError)
+    push, flight, land = leap.phases
+    stretched = flight.moves[-1:] and {BEFORE, "gamma", "delta"} <= {*flight.moves[-1]}
+    wrong = {
+        f"until is {push.until!r}: needs {AIRBORNE!r}": (push, push.until != AIRBORNE),
+        "moves: needs one, with a duration": (push, not push.moves),
+        "plan: needs one": (flight, not flight.plan),
+        f"until is {flight.until!r}: needs {LANDING!r}": (flight, flight.until != LANDING),
+        f"moves: needs a last one, of gamma and delta, {BEFORE}": (flight, not stretched),
+        f"moves: needs one, at {TOUCH_DOWN!r}": (
+            land,
+            [move.get("at") for move in land.moves] != [TOUCH_DOWN],
+        ),
+    }
+    for needs, (phase, is_wrong) in wrong.items():
+        if is_wrong:
+            raise SimulationError(f"phase {phase.name!r}: {needs}: see docs/sequences.md")
+    for k in range(3):
+        unknowns_of(leap.phases, k)
+
+
+def _refuse_short_legs(leap: Sequence, start: PhaseStart, wanted: Wanted) -> None:
+    """SimulationError if a rise takes more force than is allowed, whatever the legs do.
+
+    From its height at the start the torso cannot be pushed farther than the legs reach.
+    """
+    model = leap.model
+    angles = np.linspace(-pi, pi, GRID)
+    gamma, delta = (each.ravel() for each in np.meshgrid(angles, angles))
+    legs = np.stack([gamma, delta, gamma, delta, *np.zeros((4, gamma.size))], axis=1)
+    q, v = (np.broadcast_to(part, (gamma.size, len(part))) for part in (start.q, start.v))
+    points, _ = model.contact_points(q, v, legs)
+    feet = np.asarray(points)[:, : model.contacts["feet"]] - start.q[POSITION]
+    stroke = float(np.linalg.norm(feet, axis=-1).max() - start.q[2])
+    for name in ("push", "landing"):
+        if wanted.rise is None or name not in wanted.limits:
+            continue
+        least = 1 + wanted.rise / max(stroke, 1e-9)
+        if wanted.limits[name] < least:
+            raise SimulationError(
+                f"limits.{name}: value {wanted.limits[name]:g}: a rise of {wanted.rise:g} m over a "
+                f"stroke of at most {1e3 * stroke:.3g} mm needs at least {least:.3g} body weights"
+            )

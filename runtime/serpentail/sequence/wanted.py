@@ -1,0 +1,94 @@
+"""What a leap shall keep and reach, and how far a motion is from that."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import acos, degrees
+from typing import Any
+
+from ..basics.checks import number, one_of, refusal
+from ..basics.errors import SimulationError
+from ..motion.landing import MIN_SHARE, MIN_UPRIGHT
+
+LIMITS = {"push": "", "landing": "", "spin": "kg m^2/s", "tilt": "rad", "leg_rate": "rad/s"}
+BEST = ("rise", "softness", "spin")  # what may be made as large, or as small, as it can be
+PAID, EVEN = 10.0, 0.1  # of a share beyond MARGIN, and of squares, in the cost; the best counts 1
+ENOUGH = 0.1  # cost of what keeps all margins and is not best
+MARGIN = 0.9  # share of a limit that a search keeps
+NEARLY = 0.99  # the same of a rise: less than its goal by a hair more
+HIGHER = 1.1  # times its goal, to which a rise is kept unless it is to be best
+MISS = 0.1  # rad, of a flight's goal, which a plan mends
+UPRIGHT = degrees(acos(MIN_UPRIGHT))  # deg, of a torso that stands
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Limits (body weights, kg m^2/s, rad, rad/s), a rise (m), whether to stand, what is best.
+
+    A *share* is a measure over its limit: 1 is the limit, also of a goal.
+    """
+
+    limits: Mapping[str, float]
+    rise: float | None
+    standing: bool
+    best: str | None
+
+    def shares(self, measures: Mapping[str, float]) -> dict[str, float]:
+        """Return the shares of those measures that have a limit or a goal."""
+        shares = {
+            name: measures[name] / limit for name, limit in self.limits.items() if name in measures
+        }
+        if self.rise is not None and "rise" in measures:
+            shares["rise"] = 2 - measures["rise"] / self.rise
+        return shares
+
+    def cost(self, measures: Mapping[str, float]) -> float:
+        """Return what a search makes small: shares beyond the margin, then what is to be best, by
+        default the mean square of all shares.
+        """
+        shares = self.shares(measures)
+        if self.standing and "lean" in measures:
+            shares["lean"] = measures["lean"] / UPRIGHT
+            shares["carried"] = 2 - measures["carried"] / MIN_SHARE
+        if "miss" in measures:
+            shares["miss"] = measures["miss"] / MISS
+        if "rise" in shares and self.best != "rise":  # higher than needed lands harder
+            shares["too high"] = measures["rise"] / (HIGHER * self.rise)
+        margins = dict.fromkeys(shares, MARGIN) | {"rise": NEARLY, "too high": 1.0}
+        cost = PAID * sum(max(0.0, share - margins[name]) for name, share in shares.items())
+        if self.best is None:
+            return cost + EVEN * sum(share**2 for share in shares.values()) / max(len(shares), 1)
+        return cost + self._worse(measures)
+
+    def _worse(self, measures: Mapping[str, float]) -> float:
+        """Return how much worse than the best a motion is, in a scale of about 1."""
+        if self.best == "rise" and "rise" in measures:
+            return -measures["rise"]
+        if self.best == "spin" and "spin" in measures:
+            return 1e3 * measures["spin"]
+        if self.best == "softness":
+            return 0.02 * max(measures.get(name, 0.0) for name in ("push", "landing"))
+        return 0.0
+
+
+def wanted_of(limits: Any, goal: Any, best: Any) -> Wanted:
+    """Return checked limits and goals; SimulationError names what is wrong."""
+    for name, value in (("limits", limits), ("goal", goal)):
+        if not isinstance(value, Mapping):
+            raise refusal(name, value, "a mapping, such as {'push': 25}", SimulationError)
+    checked = {}
+    for name, value in limits.items():
+        one_of("limits: name", name, LIMITS, SimulationError)
+        least = {"least": 1.0} if name in ("push", "landing") else {"above": 0.0}
+        field = f"limits.{name}"
+        checked[name] = number(field, value, SimulationError, unit=LIMITS[name], **least)
+    for name in goal:
+        one_of("goal: name", name, ("rise", "standing"), SimulationError)
+    rise = goal.get("rise")
+    if rise is not None:
+        rise = number("goal.rise", rise, SimulationError, unit="m", above=0)
+    standing = goal.get("standing", True)
+    if not isinstance(standing, bool):
+        raise refusal("goal.standing", standing, "True or False", SimulationError)
+    if best is not None:
+        one_of("best", best, BEST, SimulationError)
+    return Wanted(checked, rise, standing, best)
