@@ -1,0 +1,94 @@
+"""Jumps of random animals that are made for their landing: ``st.optimise``."""
+
+import json
+import time
+from functools import partial
+from math import cos, pi, radians, sin
+from pathlib import Path
+
+import numpy as np
+
+import serpentail as st
+from examples.front import ROOT
+from examples.studies.landing import DELTA, GAMMA, SOURCES, SPREAD, VARIED, settled
+from examples.studies.landing_judged import SETTINGS, model_of
+from examples.studies.parts import Part, digest, made
+
+BODIES, SEED, RISES = 20, 12, (0.2, 0.35)
+LENGTHS, MASSES = np.linspace(0.1, 0.25, 5), np.linspace(2e-3, 10e-3, 6)  # m, kg, of tails
+TAIL = {"tail": "articulated", "segments": 1, "links": 3}
+LIMITS = {"push": 25.0, "landing": 25.0, "tilt": radians(60), "spin": 4e-4}
+TIME = 240.0  # s, on a machine with other work; the CPU time is counted
+# first guesses by hand: a push that grows to its end, legs that yield to rest
+PUSH = {"at": 0.02, "gamma": radians(255), "delta": radians(-55), "duration": 0.032}
+STRETCH = {"before_landing": 0.12, "gamma": radians(225), "delta": radians(-65), "duration": 0.08}
+YIELD = {"at": "touch_down", "gamma": radians(225), "delta": radians(-20), "duration": 0.024}
+
+
+def leap(model: st.Model, pitch: float = 5.0, torque: float = 0.02) -> st.Sequence:
+    """Return the first guess of a jump that lands at a pitch (deg), the tail up and at rest.
+
+    The tail's yaw is held, so that a flight whose attitude is free stays in its plane.
+    """
+    half = radians(pitch) / 2
+    goal = st.Goal([cos(half), sin(half), 0.0, 0.0], None, [radians(-20), 0.0], [0.0, 0.0])
+    bounds = st.Bounds(angle=(pi / 3, 1e-3), torque=torque)
+    plan = {"goal": goal, "bounds": bounds, "solver": st.Solver(track=False, time_limit=20.0)}
+    clear = {"until": "airborne", "clearance": 0.01, "controller": st.Damping(1e-3)}
+    phases = [
+        st.Phase("push", 1.0, moves=[PUSH | {"shape": "accelerate"}], **clear),
+        st.Phase("flight", 1.5, until="landing", plan=plan, moves=[STRETCH]),
+        st.Phase(
+            "land", 1.0, controller=st.Damping(5e-3), moves=[YIELD | {"shape": "decelerate"}]
+        ),
+    ]
+    return st.Sequence(model, phases, GAMMA, DELTA, SETTINGS)
+
+
+def found(changes: dict, rise: float) -> dict:
+    """Return what ``optimise`` finds for an animal and a rise (m)."""
+    model = model_of(TAIL).with_parameters(**changes)
+    start, begun = settled(model), time.process_time()
+    best = st.optimise(leap(model), *start, limits=LIMITS, goal={"rise": rise}, time_limit=TIME)
+    numbers = {name: float(value) for name, value in best.report["measures"].items()}
+    told = {"success": best.success, "doubts": list(best.doubts), "wanted": rise}
+    return told | numbers | {"cpu_s": time.process_time() - begun, "wall_s": best.report["seconds"]}
+
+
+def body(number: int) -> dict:
+    """Return the outcome for one random animal and rise."""
+    random, model = np.random.default_rng([SEED, number]), model_of(TAIL)
+    changes = {
+        name: (np.asarray(model.parameters[name]) * random.uniform(1 - SPREAD, 1 + SPREAD)).tolist()
+        for name in VARIED
+    }
+    return found(changes | {"mu": random.uniform(0.5, 1.0)}, random.uniform(*RISES))
+
+
+def tail(length: float, mass: float) -> dict:
+    """Return the outcome for a tail's length (m) and mass (kg), and a rise of 0.3 m."""
+    return found({"tail_length": length, "tail_mass": mass, "mu": 1.0}, 0.3)
+
+
+def study(folder: Path) -> None:
+    """Optimise all jumps, write summary.json and print how many succeed."""
+    of = {"program": digest(*(ROOT / source for source in SOURCES))}
+    model_of(TAIL)
+    parts = {
+        f"body_{number}": Part(partial(body, number), of | {"body": number})
+        for number in range(BODIES)
+    }
+    parts |= {
+        f"tail_{1e3 * length:g}_{1e3 * mass:.2g}": Part(
+            partial(tail, length, mass), of | {"tail": [length, mass]}
+        )
+        for length in LENGTHS.tolist()
+        for mass in MASSES.tolist()
+    }
+    results = made("leaps", folder / "parts", parts)
+    (folder / "summary.json").write_text(json.dumps(results, indent=1) + "\n")
+    print("| jumps | succeed | largest CPU time, s |\n|---|---|---|")
+    for kind in ("body", "tail"):
+        rows = [row for name, row in results.items() if name.startswith(kind)]
+        count, longest = sum(row["success"] for row in rows), max(row["cpu_s"] for row in rows)
+        print(f"| {kind} | {count} of {len(rows)} | {longest:.0f} |")
