@@ -38,9 +38,7 @@ def leap(model: st.Model, pitch: float = 5.0, torque: float = 0.02) -> st.Sequen
     phases = [
         st.Phase("push", 1.0, moves=[PUSH | {"shape": "accelerate"}], **clear),
         st.Phase("flight", 1.5, until="landing", plan=plan, moves=[STRETCH]),
-        st.Phase(
-            "land", 1.0, controller=st.Damping(5e-3), moves=[YIELD | {"shape": "decelerate"}]
-        ),
+        st.Phase("land", 1.0, controller=st.Damping(5e-3), moves=[YIELD | {"shape": "decelerate"}]),
     ]
     return st.Sequence(model, phases, GAMMA, DELTA, SETTINGS)
 

@@ -9,7 +9,6 @@ import numpy as np
 from ..basics.errors import PlanningError, SimulationError
 from ..basics.near_names import NearNames
 from ..basics.short_repr import brief
-from ..model.model import Model
 from ..model.weight import weight_of
 from ..motion.landing import Landing
 from ..motion.numbers import com_rise
@@ -65,8 +64,8 @@ def measures_of(sequence: Sequence, run: SequenceRun) -> dict[str, Any]:
     spin = landing.angular_momentum(0)
     weights = [phase.peak / weight_of(model.parameters) for phase in run.phases]
     return {
-        "push": weights[0],
-        "landing": weights[-1],
+        "push": float(weights[0]),
+        "landing": float(weights[-1]),
         "spin": 0.0 if spin is None else float(np.linalg.norm(spin)),
         "tilt": float(tilt(motion).max()),
         "leg_rate": leg_rate((sequence.gamma, sequence.delta), sequence.phases),
@@ -99,8 +98,8 @@ def repeats(leap: Leap, start: PhaseStart) -> Iterator[tuple[str, dict[str, Any]
     other masses and friction: none where it fails.
     """
     sequence, run = leap.sequence, leap.run
-    model, (push, flight, land) = sequence.model, sequence.phases
-    held = _tracked(model, sequence, run)
+    model, (push, _, land) = sequence.model, sequence.phases
+    held = _tracked(sequence, run)
     for drop in LOWER:
         here = state_at(run, run.phases[1].begin)
         here.q[2] += drop
@@ -122,9 +121,9 @@ def _with(sequence: Sequence, changes: dict[str, Any]) -> Sequence:
     return replace(sequence, model=sequence.model.with_parameters(**changes))
 
 
-def _tracked(model: Model, sequence: Sequence, run: SequenceRun) -> Phase:
+def _tracked(sequence: Sequence, run: SequenceRun) -> Phase:
     """Return the flight with the plan that was found, in place of the search for one."""
-    push, flight, _ = sequence.phases
+    model, (push, flight, _) = sequence.model, sequence.phases
     plan, here, moves = run.phases[1].plan, state_at(run, run.phases[1].begin), []
     assert plan is not None
     angles = sequence.last_angles(flight, push.moves)

@@ -21,7 +21,7 @@ from ..simulation.controllers.moves import TOUCH_DOWN
 from .leap import Leap, measures_of, missed, repeats, state_at
 from .phase import AIRBORNE, BEFORE, LANDING
 from .run import SequenceRun
-from .search import Measured, landing_measures, push_measures, searched, tilt
+from .search import landing_measures, push_measures, searched, tilt
 from .sequence import PhaseStart, Sequence
 from .unknowns import unknowns_of
 from .wanted import ENOUGH, Wanted, wanted_of
@@ -96,22 +96,26 @@ def optimise(
     _refuse_short_legs(leap, start, wanted)
 
     leap, aim = _freed(leap)
+    push = partial(push_measures, start=start, aim=aim)
 
     # the push, then the landing from where that comes down; a push again if no flight is true
-    push = partial(_push, measured=partial(push_measures, start=start, aim=aim))
-    search, asked, kept = push, wanted, []
+    kept: list[Leap] = []
+    flies, asked = False, wanted
     for turn in range(TURNS):
         until = min(time.monotonic() + SHARE * time_limit, begun + time_limit)
-        limits = asked if search is push else wanted
-        leap = search(leap, kept[-1].run if kept else None, limits, until)
+        if flies:
+            leap = _landing(leap, kept[-1].run, wanted, until, turn)
+        else:
+            leap = searched(leap, unknowns_of(leap.phases, 0), push, asked, until, seed=turn)
         run = leap.simulate(q, v, bristles0)
         measures = measures_of(leap, run)
         kept.append(Leap(leap, run, {"measures": measures}, tuple(missed(wanted, measures))))
-        done = kept[-1].success and (best is None or turn > 0)
-        if done or time.monotonic() - begun > time_limit:
+        if (
+            kept[-1].success and (best is None or turn > 0)
+        ) or time.monotonic() > begun + time_limit:
             break
-        search = _land if _flies(run, wanted) else push
-        if search is push:
+        flies = _flies(run, wanted)
+        if not flies:
             less = {"spin": LESS * measures["spin"], "tilt": LESS * asked.limits.get("tilt", pi)}
             asked = replace(asked, limits={**asked.limits, **less})
 
@@ -136,28 +140,19 @@ def _freed(leap: Sequence) -> tuple[Sequence, Any]:
 
 def _flies(run: SequenceRun, wanted: Wanted) -> bool:
     """Tell whether a flight is planned, comes down, and is never tilted too far."""
-    if len(run.phases) < 3 or not run.phases[1].plan.success:
+    plan = run.phases[1].plan if len(run.phases) == 3 else None
+    if plan is None or not plan.success:
         return False
     tilts = tilt(run.trajectory)[run.trajectory.t <= run.phases[2].begin]
     return bool(tilts.max() < wanted.limits.get("tilt", np.inf))
 
 
-def _push(
-    leap: Sequence, run: SequenceRun | None, wanted: Wanted, end: float, measured: Measured
-) -> Sequence:
-    """Return a leap with a better push."""
-    return searched(leap, unknowns_of(leap.phases, 0), measured, wanted, end)
-
-
-def _land(
-    leap: Sequence, run: SequenceRun | None, wanted: Wanted, end: float
-) -> Sequence:
+def _landing(leap: Sequence, run: SequenceRun, wanted: Wanted, end: float, seed: int) -> Sequence:
     """Return a leap with a better landing from where a motion comes down."""
-    assert run is not None
     touch = replace(state_at(run, run.phases[2].begin), bristles=None)
     unknowns = [*unknowns_of(leap.phases, 1)[-2:], *unknowns_of(leap.phases, 2)]
     measured, enough = partial(landing_measures, touch=touch), -np.inf if wanted.best else ENOUGH
-    return searched(leap, unknowns, measured, wanted, end, enough)
+    return searched(leap, unknowns, measured, wanted, end, enough, seed)
 
 
 def _check(leap: Any) -> None:
@@ -165,7 +160,7 @@ def _check(leap: Any) -> None:
     if not isinstance(leap, Sequence) or len(leap.phases) != 3 or leap.gamma is None:
         raise refusal("leap", leap, "a Sequence of a model with feet, of 3 phases", SimulationError)
     push, flight, land = leap.phases
-    stretched = flight.moves[-1:] and {BEFORE, "gamma", "delta"} <= {*flight.moves[-1]}
+    stretched = {BEFORE, "gamma", "delta"} <= {*[{}, *flight.moves][-1]}
     wrong = {
         f"until is {push.until!r}: needs {AIRBORNE!r}": (push, push.until != AIRBORNE),
         "moves: needs one, with a duration": (push, not push.moves),

@@ -51,7 +51,9 @@ class Wanted:
             shares["carried"] = 2 - measures["carried"] / MIN_SHARE
         if "miss" in measures:
             shares["miss"] = measures["miss"] / MISS
-        if "rise" in shares and self.best != "rise":  # higher than needed lands harder
+        if (
+            self.rise is not None and "rise" in shares and self.best != "rise"
+        ):  # higher than needed lands harder
             shares["too high"] = measures["rise"] / (HIGHER * self.rise)
         margins = dict.fromkeys(shares, MARGIN) | {"rise": NEARLY, "too high": 1.0}
         cost = PAID * sum(max(0.0, share - margins[name]) for name, share in shares.items())

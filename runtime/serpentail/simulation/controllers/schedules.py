@@ -234,8 +234,9 @@ class Legs:
             (rad), and either ``duration`` (s) or ``rate`` (rad/s, the largest of the angle that
             changes more). ``shape`` is "linear", at a constant rate; "accelerate", from rest at a
             constant acceleration, so that the rate is largest at the end; "decelerate", to rest,
-            with the largest rate at the beginning; or "quintic", from rest to rest. The last move may have ``at="touch_down"``: it begins when the feet first
-            touch down after the moves before it, from t = 0 on.
+            with the largest rate at the beginning; or "quintic", from rest to rest. The last move
+            may have ``at="touch_down"``: it begins when the feet first touch down after the moves
+            before it, from t = 0 on.
 
         Returns
         -------
