@@ -43,6 +43,7 @@ def test_shapes_are_closed_forms():
     rows = [
         ("linear", s, 1.0),
         ("accelerate", s**2, 2.0),
+        ("decelerate", s * (2 - s), 2.0),
         ("quintic", s**3 * (10 - 15 * s + 6 * s**2), 15 / 8),
     ]
     for shape, share, fastest in rows:

@@ -100,25 +100,19 @@ def repeats(leap: Leap, start: PhaseStart) -> Iterator[tuple[str, dict[str, Any]
     sequence, run = leap.sequence, leap.run
     model, (push, _, land) = sequence.model, sequence.phases
     held = _tracked(sequence, run)
+    gamma, delta = sequence.last_angles(push, ())
+    lower = replace(sequence, phases=(held, land), gamma=gamma, delta=delta)
     for drop in LOWER:
         here = state_at(run, run.phases[1].begin)
         here.q[2] += drop
-        gamma, delta = sequence.last_angles(push, ())
-        lower = replace(sequence, phases=(held, land), gamma=gamma, delta=delta)
-        found = _measured(lower, replace(here, bristles=None))
-        yield f"ground {1e3 * drop:g} mm lower", found
-    whole = replace(sequence, phases=(push, held, land))
+        yield f"ground {1e3 * drop:g} mm lower", _measured(lower, here)
     masses = [name for name in ("torso_mass", "tail_mass") if name in model.parameters]
-    for times in HEAVIER:
-        changes = {name: times * np.asarray(model.parameters[name]) for name in masses}
-        yield f"masses times {times:g}", _measured(_with(whole, changes), start)
-    for mu in SLIPPERY:
-        yield f"mu {mu:g}", _measured(_with(whole, {"mu": mu}), start)
-
-
-def _with(sequence: Sequence, changes: dict[str, Any]) -> Sequence:
-    """Return a sequence of a model with other parameters."""
-    return replace(sequence, model=sequence.model.with_parameters(**changes))
+    for what, changes in (
+        *((f"masses times {k:g}", {m: k * model.parameters[m] for m in masses}) for k in HEAVIER),
+        *((f"mu {mu:g}", {"mu": mu}) for mu in SLIPPERY),
+    ):
+        other = model.with_parameters(**changes)
+        yield what, _measured(replace(sequence, model=other, phases=(push, held, land)), start)
 
 
 def _tracked(sequence: Sequence, run: SequenceRun) -> Phase:

@@ -160,21 +160,16 @@ def _check(leap: Any) -> None:
     if not isinstance(leap, Sequence) or len(leap.phases) != 3 or leap.gamma is None:
         raise refusal("leap", leap, "a Sequence of a model with feet, of 3 phases", SimulationError)
     push, flight, land = leap.phases
-    stretched = {BEFORE, "gamma", "delta"} <= {*[{}, *flight.moves][-1]}
-    wrong = {
-        f"until is {push.until!r}: needs {AIRBORNE!r}": (push, push.until != AIRBORNE),
-        "moves: needs one, with a duration": (push, not push.moves),
-        "plan: needs one": (flight, not flight.plan),
-        f"until is {flight.until!r}: needs {LANDING!r}": (flight, flight.until != LANDING),
-        f"moves: needs a last one, of gamma and delta, {BEFORE}": (flight, not stretched),
-        f"moves: needs one, at {TOUCH_DOWN!r}": (
-            land,
-            [move.get("at") for move in land.moves] != [TOUCH_DOWN],
-        ),
-    }
-    for needs, (phase, is_wrong) in wrong.items():
-        if is_wrong:
-            raise SimulationError(f"phase {phase.name!r}: {needs}: see docs/sequences.md")
+    last, lands = [{}, *flight.moves][-1], [move.get("at") for move in land.moves]
+    pushes = {move.get("at") for move in push.moves} - {TOUCH_DOWN}
+    for phase, is_right, needs in (
+        (push, push.until == AIRBORNE and pushes, f"moves, until = {AIRBORNE!r}"),
+        (flight, flight.plan and flight.until == LANDING, f"a plan, until = {LANDING!r}"),
+        (flight, {BEFORE, "gamma", "delta"} <= {*last}, f"a last move with {BEFORE}"),
+        (land, lands == [TOUCH_DOWN], f"one move, at {TOUCH_DOWN!r}"),
+    ):
+        if not is_right:
+            raise SimulationError(f"phase {phase.name!r}: needs {needs}: see docs/sequences.md")
     for k in range(3):
         unknowns_of(leap.phases, k)
 

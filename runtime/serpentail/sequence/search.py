@@ -15,7 +15,7 @@ from scipy.optimize import OptimizeResult, differential_evolution
 
 from serpentail_scene.layout import QUATERNION, TAIL_Q
 
-from ..basics.attitude import rotation_matrix
+from ..basics.attitude import tilt_deg
 from ..basics.errors import SimulationError
 from ..basics.progress import Stage
 from ..model.model import Model
@@ -89,9 +89,8 @@ def push_measures(sequence: Sequence, start: PhaseStart, aim: Any) -> dict[str, 
     """
     model, phase = sequence.model, sequence.phases[0]
     end = max(move["at"] + move["duration"] for move in phase.moves) + AFTER
-    motion = _run(
-        sequence, phase, start, Legs.moves(sequence.gamma, sequence.delta, phase.moves), end
-    )
+    first = sequence.gamma, sequence.delta
+    motion = _run(sequence, phase, start, Legs.moves(*first, phase.moves), end)
     assert motion.contact is not None
     if motion.contact.forces[-1, :, 2].max() > 0:
         raise SimulationError("push: still on the ground")
@@ -106,7 +105,7 @@ def push_measures(sequence: Sequence, start: PhaseStart, aim: Any) -> dict[str, 
         "push": _weights(model, motion),
         "rise": float(up @ (ends[1] - ends[0]) + speed * abs(speed) / (2 * g)),
         "spin": float(np.linalg.norm(spin)),
-        "leg_rate": leg_rate((sequence.gamma, sequence.delta), sequence.phases[:1]),
+        "leg_rate": leg_rate(first, [phase]),
     } | _flight_measures(sequence, motion, aim)
 
 
@@ -117,10 +116,8 @@ def _flight_measures(sequence: Sequence, push: Trajectory, aim: Any) -> dict[str
     model, (first, flight, _) = sequence.model, sequence.phases
     goal = checked_goal(flight.plan[0].get("goal"), model.layout.nt)
     state, angles = (push.q[-1], push.v[-1]), sequence.last_angles(flight, first.moves)
-    tails = [
-        state[0][TAIL_Q],
-        0 * state[0][TAIL_Q] if goal.tail is None else np.nan_to_num(goal.tail),
-    ]
+    tail = state[0][TAIL_Q]
+    tails = [tail, 0 * tail if goal.tail is None else np.nan_to_num(goal.tail)]
     follows = replace(flight, controller=Pfl(model, Reference([0.0, SWINGS], tails)))
     start, end = PhaseStart(0.0, *state, None), landing_time(model, state, goal, angles)
     motion = _run(sequence, follows, start, Legs.fixed(*angles), end)
@@ -137,12 +134,12 @@ def landing_measures(sequence: Sequence, touch: PhaseStart) -> dict[str, float]:
     tilt (rad), leg_rate (rad/s); lean (deg) and the share of the weight on the feet at the end.
     """
     model, (push, flight, phase) = sequence.model, sequence.phases
-    stretched = sequence.last_angles(flight, push.moves)
-    angles = np.array([*stretched, *stretched, *np.zeros(4)])
+    gamma, delta = sequence.last_angles(flight, push.moves).tolist()
+    angles = np.array([gamma, delta, gamma, delta, *np.zeros(4)])
     points, _ = model.contact_points(touch.q, touch.v, angles)
     q = touch.q.copy()
     q[2] += ABOVE - np.asarray(points)[:, 2].min()
-    legs = Legs.moves(stretched[0], stretched[1], phase.moves)
+    legs = Legs.moves(gamma, delta, phase.moves)
     motion = _run(sequence, phase, replace(touch, q=q), legs, LANDING)
     assert motion.contact is not None
     tilts = tilt(motion)
@@ -150,16 +147,15 @@ def landing_measures(sequence: Sequence, touch: PhaseStart) -> dict[str, float]:
     return {
         "landing": _weights(model, motion),
         "tilt": float(tilts.max()),
-        "leg_rate": leg_rate((stretched[0], stretched[1]), [phase]),
+        "leg_rate": leg_rate((gamma, delta), [phase]),
         "lean": float(np.degrees(tilts[-1])),
         "carried": float(carried / weight_of(model.parameters)),
     }
 
 
 def tilt(motion: Trajectory) -> np.ndarray:
-    """Return how far (rad) the torso's z axis is from upright, in each sample."""
-    up = rotation_matrix(motion.q[:, QUATERNION])[:, 2, 2]
-    return np.asarray(np.arccos(np.clip(up, -1.0, 1.0)))
+    """Return the angle (rad) of the torso's z axis from the vertical in each sample."""
+    return np.radians(tilt_deg(motion.attitude))
 
 
 def _weights(model: Model, motion: Trajectory) -> float:

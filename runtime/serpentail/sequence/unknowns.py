@@ -60,7 +60,7 @@ def leg_rate(angles: tuple[float, float], phases: Sequence[Phase]) -> float:
     """Return the largest rate (rad/s) of the legs in all moves, from their first angles on."""
     gamma, delta, fastest = *angles, 0.0
     for move in (move for phase in phases for move in phase.moves):
-        goal = move.get("gamma", gamma), move.get("delta", delta)
+        goal = float(move.get("gamma", gamma)), float(move.get("delta", delta))
         way = max(abs(goal[0] - gamma), abs(goal[1] - delta))
         fastest = max(fastest, FASTEST[move.get("shape", "linear")] * way / move["duration"])
         gamma, delta = goal

@@ -11,7 +11,8 @@ from ..motion.landing import MIN_SHARE, MIN_UPRIGHT
 
 LIMITS = {"push": "", "landing": "", "spin": "kg m^2/s", "tilt": "rad", "leg_rate": "rad/s"}
 BEST = ("rise", "softness", "spin")  # what may be made as large, or as small, as it can be
-PAID, EVEN = 10.0, 0.1  # of a share beyond MARGIN, and of squares, in the cost; the best counts 1
+PAID = 10.0  # weight, in the cost, of a share beyond MARGIN; what is to be best has about 1
+EVEN = 0.1  # of the mean square of all shares, if nothing is to be best
 ENOUGH = 0.1  # cost of what keeps all margins and is not best
 MARGIN = 0.9  # share of a limit that a search keeps
 NEARLY = 0.99  # the same of a rise: less than its goal by a hair more
@@ -51,25 +52,18 @@ class Wanted:
             shares["carried"] = 2 - measures["carried"] / MIN_SHARE
         if "miss" in measures:
             shares["miss"] = measures["miss"] / MISS
-        if (
-            self.rise is not None and "rise" in shares and self.best != "rise"
-        ):  # higher than needed lands harder
-            shares["too high"] = measures["rise"] / (HIGHER * self.rise)
+        if "rise" in shares and self.best != "rise":  # higher than needed, it lands harder
+            shares["too high"] = (2 - shares["rise"]) / HIGHER
         margins = dict.fromkeys(shares, MARGIN) | {"rise": NEARLY, "too high": 1.0}
         cost = PAID * sum(max(0.0, share - margins[name]) for name, share in shares.items())
         if self.best is None:
             return cost + EVEN * sum(share**2 for share in shares.values()) / max(len(shares), 1)
-        return cost + self._worse(measures)
-
-    def _worse(self, measures: Mapping[str, float]) -> float:
-        """Return how much worse than the best a motion is, in a scale of about 1."""
-        if self.best == "rise" and "rise" in measures:
-            return -measures["rise"]
-        if self.best == "spin" and "spin" in measures:
-            return 1e3 * measures["spin"]
-        if self.best == "softness":
-            return 0.02 * max(measures.get(name, 0.0) for name in ("push", "landing"))
-        return 0.0
+        worse = {
+            "rise": -measures.get("rise", 0.0),
+            "spin": 1e3 * measures.get("spin", 0.0),
+            "softness": 0.02 * max(measures.get(name, 0.0) for name in ("push", "landing")),
+        }
+        return cost + worse[self.best]
 
 
 def wanted_of(limits: Any, goal: Any, best: Any) -> Wanted:

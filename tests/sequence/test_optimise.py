@@ -1,0 +1,70 @@
+"""A jump that is made for its landing keeps its limits and reaches its goals, as the summary of its
+motion says; its first guess does not. What cannot be is refused.
+"""
+
+from dataclasses import replace
+from math import pi, radians
+
+import numpy as np
+import pytest
+
+import serpentail as st
+from tests.sequence.test_phases import DAMPING, kick, rat, sequence, settled
+from tests.support.rows import row
+
+PUSH = {"at": 0.02, "gamma": 4.4, "delta": -0.6, "duration": 0.032, "shape": "accelerate"}
+STRETCH = {"before_landing": 0.12, "gamma": 3.93, "delta": -1.13, "duration": 0.08}
+YIELD = {"at": "touch_down", "gamma": 3.93, "delta": -0.35, "duration": 0.03}
+GOAL = st.Goal(torso_rate=None, tail=[radians(-20), 0.0], tail_rate=[0.0, 0.0])
+PLAN = {"goal": GOAL, "bounds": st.Bounds(angle=(pi / 3, 1e-3), torque=0.02)}
+
+
+def leap():
+    """A push, a flight in its plane, and legs that yield."""
+    flight = st.Phase("flight", 1.5, until="landing", plan=PLAN, moves=[STRETCH])
+    land = st.Phase("land", 1.0, controller=DAMPING, moves=[YIELD | {"shape": "decelerate"}])
+    return sequence(kick(moves=[PUSH]), flight, land)
+
+
+@pytest.mark.slow  # some 1000 runs and a plan
+def test_what_is_found_keeps_its_limits():
+    limits = {"push": 20, "landing": 22, "tilt": "60 deg", "spin": 3e-4}
+    found = st.optimise(leap(), *settled(), limits=limits, goal={"rise": 0.25}, time_limit=600)
+    first = leap().simulate(*settled())
+    assert st.summary(rat(), first.trajectory)["com_rise_m"] < 0.25
+    again = found.sequence.simulate(*settled())
+    told, measures = st.summary(rat(), again.trajectory), found.report["measures"]
+    assert found.success and again.complete and told["landed"]
+    assert told["com_rise_m"] == pytest.approx(measures["rise"]) and told["com_rise_m"] >= 0.25
+    assert told["tilt_max_deg"] <= 60 and again.phases[1].plan.success
+    assert np.linalg.norm(told["angular_momentum_at_take_off"]) <= 3e-4
+    force = told["peak_ground_force_weights"]
+    assert force == pytest.approx(max(measures["push"], measures["landing"])) and force <= 22
+    assert {doubt.partition(": ")[0] for doubt in found.doubts} <= {*found.report["repeats"]}
+    assert len(found.report["repeats"]) == 6
+
+
+def test_what_cannot_be_is_refused():
+    def of(k, **changes):
+        phases = [*leap().phases]
+        return replace(
+            leap(), phases=[*phases[:k], replace(phases[k], **changes), *phases[k + 1 :]]
+        )
+
+    for given, settings, told in (
+        (leap(), {"goal": {"rise": 0.4}, "limits": {"push": 5}}, "limits.push: value 5"),
+        (leap(), {"limits": {"landing": 0.5}}, "limits.landing: value 0.5"),
+        (leap(), {"limits": {"height": 1}}, "'height'"),
+        (leap(), {"goal": {"rise": -1.0}}, "goal.rise: value -1.0"),
+        (leap(), {"best": "speed"}, "best: value 'speed'"),
+        (sequence(kick()), {}, "leap"),
+        (
+            of(0, moves=[{"at": 0.1, "delta": -1.0, "rate": 70.0}]),
+            {},
+            "moves\\[0\\].rate: value 70",
+        ),
+        (of(2, moves=[]), {}, "'land'.*touch_down"),
+        (of(1, plan=None, moves=[]), {}, "'flight'.*plan"),
+    ):
+        with row(told), pytest.raises(st.SimulationError, match=told):
+            st.optimise(given, *settled(), **settings)
