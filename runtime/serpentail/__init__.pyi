@@ -53,6 +53,8 @@ from .sequence.sequence import Sequence as Sequence
 from .sequence.run import SequenceRun as SequenceRun
 from .sequence.phase import Phase as Phase
 from .sequence.phase import Tracking as Tracking
+from .sequence.optimise import optimise as optimise
+from .sequence.leap import Leap as Leap
 from .identification.identify import identify as identify
 from .identification.result import Identification as Identification
 from .identification.placement import Marker as Marker
