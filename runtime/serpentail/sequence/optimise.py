@@ -116,7 +116,9 @@ def optimise(
             break
         flies = _flies(run, wanted)
         if not flies:
-            less = {"spin": LESS * measures["spin"], "tilt": LESS * asked.limits.get("tilt", pi)}
+            less = {"tilt": LESS * asked.limits.get("tilt", pi)}
+            if measures["spin"] > 0:  # it has left the ground
+                less["spin"] = LESS * measures["spin"]
             asked = replace(asked, limits={**asked.limits, **less})
 
     found = min(reversed(kept), key=lambda each: len(each.doubts))
