@@ -94,11 +94,10 @@ def optimise(
     q, v = (np.asarray(part, float) for part in parted(leap.model, q0, v0)[0])
     start = PhaseStart(0.0, q, v, bristles0)
     _refuse_short_legs(leap, start, wanted)
-
     leap, aim = _freed(leap)
     push = partial(push_measures, start=start, aim=aim)
 
-    # the push, then the landing from where that comes down; a push again if no flight is true
+    # the push, then the landing from where that comes down; a push again if that is not right
     kept: list[Leap] = []
     flies, asked = False, wanted
     for turn in range(TURNS):
@@ -110,11 +109,10 @@ def optimise(
         run = leap.simulate(q, v, bristles0)
         measures = measures_of(leap, run)
         kept.append(Leap(leap, run, {"measures": measures}, tuple(missed(wanted, measures))))
-        if (
-            kept[-1].success and (best is None or turn > 0)
-        ) or time.monotonic() > begun + time_limit:
+        late = time.monotonic() > begun + time_limit
+        if late or (kept[-1].success and (best is None or turn > 0)):
             break
-        flies = _flies(run, wanted)
+        flies = _flies(run, wanted, measures)
         if not flies:
             less = {"tilt": LESS * asked.limits.get("tilt", pi)}
             if measures["spin"] > 0:  # it has left the ground
@@ -140,13 +138,13 @@ def _freed(leap: Sequence) -> tuple[Sequence, Any]:
     return replace(leap, phases=(push, replace(flight, plan=plan), land)), goal.attitude
 
 
-def _flies(run: SequenceRun, wanted: Wanted) -> bool:
-    """Tell whether a flight is planned, comes down, and is never tilted too far."""
-    plan = run.phases[1].plan if len(run.phases) == 3 else None
-    if plan is None or not plan.success:
+def _flies(run: SequenceRun, wanted: Wanted, measures: Mapping[str, Any]) -> bool:
+    """Tell whether a push is right: its flight is planned, comes down and never tilts too far."""
+    if len(run.phases) < 3 or not measures["planned"]:
         return False
     tilts = tilt(run.trajectory)[run.trajectory.t <= run.phases[2].begin]
-    return bool(tilts.max() < wanted.limits.get("tilt", np.inf))
+    shares = wanted.shares({**measures, "tilt": tilts.max()})
+    return all(shares.get(name, 0.0) <= 1 for name in ("push", "rise", "spin", "tilt"))
 
 
 def _landing(leap: Sequence, run: SequenceRun, wanted: Wanted, end: float, seed: int) -> Sequence:
