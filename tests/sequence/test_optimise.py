@@ -1,6 +1,4 @@
-"""A jump that is made for its landing keeps its limits and reaches its goals, as the summary of its
-motion says; its first guess does not. What cannot be is refused.
-"""
+"""A jump made for its landing keeps its limits, as the summary says; its first guess does not."""
 
 from dataclasses import replace
 from math import pi, radians
@@ -29,9 +27,9 @@ def leap():
 @pytest.mark.slow  # some 1000 runs and a plan
 def test_what_is_found_keeps_its_limits():
     limits = {"push": 20, "landing": 22, "tilt": "60 deg", "spin": 3e-4}
-    found = st.optimise(leap(), *settled(), limits=limits, goal={"rise": 0.25}, time_limit=600)
     first = leap().simulate(*settled())
     assert st.summary(rat(), first.trajectory)["com_rise_m"] < 0.25
+    found = st.optimise(leap(), *settled(), limits=limits, goal={"rise": 0.25}, time_limit=600)
     again = found.sequence.simulate(*settled())
     told, measures = st.summary(rat(), again.trajectory), found.report["measures"]
     assert found.success and again.complete and told["landed"]
@@ -41,7 +39,6 @@ def test_what_is_found_keeps_its_limits():
     force = told["peak_ground_force_weights"]
     assert force == pytest.approx(max(measures["push"], measures["landing"])) and force <= 22
     assert {doubt.partition(": ")[0] for doubt in found.doubts} <= {*found.report["repeats"]}
-    assert len(found.report["repeats"]) == 6
 
 
 def test_what_cannot_be_is_refused():
@@ -54,7 +51,6 @@ def test_what_cannot_be_is_refused():
     for given, settings, told in (
         (leap(), {"goal": {"rise": 0.4}, "limits": {"push": 2}}, "limits.push: value 2"),
         (leap(), {"limits": {"landing": 0.5}}, "limits.landing: value 0.5"),
-        (leap(), {"limits": {"height": 1}}, "'height'"),
         (leap(), {"goal": {"rise": -1.0}}, "goal.rise: value -1.0"),
         (leap(), {"best": "speed"}, "best: value 'speed'"),
         (sequence(kick()), {}, "leap"),

@@ -29,7 +29,7 @@ from ..simulation.simulate import simulate
 from .flight import landing_time
 from .phase import Phase
 from .sequence import PhaseStart, Sequence
-from .unknowns import Unknown, leg_rate, with_numbers
+from .unknowns import MoveNumber, leg_rate, with_numbers
 from .wanted import Wanted
 
 PEOPLE, ROUNDS = 8, 25  # tries of a round for each number; most rounds
@@ -45,7 +45,7 @@ RTOL = 1e-4  # of the searches; the leap itself has the sequence's own
 
 def searched(
     sequence: Sequence,
-    unknowns: list[Unknown],
+    unknowns: list[MoveNumber],
     measured: Measured,
     wanted: Wanted,
     end: float,

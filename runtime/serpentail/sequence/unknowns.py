@@ -14,7 +14,7 @@ LONGER = 2.0  # times, that a duration may become longer or shorter
 
 
 @dataclass(frozen=True)
-class Unknown:
+class MoveNumber:
     """A number of a move: its phase, move and key, and its first guess (rad or s)."""
 
     phase: int
@@ -30,7 +30,7 @@ class Unknown:
         return self.guess - ANGLE, self.guess + ANGLE
 
 
-def unknowns_of(phases: Sequence[Phase], k: int) -> list[Unknown]:
+def unknowns_of(phases: Sequence[Phase], k: int) -> list[MoveNumber]:
     """Return the angles of all moves of phase k, and durations of moves on the ground.
 
     SimulationError about moves that have a rate in place of a duration.
@@ -42,12 +42,12 @@ def unknowns_of(phases: Sequence[Phase], k: int) -> list[Unknown]:
             remedy = "optimise changes durations: give duration, and limits.leg_rate"
             raise SimulationError(f"{field}: value {move['rate']}: {remedy}")
         keys = ("gamma", "delta") if BEFORE in move else ("gamma", "delta", "duration")
-        found += [Unknown(k, j, key, float(move[key])) for key in keys if key in move]
+        found += [MoveNumber(k, j, key, float(move[key])) for key in keys if key in move]
     return found
 
 
 def with_numbers(
-    phases: Sequence[Phase], unknowns: Sequence[Unknown], x: np.ndarray
+    phases: Sequence[Phase], unknowns: Sequence[MoveNumber], x: np.ndarray
 ) -> tuple[Phase, ...]:
     """Return phases whose moves have the numbers x."""
     moves = [[{**move} for move in phase.moves] for phase in phases]

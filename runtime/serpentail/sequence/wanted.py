@@ -75,8 +75,8 @@ def wanted_of(limits: Any, goal: Any, best: Any) -> Wanted:
     for name, value in limits.items():
         one_of("limits: name", name, LIMITS, SimulationError)
         least = {"least": 1.0} if name in ("push", "landing") else {"above": 0.0}
-        field = f"limits.{name}"
-        checked[name] = number(field, value, SimulationError, unit=LIMITS[name], **least)
+        unit = LIMITS[name]
+        checked[name] = number(f"limits.{name}", value, SimulationError, unit=unit, **least)
     for name in goal:
         one_of("goal: name", name, ("rise", "standing"), SimulationError)
     rise = goal.get("rise")
