@@ -53,7 +53,8 @@ for best, each in found.items():
     )
 
 # %%
-# A higher jump needs a stronger push, and a softer one a longer one.
+# A higher jump needs a stronger push and faster legs. The spin hardly differs: with
+# little of it, just so much is left as turns the torso upright until it lands.
 
 plt.style.use("seaborn-v0_8-colorblind")
 figure, axes = plt.subplots(3, 1, figsize=(7, 6.4), sharex=True, layout="constrained")

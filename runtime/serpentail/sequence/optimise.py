@@ -114,9 +114,7 @@ def optimise(
             break
         flies = _flies(run, wanted, measures)
         if not flies:
-            less = {"tilt": LESS * asked.limits.get("tilt", pi)}
-            if measures["spin"] > 0:  # it has left the ground
-                less["spin"] = LESS * measures["spin"]
+            less = {k: LESS * asked.limits[k] for k in ("spin", "tilt") if k in asked.limits}
             asked = replace(asked, limits={**asked.limits, **less})
 
     found = min(reversed(kept), key=lambda each: len(each.doubts))
