@@ -81,7 +81,6 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
     problems += chains.problems
     values |= {"chains": chains.chains, "parameters": chains.parameters}
     ordered, unknown = contacts_in_order(contacts, values["chain"])
-    problems += unknown
     for describe in (tail_description, tendons_of):
         found = describe(kind, values)
         values |= found.values
@@ -89,7 +88,7 @@ def parse_scene(table: Mapping[str, Any], name: str) -> Scene:
     problems += [*key_problems(values), *kind_problems(table, kind)]
     problems += function_problems(values["functions"]) + contact_problems(table, values, contacts)
     problems += polar_problems(table, kind, contacts, values["functions"])
-    problems += fixed_problems(values, contacts)
+    problems += fixed_problems(values, contacts) + unknown
 
     # the kind and the contacts determine which parameters there are
     links = min(sum(values["shape"].counts) or tail_pieces(values), MOST_LINKS)

@@ -59,7 +59,8 @@ def scene_path(scene: str | PathLike[str]) -> Path:
     known = example_paths()
     if str(path) in known:
         return known[str(path)]
-    remedy = did_you_mean(str(path), known) or f"the examples are {', '.join(known)}"
+    listed = f"`serpentail examples` lists {len(known)}, such as kick"
+    remedy = did_you_mean(str(path), known) or listed
     raise SerpentailError(
         f"scene file: value {shown(str(path))}: is neither a file nor an example; {remedy}"
     )
