@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from serpentail_scene.layout import TAIL_Q, TAIL_V
-
 from ...basics.errors import PlanningError, SimulationError
 from ...basics.near_names import NearNames
 from ...model.model import Model
@@ -125,6 +123,13 @@ class Plan(NearNames):
         """Duration (s)."""
         return self.curve.duration
 
+    @property
+    def controller(self) -> Controller:
+        """The planned torques or tensions less the problem's damping, applied open loop: a controller
+        for ``simulate``, in C. They are held after the end.
+        """
+        return planned_law(self.curve, self.problem.damping)
+
     @cached_property
     def gains(self) -> "Gains":
         """Feedback along the plan, a controller for ``simulate``; made when it is first needed.
@@ -232,29 +237,6 @@ class Plan(NearNames):
 
     def _at(self, times: ArrayLike) -> dict[str, np.ndarray]:
         return self.curve.at(np.atleast_1d(np.asarray(times, float)))
-
-    def controller(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Return the open-loop torques, a controller for ``simulate``.
-
-        They are the planned torques, or those of the planned tensions, less the problem's damping.
-
-        Parameters
-        ----------
-        t : float
-            Time from the start (s).
-        q : array_like, shape (nq,)
-            Configuration, on which the torques of tensions depend.
-        v : ndarray, shape (nv,)
-            Velocity.
-
-        Returns
-        -------
-        ndarray, shape (2m,)
-            Torques (N m).
-        """
-        planned = self._at(min(max(t, 0.0), self.duration))
-        torques = torques_of(self.trajectory.model, planned | {"tail": q[None, TAIL_Q]})
-        return torques[0] - self.problem.damping * v[TAIL_V]
 
 
 def _digits(value: Any) -> str:
