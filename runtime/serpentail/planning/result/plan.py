@@ -125,8 +125,9 @@ class Plan(NearNames):
 
     @property
     def controller(self) -> Controller:
-        """The planned torques or tensions less the problem's damping, applied open loop: a controller
-        for ``simulate``, in C. They are held after the end.
+        """The planned torques or tensions, less the problem's damping: a controller in C, open loop.
+
+        They are held after the end.
         """
         return planned_law(self.curve, self.problem.damping)
 
