@@ -53,6 +53,7 @@ BOUNDS = {
     "rate": _bound("rad/s"),
     "torque": _bound("N m"),
     "torque_rate": _bound("N m/s"),
+    "tension": _bound("N"),
     "speed": _bound("rad/s"),
     "power": _bound("W"),
 }

@@ -125,7 +125,7 @@ class Plan(NearNames):
 
     @property
     def controller(self) -> Controller:
-        """The planned torques or tensions, less the problem's damping: a controller in C, open loop.
+        """The planned torques or tensions, less the problem's damping: open loop, in C.
 
         They are held after the end.
         """
