@@ -30,9 +30,10 @@ def urdf(model: Model) -> bytes:
     """Return the file; ExportError if the tail has springs, or is not a chain of rigid links."""
     bodies, capsule = bodies_of(model, "urdf"), torso_capsule(model)
     if any(own.stiffness for own in bodies.passive.values()):
+        springs = [n for n in model.parameters if n.endswith("_stiffness") and "stop" not in n]
         raise ExportError(
-            f"kind: value 'urdf': needs a tail without springs ({model.name}), which URDF lacks: "
-            'export an "mjcf", or load the model with tail_stiffness = 0'
+            f"kind: value 'urdf': needs chains without springs ({model.name}), which URDF lacks: "
+            f'export an "mjcf", or load the model with {" = 0, ".join(springs)} = 0'
         )
     robot = Xml.Element("robot", name=model.name)
     robot.append(Xml.Comment(origin(model, STOPS)))
