@@ -123,6 +123,14 @@ def test_a_rat_on_its_back_stands_up_by_its_tail():
 # Starts, schedules and controllers of tables.
 
 
+@pytest.mark.slow
+def test_a_rat_stands_on_a_slope_that_friction_holds_and_else_slides():
+    for mu in (0.8, 0.2):
+        scene = st.scenario("slope", changes={"mu": mu})
+        assert st.summary(scene.model, scene.simulate())["standing_end"] == (mu > np.tan(0.35))
+
+
+
 def test_bends_are_shared_among_links(scenario):
     times = "[simulate.reference]\ntimes = [0.01, 0.02]\n"
     with pytest.raises(st.SimulationError, match="bends"):
