@@ -11,6 +11,7 @@ from ..model.tendons import tendons_of
 from ..optimal.terms import Terms, terms_of
 from ..simulation.controllers.controller import TensionCurve, TorqueCurve
 from ..simulation.controllers.piecewise import Piecewise
+from .design import Design
 from .program.body import BodyFunctions
 from .program.cache import memoised
 from .program.coordinates import IDENTITY_POSE
@@ -64,15 +65,16 @@ def torque_expression(body: BodyFunctions, tail: "ca.SX", tension: "ca.SX") -> "
     return body.call("tendon_torques", ca.vertcat(ca.DM(IDENTITY_POSE), tail), tension)
 
 
-def pull_terms(model: Model, body: BodyFunctions) -> Terms:
-    """Return the torques as terms of tail coordinates and tensions."""
+def pull_terms(model: Model, states: int) -> Terms:
+    """Return (x, torques) as terms of a node's states x and tensions."""
 
     def made() -> Terms:
         import casadi as ca
 
-        tail, tension = (ca.SX.sym(n, k) for n, k in (("tail", model.layout.nt), input_of(model)))
-        torque = torque_expression(body, tail, tension)
-        return terms_of(ca.vertcat(tail, tension), ca.SX(0, 1), torque)
+        body, tail = BodyFunctions(model, Design(), None), slice(4, 4 + model.layout.nt)
+        x, tension = ca.SX.sym("x", states), ca.SX.sym(*input_of(model))
+        torque = torque_expression(body, x[tail], tension)
+        return terms_of(ca.vertcat(x, tension), ca.SX(0, 1), ca.vertcat(x, torque))
 
     return memoised(("pull", model), made)
 

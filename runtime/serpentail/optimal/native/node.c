@@ -9,9 +9,9 @@
 /* Sizes, and where in the scratch is what. */
 typedef struct {
     int zeta, y, e, terms; /* of (x, omega, u, p), of terms */
-    int air, air_y, raw, pulled; /* of airborne zeta and y; with torques; of (q_t, tensions) */
+    int air, air_y, raw; /* of airborne zeta and y; of zeta with torques, not tensions */
     double *z, *tau, *air_out, *air_J, *air_H, *air_mu, *e_in, *out, *out_J, *out_H, *out_mu, *work;
-    double *raw_J, *raw_H, *half, *pull, *pull_in, *pull_J, *pull_H, *pull_mu;
+    double *raw_J, *raw_H, *half, *pull, *pull_J, *pull_mu;
 } Places;
 
 /* Length of the airborne state, with which x begins. */
@@ -26,9 +26,8 @@ static Places places_of(const Node *node, double *scratch)
     const int m = node->tail;
     at.zeta = zeta_of(node);
     at.y = y_of_node(node);
-    at.pulled = node->tendons > 0 ? m + node->tendons : 0;
     at.raw = m > 0 ? airborne_of(node) + m : 0;
-    at.air = at.pulled > 0 ? airborne_of(node) + node->tendons : at.raw;
+    at.air = node->tendons > 0 ? airborne_of(node) + node->tendons : at.raw;
     at.air_y = m > 0 ? airborne_of(node) + TURN : 0;
     at.e = at.zeta + (m > 0 ? TURN : 0);
     at.terms = (m > 0 ? 0 : node->states) + node->rows + 1;
@@ -43,17 +42,15 @@ static Places places_of(const Node *node, double *scratch)
     at.out_mu = at.out + at.terms;
     at.out_J = at.out_mu + at.terms;
     at.out_H = at.out_J + (size_t)at.terms * at.e;
-    at.pull = at.out_H + (size_t)at.e * at.e;
-    at.pull_mu = at.pull + (at.pulled > 0 ? m : 0);
-    at.pull_in = at.pull_mu + (at.pulled > 0 ? m : 0);
-    at.pull_J = at.pull_in + at.pulled;
-    at.pull_H = at.pull_J + (size_t)m * at.pulled;
-    at.half = at.pull_H + (size_t)at.pulled * at.pulled;
-    at.work = at.half + (at.pulled > 0 ? (size_t)at.raw * at.air : 0);
+    at.work = at.out_H + (size_t)at.e * at.e;
     at.raw_J = at.air_J;
     at.raw_H = at.air_H;
-    if (at.pulled > 0) {
-        at.raw_J = at.work;
+    if (node->tendons > 0) {
+        at.pull = at.work;
+        at.pull_mu = at.pull + at.raw;
+        at.pull_J = at.pull_mu + at.raw;
+        at.half = at.pull_J + (size_t)at.raw * at.air;
+        at.raw_J = at.half + (size_t)at.raw * at.air;
         at.raw_H = at.raw_J + (size_t)at.air_y * at.raw;
         at.work = at.raw_H + (size_t)at.raw * at.raw;
     }
@@ -76,17 +73,14 @@ static int finite(const double *values, size_t count)
     return 1;
 }
 
-/* Torques of tensions, 0 where all is finite; order 2: weighed by pull_mu. */
+/* (x, torques) of (x, tensions), 0 where all is finite; order 2: weighed by pull_mu, to air_H. */
 static int evaluate_pull(const Node *node, Places at, int order)
 {
-    const double *arg[8] = {at.pull_in, at.pull_mu};
-    double *res[8] = {at.pull, at.pull_J, at.pull_H};
-    const int m = node->tail;
-    memcpy(at.pull_in, at.z + ATTITUDE, (size_t)m * sizeof *at.z);
-    memcpy(at.pull_in + m, at.z + airborne_of(node), (size_t)node->tendons * sizeof *at.z);
+    const double *arg[8] = {at.z, at.pull_mu};
+    double *res[8] = {at.pull, at.pull_J, at.air_H};
     return (order == 2 ? node->pull_twice : order == 1 ? node->pull_slopes : node->pull)(
                arg, res, NULL, NULL, 0)
-        || !finite(at.pull, (size_t)m);
+        || !finite(at.pull, (size_t)at.raw);
 }
 
 /* zeta in SI; the torques in truth are tau - damping q_t_dot, in tau. */
@@ -104,10 +98,10 @@ static int in_si(const Node *node, Places at, const double *x, const double *u, 
     for (int j = 0; j < node->constants; j++) {
         z[states + controls + j] = node->units[states + controls + j] * p[j];
     }
-    if (at.pulled > 0 && evaluate_pull(node, at, slopes) != 0) {
+    if (node->tendons > 0 && evaluate_pull(node, at, slopes) != 0) {
         return 1;
     }
-    const double *given = at.pulled > 0 ? at.pull : z + airborne_of(node);
+    const double *given = (node->tendons > 0 ? at.pull : z) + airborne_of(node);
     for (int a = 0; a < m; a++) {
         tau[a] = given[a] - node->damping * z[ATTITUDE + m + a];
     }
@@ -174,47 +168,30 @@ static void damp_rows(const Node *node, double *H, int columns)
     }
 }
 
-/* Rows by (x, torques) as rows by (x, tensions). */
-static void chain_columns(const Node *node, Places at, const double *raw, int count, double *rows)
+/* Rows by (x, torques) as rows by (x, tensions): times P, the slopes of the former. */
+static void chain_rows(Places at, const double *raw, int count, double *rows)
 {
-    const int m = node->tail, own = airborne_of(node);
-    for (int i = 0; i < count; i++) {
-        const double *from = raw + (size_t)i * at.raw;
-        double *to = rows + (size_t)i * at.air;
-        memcpy(to, from, (size_t)own * sizeof *to);
-        memset(to + own, 0, (size_t)node->tendons * sizeof *to);
-        for (int a = 0; a < m; a++) {
-            const double *slope = at.pull_J + (size_t)a * at.pulled;
-            add(m, from[own + a], slope, to + ATTITUDE);
-            add(node->tendons, from[own + a], slope + m, to + own);
-        }
+    memset(rows, 0, (size_t)count * at.air * sizeof *rows);
+    for (int i = 0; i < count * at.raw; i++) {
+        add(at.air, raw[i], at.pull_J + (size_t)(i % at.raw) * at.air,
+            rows + (size_t)(i / at.raw) * at.air);
     }
 }
 
 /* H by (x, torques) as that by (x, tensions): P^T H P and the torques' own curvature. */
 static int chain_curvature(const Node *node, Places at)
 {
-    const int m = node->tail, own = airborne_of(node);
-    memset(at.pull_mu, 0, (size_t)m * sizeof *at.pull_mu);
+    memset(at.pull_mu, 0, (size_t)at.raw * sizeof *at.pull_mu);
     for (int i = 0; i < at.air_y; i++) {
-        add(m, at.air_mu[i], at.raw_J + (size_t)i * at.raw + own, at.pull_mu);
+        add(at.raw, at.air_mu[i], at.raw_J + (size_t)i * at.raw, at.pull_mu);
     }
     if (evaluate_pull(node, at, 2) != 0) {
         return 1;
     }
-    chain_columns(node, at, at.raw_H, at.raw, at.half);
-    memcpy(at.air_H, at.half, (size_t)own * at.air * sizeof *at.half);
-    memset(at.air_H + (size_t)own * at.air, 0,
-           (size_t)node->tendons * at.air * sizeof *at.half);
-    for (int i = 0; i < at.pulled; i++) {
-        const int row = i < m ? ATTITUDE + i : own + i - m;
-        double *H = at.air_H + (size_t)row * at.air;
-        for (int a = 0; a < m; a++) {
-            add(at.air, at.pull_J[(size_t)a * at.pulled + i], at.half + (size_t)(own + a) * at.air,
-                H);
-        }
-        add(m, 1.0, at.pull_H + (size_t)i * at.pulled, H + ATTITUDE);
-        add(node->tendons, 1.0, at.pull_H + (size_t)i * at.pulled + m, H + own);
+    chain_rows(at, at.raw_H, at.raw, at.half);
+    for (int i = 0; i < at.raw * at.air; i++) {
+        add(at.air, at.pull_J[i], at.half + (size_t)(i / at.air) * at.air,
+            at.air_H + (size_t)(i % at.air) * at.air);
     }
     return 0;
 }
@@ -362,10 +339,10 @@ int node_evaluate(const Node *node, const double *x, const double *u, const doub
             damp_columns(node, at.raw_H, at.raw, at.raw);
             damp_rows(node, at.raw_H, at.raw);
         }
-        if (at.pulled > 0 && order > 0) {
-            chain_columns(node, at, at.raw_J, at.air_y, at.air_J);
+        if (node->tendons > 0 && order > 0) {
+            chain_rows(at, at.raw_J, at.air_y, at.air_J);
         }
-        if (at.pulled > 0 && order == 2 && chain_curvature(node, at) != 0) {
+        if (node->tendons > 0 && order == 2 && chain_curvature(node, at) != 0) {
             return 1;
         }
     }

@@ -48,7 +48,7 @@ typedef struct {
     const double *units;         /* (x, u, p) */
     const double *y_units;       /* (rates, rows, cost) */
     int tendons;                 /* 0: the inputs after the airborne state are the torques; else */
-    Terms pull, pull_slopes, pull_twice; /* they are tensions, and torques are these of (q_t, T) */
+    Terms pull, pull_slopes, pull_twice; /* they are tensions, and this is (x, torques) of (x, T) */
 } Node;
 
 static inline int zeta_of(const Node *node)

@@ -184,9 +184,9 @@ class FlightDynamics:
                 "work": max(model.manifest["work"][name] for name in FUNCTIONS.values()),
             }
             if variables.input == TENSION:
-                pull = pull_terms(model, BodyFunctions(model, variables.design, None)).functions
-                names = zip(("pull", "pull_slopes", "pull_twice"), pull.values(), strict=True)
-                airborne |= {"tendons": len(variables.units[TENSION]), **dict(names)}
+                pull = pull_terms(model, variables.size(variables.states)).functions.values()
+                airborne |= zip(("pull", "pull_slopes", "pull_twice"), pull, strict=True)
+                airborne["tendons"] = len(variables.units[TENSION])
             arrays = {"parameters": model.parameter_vector, "momentum": self.conserved[:3]}
         parts = (*variables.states, *variables.controls, *variables.constants)
         return OcpNode(
