@@ -169,12 +169,15 @@ static void damp_rows(const Node *node, double *H, int columns)
 }
 
 /* Rows by (x, torques) as rows by (x, tensions): times P, the slopes of the former. */
-static void chain_rows(Places at, const double *raw, int count, double *rows)
+static void chain_rows(const Node *node, Places at, const double *raw, int count, double *rows)
 {
+    const int own = airborne_of(node);
     memset(rows, 0, (size_t)count * at.air * sizeof *rows);
-    for (int i = 0; i < count * at.raw; i++) {
-        add(at.air, raw[i], at.pull_J + (size_t)(i % at.raw) * at.air,
-            rows + (size_t)(i / at.raw) * at.air);
+    for (int i = 0; i < count; i++, raw += at.raw, rows += at.air) {
+        memcpy(rows, raw, (size_t)own * sizeof *rows);
+        for (int k = own; k < at.raw; k++) {
+            add(at.air, raw[k], at.pull_J + (size_t)k * at.air, rows);
+        }
     }
 }
 
@@ -188,7 +191,7 @@ static int chain_curvature(const Node *node, Places at)
     if (evaluate_pull(node, at, 2) != 0) {
         return 1;
     }
-    chain_rows(at, at.raw_H, at.raw, at.half);
+    chain_rows(node, at, at.raw_H, at.raw, at.half);
     for (int i = 0; i < at.raw * at.air; i++) {
         add(at.air, at.pull_J[i], at.half + (size_t)(i / at.air) * at.air,
             at.air_H + (size_t)(i % at.air) * at.air);
@@ -340,7 +343,7 @@ int node_evaluate(const Node *node, const double *x, const double *u, const doub
             damp_rows(node, at.raw_H, at.raw);
         }
         if (node->tendons > 0 && order > 0) {
-            chain_rows(at, at.raw_J, at.air_y, at.air_J);
+            chain_rows(node, at, at.raw_J, at.air_y, at.air_J);
         }
         if (node->tendons > 0 && order == 2 && chain_curvature(node, at) != 0) {
             return 1;
