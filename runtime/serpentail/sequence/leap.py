@@ -18,7 +18,7 @@ from .run import SequenceRun
 from .search import tilt
 from .sequence import PhaseStart, Sequence
 from .unknowns import leg_rate
-from .wanted import LIMITS, Wanted
+from .wanted import UNITS, Wanted
 
 LOWER = (0.002, 0.005)  # m, of the ground at the landing
 HEAVIER = (0.9, 1.1)  # of all masses
@@ -86,10 +86,8 @@ def missed(wanted: Wanted, measures: dict[str, Any], where: str = "") -> Iterato
         yield f"{where}standing: it does not stand at the end"
     for name, share in wanted.shares(measures).items():
         if share > 1:
-            if name == "rise":
-                limit, unit, how = wanted.rise, "m", "less"
-            else:
-                limit, unit, how = wanted.limits[name], LIMITS[name] or "body weights", "more"
+            unit, how = UNITS.get(name, "m") or "body weights", "less" if name == "rise" else "more"
+            limit = wanted.limits[name]
             yield f"{where}{name}: {measures[name]:.3g} {unit}, {how} than {limit:.3g}"
 
 
@@ -107,12 +105,11 @@ def repeats(leap: Leap, start: PhaseStart) -> Iterator[tuple[str, dict[str, Any]
         here.q[2] += drop
         yield f"ground {1e3 * drop:g} mm lower", _measured(lower, here)
     masses = [name for name in ("torso_mass", "tail_mass") if name in model.parameters]
-    for what, changes in (
-        *((f"masses times {k:g}", {m: k * model.parameters[m] for m in masses}) for k in HEAVIER),
-        *((f"mu {mu:g}", {"mu": mu}) for mu in SLIPPERY),
-    ):
-        other = model.with_parameters(**changes)
-        yield what, _measured(replace(sequence, model=other, phases=(push, held, land)), start)
+    others = {f"masses times {k:g}": {m: k * model.parameters[m] for m in masses} for k in HEAVIER}
+    others |= {f"mu {mu:g}": {"mu": mu} for mu in SLIPPERY}
+    for what, changes in others.items():
+        other = replace(sequence, model=model.with_parameters(**changes), phases=(push, held, land))
+        yield what, _measured(other, start)
 
 
 def _tracked(sequence: Sequence, run: SequenceRun) -> Phase:

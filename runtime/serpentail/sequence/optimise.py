@@ -177,7 +177,7 @@ def _refuse_short_legs(leap: Sequence, start: PhaseStart, wanted: Wanted) -> Non
 
     From its height at the start the torso cannot be pushed farther than the legs reach.
     """
-    model = leap.model
+    model, rise = leap.model, wanted.limits.get("rise", 0.0)
     angles = np.linspace(-pi, pi, GRID)
     gamma, delta = (each.ravel() for each in np.meshgrid(angles, angles))
     legs = np.stack([gamma, delta, gamma, delta, *np.zeros((4, gamma.size))], axis=1)
@@ -185,12 +185,10 @@ def _refuse_short_legs(leap: Sequence, start: PhaseStart, wanted: Wanted) -> Non
     points, _ = model.contact_points(q, v, legs)
     feet = np.asarray(points)[:, : model.contacts["feet"]] - start.q[POSITION]
     stroke = float(np.linalg.norm(feet, axis=-1).max() - start.q[2])
+    least = 1 + rise / max(stroke, 1e-9)
     for name in ("push", "landing"):
-        if wanted.rise is None or name not in wanted.limits:
-            continue
-        least = 1 + wanted.rise / max(stroke, 1e-9)
-        if wanted.limits[name] < least:
+        if wanted.limits.get(name, np.inf) < least:
             raise SimulationError(
-                f"limits.{name}: value {wanted.limits[name]:g}: a rise of {wanted.rise:g} m over a "
+                f"limits.{name}: value {wanted.limits[name]:g}: a rise of {rise:g} m over a "
                 f"stroke of at most {1e3 * stroke:.3g} mm needs at least {least:.3g} body weights"
             )

@@ -11,16 +11,16 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.optimize import OptimizeResult, differential_evolution
+from scipy.optimize import Bounds, OptimizeResult, differential_evolution
 
 from serpentail_scene.layout import QUATERNION, TAIL_Q
 
 from ..basics.attitude import tilt_deg
 from ..basics.errors import SimulationError
 from ..basics.progress import Stage
-from ..model.model import Model
-from ..model.weight import fall, total_mass, weight_of
+from ..model.weight import weight_of
 from ..motion.ground import peaks
+from ..motion.numbers import com_rise
 from ..motion.trajectory import Trajectory
 from ..planning.problem import checked_goal
 from ..simulation.controllers.pfl import Pfl
@@ -29,7 +29,7 @@ from ..simulation.simulate import simulate
 from .flight import landing_time
 from .phase import Phase
 from .sequence import PhaseStart, Sequence
-from .unknowns import MoveNumber, leg_rate, with_numbers
+from .unknowns import ANGLE, LONGER, Unknown, leg_rate, with_numbers
 from .wanted import Wanted
 
 PEOPLE, ROUNDS = 8, 25  # tries of a round for each number; most rounds
@@ -45,7 +45,7 @@ RTOL = 1e-4  # of the searches; the leap itself has the sequence's own
 
 def searched(
     sequence: Sequence,
-    unknowns: list[MoveNumber],
+    unknowns: list[Unknown],
     measured: Measured,
     wanted: Wanted,
     end: float,
@@ -58,10 +58,12 @@ def searched(
     enough: cost at which to stop; seed: of the tries.
     """
 
+    def changed(x: np.ndarray) -> Sequence:
+        return replace(sequence, phases=with_numbers(sequence.phases, unknowns, x))
+
     def cost(x: np.ndarray) -> float:
         try:
-            changed = replace(sequence, phases=with_numbers(sequence.phases, unknowns, x))
-            return wanted.cost(measured(changed))
+            return wanted.cost(measured(changed(x)))
         except SimulationError:
             return FAILED
 
@@ -69,64 +71,49 @@ def searched(
         stage.tell()
         return intermediate_result.fun <= enough or time.monotonic() > end
 
+    guess = np.array([unknown.guess for unknown in unknowns])
+    timed = [unknown.key == "duration" for unknown in unknowns]
+    least, most = np.where(timed, [guess / LONGER, guess * LONGER], [guess - ANGLE, guess + ANGLE])
     with Stage("optimise", sequence.phases[unknowns[0].phase].name) as stage:
-        found = differential_evolution(
-            cost,
-            [unknown.bounds for unknown in unknowns],
-            x0=[unknown.guess for unknown in unknowns],
-            popsize=PEOPLE,
-            maxiter=ROUNDS,
-            seed=seed,
-            polish=False,
-            callback=stop,
-        )
-    return replace(sequence, phases=with_numbers(sequence.phases, unknowns, found.x))
+        settings: dict[str, Any] = {"popsize": PEOPLE, "maxiter": ROUNDS, "polish": False}
+        settings |= {"x0": guess, "seed": seed, "callback": stop}
+        return changed(differential_evolution(cost, Bounds(least, most), **settings).x)
 
 
 def push_measures(sequence: Sequence, start: PhaseStart, aim: Any) -> dict[str, float]:
-    """Return push (body weights), rise (m), spin (kg m^2/s), leg_rate (rad/s) of a push; of
-    the flight after it what ``_flight_measures`` tells. aim: the attitude of the landing.
+    """Return push (body weights), rise (m), spin (kg m^2/s), leg_rate (rad/s) of a push; of the
+    flight after it, whose tail only goes to the plan's goal, tilt (rad), and miss: how far (rad)
+    the torso then is from the attitude aim.
     """
-    model, phase = sequence.model, sequence.phases[0]
-    end = max(move["at"] + move["duration"] for move in phase.moves) + AFTER
+    model, (push, flight, _) = sequence.model, sequence.phases
     first = sequence.gamma, sequence.delta
-    motion = _run(sequence, phase, start, Legs.moves(*first, phase.moves), end)
-    assert motion.contact is not None
-    if motion.contact.forces[-1, :, 2].max() > 0:
+    end = max(move["at"] + move["duration"] for move in push.moves) + AFTER
+    pushed = _run(sequence, push, start, Legs.moves(*first, push.moves), end)
+    assert pushed.contact is not None
+    if pushed.contact.forces[-1, :, 2].max() > 0:
         raise SimulationError("push: still on the ground")
 
-    # after the push the centre of mass is in free fall
-    down = fall(model.parameters)
-    g, up = np.linalg.norm(down), -down / np.linalg.norm(down)
-    ends = [model.center_of_mass(motion.q[k], motion.v[k])[0] for k in (0, -1)]
-    momentum, spin = model.momentum(motion.q[-1], motion.v[-1])
-    speed = up @ momentum / total_mass(model.parameters)
-    return {
-        "push": _weights(model, motion),
-        "rise": float(up @ (ends[1] - ends[0]) + speed * abs(speed) / (2 * g)),
-        "spin": float(np.linalg.norm(spin)),
-        "leg_rate": leg_rate(first, [phase]),
-    } | _flight_measures(sequence, motion, aim)
-
-
-def _flight_measures(sequence: Sequence, push: Trajectory, aim: Any) -> dict[str, float]:
-    """Return the largest tilt (rad) of a flight whose tail only goes to the plan's goal, and how
-    far (rad) the torso then is from an attitude.
-    """
-    model, (first, flight, _) = sequence.model, sequence.phases
+    # the flight, to the landing
     goal = checked_goal(flight.plan[0].get("goal"), model.layout.nt)
-    state, angles = (push.q[-1], push.v[-1]), sequence.last_angles(flight, first.moves)
-    tail = state[0][TAIL_Q]
-    tails = [tail, 0 * tail if goal.tail is None else np.nan_to_num(goal.tail)]
+    q, v = pushed.q[-1], pushed.v[-1]
+    tails = [q[TAIL_Q], 0 * q[TAIL_Q] if goal.tail is None else np.nan_to_num(goal.tail)]
     follows = replace(flight, controller=Pfl(model, Reference([0.0, SWINGS], tails)))
-    start, end = PhaseStart(0.0, *state, None), landing_time(model, state, goal, angles)
-    motion = _run(sequence, follows, start, Legs.fixed(*angles), end)
-    tilts, attitude = tilt(motion), motion.q[-1, QUATERNION]
+    angles = sequence.last_angles(flight, push.moves)
+    end = landing_time(model, (q, v), goal, angles)
+    flown = _run(sequence, follows, PhaseStart(0.0, q, v, None), Legs.fixed(*angles), end)
+    tilts, miss = tilt(flown), 0.0
     if isinstance(aim, str):
         miss = float(tilts[-1])
-    else:
-        miss = 0.0 if aim is None else 2 * float(np.arccos(min(1.0, abs(attitude @ aim))))
-    return {"tilt": float(tilts.max()), "miss": miss}
+    elif aim is not None:
+        miss = 2 * float(np.arccos(min(1.0, abs(flown.q[-1, QUATERNION] @ aim))))
+    return {
+        "push": _weights(sequence, pushed),
+        "rise": sum(com_rise(model, motion) or 0.0 for motion in (pushed, flown)),
+        "spin": float(np.linalg.norm(pushed.angular_momentum[-1])),
+        "leg_rate": leg_rate(first, [push]),
+        "tilt": float(tilts.max()),
+        "miss": miss,
+    }
 
 
 def landing_measures(sequence: Sequence, touch: PhaseStart) -> dict[str, float]:
@@ -134,20 +121,18 @@ def landing_measures(sequence: Sequence, touch: PhaseStart) -> dict[str, float]:
     tilt (rad), leg_rate (rad/s); lean (deg) and the share of the weight on the feet at the end.
     """
     model, (push, flight, phase) = sequence.model, sequence.phases
-    gamma, delta = sequence.last_angles(flight, push.moves).tolist()
-    angles = np.array([gamma, delta, gamma, delta, *np.zeros(4)])
-    points, _ = model.contact_points(touch.q, touch.v, angles)
+    first = sequence.last_angles(flight, push.moves).tolist()
+    points, _ = model.contact_points(touch.q, touch.v, np.array([*first, *first, *np.zeros(4)]))
     q = touch.q.copy()
     q[2] += ABOVE - np.asarray(points)[:, 2].min()
-    legs = Legs.moves(gamma, delta, phase.moves)
-    motion = _run(sequence, phase, replace(touch, q=q), legs, LANDING)
+    motion = _run(sequence, phase, replace(touch, q=q), Legs.moves(*first, phase.moves), LANDING)
     assert motion.contact is not None
     tilts = tilt(motion)
     carried = motion.contact.of("feet").forces[-SAMPLES // 4 :, :, 2].sum(axis=1).mean()
     return {
-        "landing": _weights(model, motion),
+        "landing": _weights(sequence, motion),
         "tilt": float(tilts.max()),
-        "leg_rate": leg_rate((gamma, delta), [phase]),
+        "leg_rate": leg_rate(first, [phase]),
         "lean": float(np.degrees(tilts[-1])),
         "carried": float(carried / weight_of(model.parameters)),
     }
@@ -158,17 +143,15 @@ def tilt(motion: Trajectory) -> np.ndarray:
     return np.radians(tilt_deg(motion.attitude))
 
 
-def _weights(model: Model, motion: Trajectory) -> float:
+def _weights(sequence: Sequence, motion: Trajectory) -> float:
     """Return the largest force of the ground, in body weights."""
-    return float(peaks(motion)["all"].force / weight_of(model.parameters))
+    return float(peaks(motion)["all"].force / weight_of(sequence.model.parameters))
 
 
 def _run(sequence: Sequence, phase: Phase, start: PhaseStart, legs: Legs, end: float) -> Trajectory:
     """Return the motion of a phase from a start at 0, to a time (s)."""
     settings: dict[str, Any] = {**sequence.settings, "rtol": RTOL, "output_step": end / SAMPLES}
-    if start.bristles is not None:
-        settings["bristles0"] = start.bristles
     settings |= {"controller": phase.controller, "legs": legs, "t_span": end}
-    motion = simulate(sequence.model, start.q, start.v, **settings)
+    motion = simulate(sequence.model, start.q, start.v, bristles0=start.bristles, **settings)
     assert isinstance(motion, Trajectory)  # of one start
     return motion

@@ -1,7 +1,8 @@
 """The numbers of a leap's moves that are searched for."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,8 +14,7 @@ ANGLE = 0.9  # rad, that an angle may move to each side of the first guess
 LONGER = 2.0  # times, that a duration may become longer or shorter
 
 
-@dataclass(frozen=True)
-class MoveNumber:
+class Unknown(NamedTuple):
     """A number of a move: its phase, move and key, and its first guess (rad or s)."""
 
     phase: int
@@ -22,15 +22,8 @@ class MoveNumber:
     key: str
     guess: float
 
-    @property
-    def bounds(self) -> tuple[float, float]:
-        """Between which it is searched for."""
-        if self.key == "duration":
-            return self.guess / LONGER, self.guess * LONGER
-        return self.guess - ANGLE, self.guess + ANGLE
 
-
-def unknowns_of(phases: Sequence[Phase], k: int) -> list[MoveNumber]:
+def unknowns_of(phases: Sequence[Phase], k: int) -> list[Unknown]:
     """Return the angles of all moves of phase k, and durations of moves on the ground.
 
     SimulationError about moves that have a rate in place of a duration.
@@ -42,12 +35,12 @@ def unknowns_of(phases: Sequence[Phase], k: int) -> list[MoveNumber]:
             remedy = "optimise changes durations: give duration, and limits.leg_rate"
             raise SimulationError(f"{field}: value {move['rate']}: {remedy}")
         keys = ("gamma", "delta") if BEFORE in move else ("gamma", "delta", "duration")
-        found += [MoveNumber(k, j, key, float(move[key])) for key in keys if key in move]
+        found += [Unknown(k, j, key, float(move[key])) for key in keys if key in move]
     return found
 
 
 def with_numbers(
-    phases: Sequence[Phase], unknowns: Sequence[MoveNumber], x: np.ndarray
+    phases: Sequence[Phase], unknowns: Sequence[Unknown], x: np.ndarray
 ) -> tuple[Phase, ...]:
     """Return phases whose moves have the numbers x."""
     moves = [[{**move} for move in phase.moves] for phase in phases]
@@ -56,12 +49,11 @@ def with_numbers(
     return tuple(replace(phase, moves=each) for phase, each in zip(phases, moves, strict=True))
 
 
-def leg_rate(angles: tuple[float, float], phases: Sequence[Phase]) -> float:
+def leg_rate(angles: Sequence[float], phases: Sequence[Phase]) -> float:
     """Return the largest rate (rad/s) of the legs in all moves, from their first angles on."""
-    gamma, delta, fastest = *angles, 0.0
+    (gamma, delta), fastest = angles, 0.0
     for move in (move for phase in phases for move in phase.moves):
-        goal = float(move.get("gamma", gamma)), float(move.get("delta", delta))
-        way = max(abs(goal[0] - gamma), abs(goal[1] - delta))
+        before, gamma, delta = (gamma, delta), move.get("gamma", gamma), move.get("delta", delta)
+        way = max(abs(gamma - before[0]), abs(delta - before[1]))
         fastest = max(fastest, FASTEST[move.get("shape", "linear")] * way / move["duration"])
-        gamma, delta = goal
-    return fastest
+    return float(fastest)

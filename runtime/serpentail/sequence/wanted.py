@@ -9,7 +9,8 @@ from ..basics.checks import number, one_of, refusal
 from ..basics.errors import SimulationError
 from ..motion.landing import MIN_SHARE, MIN_UPRIGHT
 
-LIMITS = {"push": "", "landing": "", "spin": "kg m^2/s", "tilt": "rad", "leg_rate": "rad/s"}
+UNITS = {"push": "", "landing": "", "spin": "kg m^2/s", "tilt": "rad", "leg_rate": "rad/s"}
+NAMES = {"limits": (*UNITS,), "goal": ("rise", "standing")}
 BEST = ("rise", "softness", "spin")  # what may be made as large, or as small, as it can be
 PAID = 10.0  # weight, in the cost, of a share beyond MARGIN; what is to be best has about 1
 EVEN = 0.1  # of the mean square of all shares, if nothing is to be best
@@ -23,24 +24,18 @@ UPRIGHT = degrees(acos(MIN_UPRIGHT))  # deg, of a torso that stands
 
 @dataclass(frozen=True)
 class Wanted:
-    """Limits (body weights, kg m^2/s, rad, rad/s), a rise (m), whether to stand, what is best.
-
-    A *share* is a measure over its limit: 1 is the limit, also of a goal.
+    """Limits (body weights, kg m^2/s, rad, rad/s; the least rise, m), whether to stand, what is
+    best. A *share* is a measure over its limit: 1 is the limit, also of a rise.
     """
 
     limits: Mapping[str, float]
-    rise: float | None
     standing: bool
     best: str | None
 
     def shares(self, measures: Mapping[str, float]) -> dict[str, float]:
-        """Return the shares of those measures that have a limit or a goal."""
-        shares = {
-            name: measures[name] / limit for name, limit in self.limits.items() if name in measures
-        }
-        if self.rise is not None and "rise" in measures:
-            shares["rise"] = 2 - measures["rise"] / self.rise
-        return shares
+        """Return the shares of those measures that have a limit."""
+        found = {name: measures[name] / x for name, x in self.limits.items() if name in measures}
+        return found | ({"rise": 2 - found["rise"]} if "rise" in found else {})
 
     def cost(self, measures: Mapping[str, float]) -> float:
         """Return what a search makes small: shares beyond the margin, then what is to be best, by
@@ -68,23 +63,20 @@ class Wanted:
 
 def wanted_of(limits: Any, goal: Any, best: Any) -> Wanted:
     """Return checked limits and goals; SimulationError names what is wrong."""
-    for name, value in (("limits", limits), ("goal", goal)):
-        if not isinstance(value, Mapping):
-            raise refusal(name, value, "a mapping, such as {'push': 25}", SimulationError)
     checked = {}
-    for name, value in limits.items():
-        one_of("limits: name", name, LIMITS, SimulationError)
-        least = {"least": 1.0} if name in ("push", "landing") else {"above": 0.0}
-        unit = LIMITS[name]
-        checked[name] = number(f"limits.{name}", value, SimulationError, unit=unit, **least)
-    for name in goal:
-        one_of("goal: name", name, ("rise", "standing"), SimulationError)
-    rise = goal.get("rise")
-    if rise is not None:
-        rise = number("goal.rise", rise, SimulationError, unit="m", above=0)
+    for where, given in (("limits", limits), ("goal", goal)):
+        if not isinstance(given, Mapping):
+            raise refusal(where, given, "a mapping, such as {'push': 25}", SimulationError)
+        for name, value in given.items():
+            one_of(f"{where}: name", name, NAMES[where], SimulationError)
+            if name == "standing" or (name == "rise" and value is None):
+                continue
+            least = {"least": 1.0} if name in ("push", "landing") else {"above": 0.0}
+            unit = UNITS.get(name, "m")
+            checked[name] = number(f"{where}.{name}", value, SimulationError, unit=unit, **least)
     standing = goal.get("standing", True)
     if not isinstance(standing, bool):
         raise refusal("goal.standing", standing, "True or False", SimulationError)
     if best is not None:
         one_of("best", best, BEST, SimulationError)
-    return Wanted(checked, rise, standing, best)
+    return Wanted(checked, standing, best)
