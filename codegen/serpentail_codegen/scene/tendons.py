@@ -28,16 +28,16 @@ MIDDLE = (0.5,)  # of a link: where its guide is
 
 def tendons_of(kind: str, values: Mapping[str, Any]) -> TailDescription:
     """Return what the tables say; parameters that the scene names replace theirs."""
-    tables, shape = values["tendon"], values["shape"]
+    tables, shape, m = values["tendon"], values["shape"], segments_in(values)
     if not isinstance(tables, Mapping) or not tables:
         return TailDescription({})
-    problems = _refused(values, kind)
-    found = [(name, _numbers(f"tendon.{name}", name, t, problems)) for name, t in tables.items()]
-    guided = bool(shape.own or shape.counts or any({*GUIDES[1:]} & {*own} for _, own in found))
-    guided = guided and kind == "articulated"
-    for name, own in found:
-        problems += _each_problem(f"tendon.{name}", tables[name], own, kind, guided)
-        problems += _end_problem(f"tendon.{name}", tables[name], segments_in(values))
+    links, problems = kind == "articulated", _refused(values, kind)
+    found = {name: _numbers(f"tendon.{name}", name, t, problems) for name, t in tables.items()}
+    differ = shape.own or shape.counts or any({*GUIDES[1:]} & {*own} for own in found.values())
+    guided = bool(links and differ)
+    for name, table in tables.items():
+        if isinstance(table, Mapping):
+            problems += _problems(f"tendon.{name}", table, found[name], links, guided, m)
     if problems or not isinstance(values["parameters"], Mapping):
         return TailDescription({}, tuple(problems))
     names = names_of_tendons(tables)
@@ -47,20 +47,12 @@ def tendons_of(kind: str, values: Mapping[str, Any]) -> TailDescription:
         return TailDescription({}, (Problem("tendon", names, remedy),))
 
     # each tendon of a ring by itself
-    each = [one for name, own in found for one in _ring(tables[name], own)]
-    m, counts = segments_in(values), [table.get("count", 1) for table in tables.values()]
-    ends = [table.get("to", m) for table in tables.values()]
-    to = [end for end, count in zip(ends, counts, strict=True) for _ in range(count)]
-    given = {
-        "tendon_offsets": [own["offset"] for own in each],
-        "tendon_limits": [own["tension"] for own in each],
-    }
-    if kind == "articulated":
-        given["tendon_guides"] = [own.get("guides", MIDDLE) for own in each]
-    if guided:
-        given["tendon_ends"] = [own.get("end_offset", own["offset"]) for own in each]
-        given["tendon_roots"] = [own["root"] for own in each]
-    shape = replace(shape, tendons=tuple(to), guided=guided)
+    each = [one for name, table in tables.items() for one in _ring(table, found[name], m)]
+    keys = {"tendon_offsets": "offset", "tendon_limits": "tension"}
+    keys |= {"tendon_guides": "guides"} if links else {}
+    keys |= {"tendon_ends": "end_offset", "tendon_roots": "root"} if guided else {}
+    given = {name: [one[key] for one in each] for name, key in keys.items()}
+    shape = replace(shape, tendons=tuple(one["to"] for one in each), guided=guided)
     return TailDescription({"shape": shape, "parameters": {**given, **values["parameters"]}})
 
 
@@ -77,41 +69,33 @@ def _numbers(place: str, name: str, table: Any, problems: list[Problem]) -> Numb
     return numbers_of(place, numbers, TENDON, 1, problems)
 
 
-def _each_problem(
-    place: str, table: Any, own: Numbers, kind: str, guided: bool
+def _problems(
+    place: str, table: Mapping[str, Any], own: Numbers, links: bool, guided: bool, segments: int
 ) -> Iterator[Problem]:
-    """Yield what is missing or too much in a table."""
-    if not isinstance(table, Mapping):
-        return
+    """Yield what is missing, wrong or too much in a table."""
     start = ("count", "radius") if {"count", "radius"} & {*table} else ("offset",)
-    for key in (*start, "tension", *(["root"] if guided else [])):
+    for key in (*start, "tension", *["root"] * guided):
         if key not in table:
             yield Problem(f"{place}.{key}", None, f"needs {NEEDED[key]}")
-    if len(start) > 1 and "offset" in table:
-        yield Problem(f"{place}.offset", table["offset"], "radius gives it: remove one of the two")
+    if COUNT.holds(to := table.get("to", 1)) and to > segments:
+        yield Problem(f"{place}.to", to, f"the tail has {segments} segments")
+    remedies = {"offset": "radius gives it: remove one of the two"} if len(start) > 1 else {}
     if own.get("offset") == (0.0, 0.0):
-        remedy = "a tendon on the axis of the tail has no lever: give an offset"
-        yield Problem(f"{place}.offset", table["offset"], remedy)
-    for key in GUIDES if kind == "continuum" else ():
-        if key in table:
-            remedy = "a tendon of arcs is parallel to their centre line: remove it"
-            yield Problem(f"{place}.{key}", table[key], remedy)
+        remedies["offset"] = "a tendon on the axis of the tail has no lever: give an offset"
+    if not links:
+        parallel = "a tendon of arcs is parallel to their centre line: remove it"
+        remedies |= dict.fromkeys(GUIDES, parallel)
+    for key in [key for key in remedies if key in table]:
+        yield Problem(f"{place}.{key}", table[key], remedies[key])
 
 
-def _end_problem(place: str, table: Any, segments: int) -> list[Problem]:
-    """Return a problem if a tendon ends beyond the tail."""
-    to = table.get("to", 1) if isinstance(table, Mapping) else 1
-    if not COUNT.holds(to) or to <= segments:
-        return []
-    return [Problem(f"{place}.to", to, f"the tail has {segments} segments")]
-
-
-def _ring(table: Mapping[str, Any], own: Numbers) -> list[Mapping[str, tuple[float, ...]]]:
-    """Return the tendons of a table, those of a ring from x towards z."""
-    count = table.get("count", 0)
+def _ring(table: Mapping[str, Any], own: Numbers, segments: int) -> Iterator[dict[str, Any]]:
+    """Yield what each tendon of a table has, those of a ring from x towards z."""
+    count, usual = table.get("count", 0), {"guides": MIDDLE, "to": table.get("to", segments)}
     angles = [2 * pi * k / count for k in range(count)]
     ring = [tuple(own["radius"][0] * way for way in (cos(a), sin(a))) for a in angles]
-    return [{**own, "offset": offset} for offset in ring] or [own]
+    for offset in ring or [own["offset"]]:
+        yield {"end_offset": offset, **usual, **own, "offset": offset}
 
 
 def _refused(values: Mapping[str, Any], kind: str) -> list[Problem]:
