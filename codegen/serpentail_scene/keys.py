@@ -271,3 +271,12 @@ TENDON = {
     "root": Key("m", NOT_NEGATIVE),
 }
 TENDON_COUNTS = ("to", "count")
+
+
+def names_of_tendons(tables: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the name of each tendon of checked tables; a ring numbers its own from 1."""
+    return tuple(
+        f"{name}_{k + 1}" if "count" in table else name
+        for name, table in tables.items()
+        for k in range(table.get("count", 1))
+    )

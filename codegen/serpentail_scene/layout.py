@@ -74,12 +74,14 @@ class Layout(Sizes):
     """Where numbers lie in q, v and tau; ``layout["hind_left"]`` is that of one chain.
 
     chains: those of a model, the tail first. hinges: how many segments have one coordinate.
+    tendons: their names.
     """
 
     segments: int
     fixed: bool = False
     chains: tuple[ChainLayout, ...] = field(default=(), compare=False)
     hinges: int = 0
+    tendons: tuple[str, ...] = field(default=(), compare=False)
 
     @property
     def widths(self) -> tuple[int, ...]:

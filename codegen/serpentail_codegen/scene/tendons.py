@@ -5,9 +5,8 @@ from dataclasses import replace
 from math import cos, pi, sin
 from typing import Any
 
-from serpentail_scene.keys import NAME, TENDON, TENDON_COUNTS
+from serpentail_scene.keys import NAME, TENDON, TENDON_COUNTS, names_of_tendons
 from serpentail_scene.rules import COUNT
-from serpentail_scene.tendons import names_of_tendons
 
 from .checks import parameters_in, segments_in
 from .problems import Problem

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from serpentail_scene.drives import drives_of
+from serpentail_scene.keys import names_of_tendons
 from serpentail_scene.layout import ChainLayout, Layout
 from serpentail_scene.parameters import NAMES, OUT_OF_REACH, PASSIVE, name_in
 
@@ -79,7 +80,8 @@ def layout_of(manifest: Mapping[str, Any], kinds: tuple[str, ...]) -> Layout:
             )
         )
         first = stop
-    return Layout(len(kinds), fixed, tuple(chains), layout.hinges)
+    tendons = names_of_tendons(manifest["scene"].get("tendon", {}))
+    return Layout(len(kinds), fixed, tuple(chains), layout.hinges, tendons)
 
 
 def values_of(chain: ChainLayout, values: Mapping[str, Any]) -> dict[str, Any]:

@@ -10,8 +10,7 @@ from ..basics.errors import PlanningError
 from ..model.model import Model
 from ..planning.goal import Bounds
 from ..planning.magnitudes import checked_bounds
-from ..planning.result.fit import refuse_unfit
-from ..planning.result.plan import Plan
+from ..planning.result.plan import Plan, refuse_unfit
 from .kernel import FUNCTIONS
 
 NEEDED = dict(

@@ -12,7 +12,6 @@ from ..basics.checks import number, numbers, refusal, shown
 from ..basics.errors import PlanningError, UnusualSize
 from ..basics.plausible_values import warn_of_unusual
 from ..model.model import Model
-from ..model.tendons import tendons_of
 from ..model.weight import fall, total_mass
 from .goal import HALF_TURN, LIMIT, MOTOR, Bounds
 
@@ -63,7 +62,7 @@ def checked_bounds(model: Model, bounds: Any) -> Bounds:
     own = [n for n in USUAL if isinstance(x := getattr(bounds, n), str) and x == MOTOR]
     usual = {n: model.parameters.get(f"motor_{n}", USUAL[n]) for n in own}
     bounds = replace(bounds, **usual)
-    count = len(tendons_of(model))
+    count = len(model.layout.tendons)
     found = {
         n: _bound(n, getattr(bounds, n), count if n == "tension" else model.layout.nt)
         for n in (entry.name for entry in fields(Bounds))
@@ -88,7 +87,7 @@ def checked_bounds(model: Model, bounds: Any) -> Bounds:
 def _of_tendons(model: Model, bounds: Bounds) -> Bounds:
     """Return bounds of tensions in place of those of motors, where tendons pull the tail."""
     usual = isinstance(bounds.tension, str) and bounds.tension == LIMIT
-    if not tendons_of(model):
+    if not model.layout.tendons:
         if not usual and bounds.tension is not None:
             raise refusal("bounds.tension", bounds.tension, "a model with tendons", PlanningError)
         return replace(bounds, tension=None)

@@ -7,10 +7,7 @@ import numpy as np
 
 from ..basics.errors import PlanningError
 from ..model.model import Model
-from ..model.tendons import tendons_of
 from ..optimal.terms import Terms, terms_of
-from ..simulation.controllers.controller import TensionCurve, TorqueCurve
-from ..simulation.controllers.piecewise import Piecewise
 from .design import Design
 from .program.body import BodyFunctions
 from .program.cache import memoised
@@ -26,13 +23,8 @@ Blocks = Mapping[str, np.ndarray]
 
 def input_of(model: Model) -> tuple[str, int]:
     """Return name and size of what drives the tail in plans of a model."""
-    count = len(tendons_of(model))
+    count = len(model.layout.tendons)
     return (TENSION, count) if count else ("torque", model.layout.nt)
-
-
-def law_of(inputs: Blocks, curve: Piecewise, damping: float) -> TensionCurve | TorqueCurve:
-    """Return the controller of planned inputs."""
-    return (TensionCurve if TENSION in inputs else TorqueCurve)(curve, damping)
 
 
 def torques_of(model: Model | None, blocks: Blocks) -> np.ndarray:
@@ -81,5 +73,5 @@ def pull_terms(model: Model, states: int) -> Terms:
 
 def refuse_tendons(model: Model, what: str) -> None:
     """PlanningError if tendons pull the tail of a model."""
-    if tendons_of(model):
+    if model.layout.tendons:
         raise PlanningError(f"{what}: tendons pull the tail: this needs a model without them")

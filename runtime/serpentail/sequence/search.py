@@ -121,18 +121,20 @@ def landing_measures(sequence: Sequence, touch: PhaseStart) -> dict[str, float]:
     tilt (rad), leg_rate (rad/s); lean (deg) and the share of the weight on the feet at the end.
     """
     model, (push, flight, phase) = sequence.model, sequence.phases
-    first = sequence.last_angles(flight, push.moves).tolist()
-    points, _ = model.contact_points(touch.q, touch.v, np.array([*first, *first, *np.zeros(4)]))
+    gamma, delta = sequence.last_angles(flight, push.moves).tolist()
+    angles = np.array([gamma, delta, gamma, delta, *np.zeros(4)])
+    points, _ = model.contact_points(touch.q, touch.v, angles)
     q = touch.q.copy()
     q[2] += ABOVE - np.asarray(points)[:, 2].min()
-    motion = _run(sequence, phase, replace(touch, q=q), Legs.moves(*first, phase.moves), LANDING)
+    legs = Legs.moves(gamma, delta, phase.moves)
+    motion = _run(sequence, phase, replace(touch, q=q), legs, LANDING)
     assert motion.contact is not None
     tilts = tilt(motion)
     carried = motion.contact.of("feet").forces[-SAMPLES // 4 :, :, 2].sum(axis=1).mean()
     return {
         "landing": _weights(sequence, motion),
         "tilt": float(tilts.max()),
-        "leg_rate": leg_rate(first, [phase]),
+        "leg_rate": leg_rate((gamma, delta), [phase]),
         "lean": float(np.degrees(tilts[-1])),
         "carried": float(carried / weight_of(model.parameters)),
     }
@@ -151,7 +153,7 @@ def _weights(sequence: Sequence, motion: Trajectory) -> float:
 def _run(sequence: Sequence, phase: Phase, start: PhaseStart, legs: Legs, end: float) -> Trajectory:
     """Return the motion of a phase from a start at 0, to a time (s)."""
     settings: dict[str, Any] = {**sequence.settings, "rtol": RTOL, "output_step": end / SAMPLES}
-    settings |= {"controller": phase.controller, "legs": legs, "t_span": end}
-    motion = simulate(sequence.model, start.q, start.v, bristles0=start.bristles, **settings)
+    settings |= {"controller": phase.controller, "legs": legs, "bristles0": start.bristles}
+    motion = simulate(sequence.model, start.q, start.v, end, **settings)
     assert isinstance(motion, Trajectory)  # of one start
     return motion

@@ -17,7 +17,6 @@ from ..basics.errors import ExtraMissing, SerpentailError
 from ..basics.extras import needed
 from ..model.model import Model
 from ..model.passive import idle
-from ..model.tendons import tendons_of
 from . import (
     air_laws,
     airborne_laws,
@@ -102,7 +101,7 @@ def unchecked(entry: Law, model: Model) -> str:
     kinds += [] if model.fixed else ["free"]
     kinds += ["passive"] if idle(model.parameters, PARTS) else []
     kinds += ["air"] if idle(model.parameters, ("air",)) else []
-    kinds += ["tendons"] if tendons_of(model) else []
+    kinds += ["tendons"] if model.layout.tendons else []
     if entry.only not in kinds:
         return f"only for {OF.get(entry.only, entry.only + ' models')}"
     if entry.casadi:

@@ -13,7 +13,6 @@ from serpentail_scene.signatures.table import in_group
 from ..basics.errors import ModelError
 from ..model.chains import bend_ranges
 from ..model.model import Model
-from ..model.tendons import tendons_of
 from ..model.weight import total_mass
 
 KINDS = ("random", "straight", "folded")
@@ -79,7 +78,7 @@ def states(model: Model, count: int = 4, seed: int = 1) -> Iterator[Case]:
         for k in range(count):
             arrays = random_arrays(model, rng, kind, k)
             arrays = [x.astype(real).astype(float) for x in arrays]
-            yield Case(kind, *arrays, tendons=len(tendons_of(model)))
+            yield Case(kind, *arrays, tendons=len(model.layout.tendons))
 
 
 def random_arrays(model: Model, rng: np.random.Generator, kind: str, k: int) -> list[np.ndarray]:

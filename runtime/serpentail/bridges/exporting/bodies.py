@@ -11,7 +11,6 @@ from ... import __version__
 from ...basics.errors import ExportError
 from ...model.chains import HINGE, values_of
 from ...model.model import Model
-from ...model.tendons import tendons_of
 from ...show.animal import animal_of, usual_radius
 
 AXES = (("alpha", (1, 0, 0)), ("beta", (0, 0, 1)))  # of a link's two joints, in its own frame
@@ -208,7 +207,7 @@ def _refuse_other(model: Model, kind: str) -> None:
         remedy = 'export an "mjcf", or load the model with 0 for them'
     elif "air_density" in p:
         needs, remedy = "a model without air", 'leave out air_density, or export an "fmu"'
-    elif tendons_of(model):
+    elif model.layout.tendons:
         needs, remedy = "a tail without tendons", "leave out the tables [tendon.NAME]"
     else:
         return

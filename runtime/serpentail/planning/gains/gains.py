@@ -22,8 +22,7 @@ from ...model.state import Quantity
 from ...simulation.controllers.parts import ControllerState, NativeTorque, Parts
 from ...simulation.controllers.piecewise import Piecewise
 from ..c_text import write_texts
-from ..result.fit import refuse_unfit
-from ..result.plan import Plan
+from ..result.plan import Plan, refuse_unfit
 from .emission import texts_of
 from .kernel import GainsMemory, kernel
 from .riccati import NONE, tables_of

@@ -1,6 +1,6 @@
 """``Plan``: a planned motion with its torques, and a report on the true motion."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
@@ -20,9 +20,10 @@ from ...optimal.mesh import TimeMesh
 from ...optimal.rules import CollocationRule
 from ...optimal.solution import Solution
 from ...simulation.controllers.controller import Controller, Damping
+from ..air import refuse_air
 from ..flight import flight
 from ..problem import PlanningProblem
-from ..tendons import TENSION, torques_of
+from ..tendons import TENSION, refuse_tendons, torques_of
 from .curve import Curve
 from .full_state import full_state
 from .truth import planned_law
@@ -238,6 +239,25 @@ class Plan(NearNames):
 
     def _at(self, times: ArrayLike) -> dict[str, np.ndarray]:
         return self.curve.at(np.atleast_1d(np.asarray(times, float)))
+
+
+def refuse_unfit(name: str, model: Model, plan: Plan, functions: Iterable[str]) -> None:
+    """ModelError or PlanningError if a model cannot fly a plan by a controller of this name."""
+    model.refuse_fixed(name)
+    refuse_air(model, name)
+    refuse_tendons(model, name)
+    if "airspeed" in plan.curve.starts:
+        raise PlanningError(f"{name}: the plan was made in air: give one of a model without air")
+    model.need(*functions)
+    if model.library is None:
+        raise PlanningError(
+            f"{name}: the model was loaded with compiled=False: load it again with C"
+        )
+    tail = plan.curve.starts["tail"].shape[1]
+    if tail != model.layout.nt:
+        raise PlanningError(
+            f"{name}: the plan has {tail} tail coordinates, the model {model.layout.nt}"
+        )
 
 
 def _digits(value: Any) -> str:

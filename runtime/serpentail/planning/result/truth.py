@@ -11,11 +11,11 @@ from ...basics.attitude import angle_deg, tilt_deg
 from ...basics.errors import SimulationError
 from ...model.model import Model
 from ...motion.resample import smooth
-from ...simulation.controllers.controller import Controller
+from ...simulation.controllers.controller import Controller, TensionCurve, TorqueCurve
 from ...simulation.controllers.piecewise import Piecewise
 from ..flight import end_of_flight, flight
 from ..problem import PlanningProblem
-from ..tendons import law_of, torques_of
+from ..tendons import TENSION, torques_of
 from .curve import Curve
 
 SAMPLE = 1e-3  # s, the most between samples of a flight
@@ -35,9 +35,10 @@ def applied(
         return np.full_like(q, np.nan), np.full_like(v, np.nan)
 
 
-def planned_law(curve: Curve, damping: float) -> Controller:
-    """Return the controller of a plan's torques or tensions, and of damping."""
-    return law_of(curve.nodes, planned_torques(curve), damping)
+def planned_law(curve: Curve, damping: float, inputs: Piecewise | None = None) -> Controller:
+    """Return the controller of a plan's torques or tensions, or of a part of them, and damping."""
+    law = TensionCurve if TENSION in curve.nodes else TorqueCurve
+    return law(inputs or planned_torques(curve), damping)
 
 
 def planned_torques(curve: Curve) -> Piecewise:
@@ -125,7 +126,7 @@ def local_errors(
     errors, inputs, rates = np.zeros(len(q) - 1), planned_torques(curve), slice(OMEGA.start, None)
     for k, width in enumerate(np.diff(curve.ends)):
         piece = Piecewise(np.array([0.0, width]), inputs.coefficients[k : k + 1])
-        law = law_of(curve.nodes, piece, damping)
+        law = planned_law(curve, damping, piece)
         true_q, true_v = applied(model, law, float(width), q[k], v[k])
         if not np.isfinite(true_q).all():
             errors[k] = np.pi

@@ -4,7 +4,6 @@ import numpy as np
 
 from ...basics.errors import SimulationError
 from ...model.model import Model
-from ...model.tendons import tendons_of
 from .piecewise import Piecewise
 
 ROUNDING = 1e-6  # of a limit, by which tensions of a solver may go beyond it
@@ -12,7 +11,7 @@ ROUNDING = 1e-6  # of a limit, by which tensions of a solver may go beyond it
 
 def refuse_tensions(model: Model, curve: Piecewise) -> None:
     """SimulationError if a model has other tendons, or a tension is below 0 or above its limit."""
-    names = tendons_of(model)
+    names = model.layout.tendons
     if not names or curve.channels != len(names):
         has = f"{len(names)} tendons" if names else "none: give its scene tables [tendon.NAME]"
         raise SimulationError(f"tensions: {curve.channels} tendons: {model.name} has {has}")
