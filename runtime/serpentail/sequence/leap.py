@@ -13,10 +13,10 @@ from ..model.weight import weight_of
 from ..motion.landing import Landing
 from ..motion.numbers import com_rise
 from .flight import landing_time, tracker
-from .phase import BEFORE, Phase
+from .phase import Phase
 from .run import SequenceRun
 from .search import tilt
-from .sequence import PhaseStart, Sequence
+from .sequence import PhaseStart, Sequence, timed
 from .unknowns import leg_rate
 from .wanted import UNITS, Wanted
 
@@ -115,15 +115,11 @@ def repeats(leap: Leap, start: PhaseStart) -> Iterator[tuple[str, dict[str, Any]
 def _tracked(sequence: Sequence, run: SequenceRun) -> Phase:
     """Return the flight with the plan that was found, in place of the search for one."""
     model, (push, flight, _) = sequence.model, sequence.phases
-    plan, here, moves = run.phases[1].plan, state_at(run, run.phases[1].begin), []
+    plan, here = run.phases[1].plan, state_at(run, run.phases[1].begin)
     assert plan is not None
     angles = sequence.last_angles(flight, push.moves)
-    for move in flight.moves:
-        timed = {name: value for name, value in move.items() if name != BEFORE}
-        if BEFORE in move:
-            landing = landing_time(model, (here.q, here.v), plan.problem.goal, angles)
-            timed["at"] = max(landing - move[BEFORE], 0.0)
-        moves.append(timed)
+    landing = landing_time(model, (here.q, here.v), plan.problem.goal, angles)
+    moves = [timed(move, 0.0, landing, False) for move in flight.moves]
     acts = tracker(model, flight, plan) if plan.success else flight.controller
     return replace(flight, plan=None, controller=acts, moves=moves)
 

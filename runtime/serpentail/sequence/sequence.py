@@ -149,7 +149,7 @@ class Sequence(NearNames):
                     flight = planned_flight(self.model, phase, (start.q, start.v), angles)
                     controller, plan, landing = flight.controller, flight.plan, flight.landing
                 touches = bool(runs) and runs[-1].ended_by == TOUCH
-                moves += [_timed(move, start.time, landing, touches) for move in phase.moves]
+                moves += [timed(move, start.time, landing, touches) for move in phase.moves]
                 motion, ended_by = self._made(phase, controller, start, moves)
             except (SimulationError, PlanningError) as error:
                 named = type(error)(f"phase {phase.name!r}: {error}")
@@ -258,7 +258,7 @@ def _begun(moves: Iterable[dict[str, Any]], at: float | None) -> Iterator[dict[s
             yield move | {"at": at}
 
 
-def _timed(
+def timed(
     move: Mapping[str, Any], begin: float, landing: float | None, touches: bool
 ) -> dict[str, Any]:
     """Return a move on the clock of the motion, from one on its phase's clock.

@@ -1,6 +1,5 @@
 """The program of a plan: flight on a mesh from a start to a goal, within bounds."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -154,18 +153,19 @@ def _start(model: Model, problem: PlanningProblem) -> np.ndarray:
 
 def _flight_terms(flight: FlightDynamics) -> NodeTerms:
     """Return the terms of the flight's nodes: path constraints and cost."""
-    problem, units = flight.problem, flight.variables.units
+    problem, variables = flight.problem, flight.variables
     legs = None if problem.legs is None else tuple(problem.legs.curve.at(0.0)[0])
     key = ("flight", *flight.key, problem.objective, problem.smoothing, problem.rows, legs)
 
     def make() -> NodeTerms:
         symbols = flight.symbols(SOFTENING)
-        parts, own = _parts(symbols, problem, units)
+        parts, own = _parts(symbols, problem, variables)
         rates = _rates(flight, symbols)
-        _refuse_unused(flight.variables, symbols, [*parts, own, rates])
+        _refuse_unused(variables, symbols, [*parts, own, rates])
         return terms_with(symbols, parts, rates, own)
 
-    return memoised((*key, tuple(units["torque"]), tuple(units[flight.variables.input])), make)
+    units = [tuple(variables.units[name]) for name in ("torque", variables.input)]
+    return memoised((*key, *units), make)
 
 
 def _rates(flight: FlightDynamics, symbols: NodeSymbols) -> "ca.SX":
@@ -177,7 +177,7 @@ def _rates(flight: FlightDynamics, symbols: NodeSymbols) -> "ca.SX":
 
 
 def _parts(
-    symbols: NodeSymbols, problem: PlanningProblem, units: Mapping[str, np.ndarray]
+    symbols: NodeSymbols, problem: PlanningProblem, variables: PlanVariables
 ) -> "tuple[list[ca.SX], ca.SX]":
     """Return the path constraints and the cost of a node."""
     import casadi as ca
@@ -187,7 +187,7 @@ def _parts(
         ca.vec(asked(f"path[{k}]", function, point))
         for k, (function, _, _) in enumerate(problem.rows)
     ]
-    return rows, cost(problem, point, symbols.blocks["softening"], units)
+    return rows, cost(problem, point, symbols.blocks["softening"], variables)
 
 
 def _falls(model: Model, problem: PlanningProblem, compiled: bool) -> bool:
@@ -196,7 +196,7 @@ def _falls(model: Model, problem: PlanningProblem, compiled: bool) -> bool:
 
     variables = variables_of(model, problem, True)
     symbols = symbols_of(model, variables, compiled, SOFTENING)
-    rows, own = _parts(symbols, problem, variables.units)
+    rows, own = _parts(symbols, problem, variables)
     flying = ca.vertcat(symbols.blocks["com"], symbols.blocks["com_velocity"])
     return bool(ca.depends_on(ca.vertcat(*rows, own), flying))
 

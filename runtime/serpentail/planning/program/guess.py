@@ -17,7 +17,7 @@ from ...simulation.controllers.controller import TorqueTable
 from ..air import drift_of_states, in_air
 from ..flight import State, flight
 from ..problem import PlanningProblem
-from ..tendons import TENSION, input_of, tensions_near
+from ..tendons import TENSION, tensions_near
 from .build import PlanProgram, conserved_at
 
 ROUGH = 1e-4  # rtol of a guess, whose damping can be stiff
@@ -75,9 +75,8 @@ def of_trajectory(model: Model, motion: Trajectory, damping: float = 0.0) -> Gue
         "tail_rate": tail_rate,
         "torque": motion.tau + damping * tail_rate,
     }
-    name, _ = input_of(model)
-    if name == TENSION:
-        samples[name] = tensions_near(model, samples["tail"], samples["torque"])
+    if model.layout.tendons:
+        samples[TENSION] = tensions_near(model, samples["tail"], samples["torque"])
     if in_air(model):
         samples |= drift_of_states(model, motion.q, motion.v)
     t = motion.t - motion.t[0]

@@ -1,6 +1,6 @@
 """The variables of a plan's program: blocks of states, controls and constants, and their units."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,7 +40,7 @@ class PlanVariables:
     @property
     def input(self) -> str:
         """What drives the tail: "torque" or "tension"."""
-        return input_in(self.units)
+        return TENSION if TENSION in self.units else "torque"
 
     @property
     def torque_is_state(self) -> bool:
@@ -64,11 +64,6 @@ class PlanVariables:
         """Return blocks in SI of rows (.., n) in the program's units."""
         values = row * self.scale(blocks)
         return {name: values[..., place] for name, place in self.places(blocks).items()}
-
-
-def input_in(units: Mapping[str, np.ndarray]) -> str:
-    """Return what drives a tail: "tension" if that has a unit, else "torque"."""
-    return TENSION if TENSION in units else "torque"
 
 
 def variables_of(model: Model, problem: PlanningProblem, falls: bool) -> PlanVariables:

@@ -114,7 +114,7 @@ def slopes(best: "Round") -> dict[str, Any]:
 
 def objective_unit_of(best: "Round") -> float:
     """SI units of the program's objective."""
-    return objective_unit(best.problem, best.program.variables.units)
+    return objective_unit(best.problem, best.program.variables)
 
 
 def effort(curve: Curve) -> float:

@@ -106,12 +106,10 @@ class TensionTable:
 
     Parameters
     ----------
-    times : array_like, shape (K,)
-        Increasing times (s). Before the first and after the last, the tensions are held.
+    times, damping
+        As of ``TorqueTable``.
     tensions : array_like, shape (K, tendons)
         Tensions (N), from 0 to the limit of each tendon.
-    damping : float or sequence of float, default 0
-        Damping (N m s), as of ``Damping``, in addition.
 
     Examples
     --------
@@ -140,8 +138,8 @@ class TensionCurve:
     ----------
     tensions : Piecewise
         Tensions (N), one channel for each tendon, from 0 to its limit.
-    damping : float or sequence of float, default 0
-        Damping (N m s), as of ``Damping``, in addition.
+    damping
+        As of ``TorqueCurve``.
     """
 
     tensions: Piecewise
