@@ -15,9 +15,8 @@ from ..motion.numbers import com_rise
 from .flight import landing_time, tracker
 from .phase import Phase
 from .run import SequenceRun
-from .search import tilt
+from .search import leg_rate, tilt
 from .sequence import PhaseStart, Sequence, timed
-from .unknowns import leg_rate
 from .wanted import UNITS, Wanted
 
 LOWER = (0.002, 0.005)  # m, of the ground at the landing

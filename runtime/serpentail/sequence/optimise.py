@@ -21,9 +21,8 @@ from ..simulation.controllers.moves import TOUCH_DOWN
 from .leap import Leap, measures_of, missed, repeats, state_at
 from .phase import AIRBORNE, BEFORE, LANDING
 from .run import SequenceRun
-from .search import landing_measures, push_measures, searched, tilt
+from .search import landing_measures, push_measures, searched, tilt, unknowns_of
 from .sequence import PhaseStart, Sequence
-from .unknowns import unknowns_of
 from .wanted import ENOUGH, Wanted, wanted_of
 
 LIMITS = MappingProxyType({"push": 25.0, "landing": 25.0, "tilt": radians(60)})

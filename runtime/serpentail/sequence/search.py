@@ -6,9 +6,9 @@ because the force of a landing is full of small optima.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import Bounds, OptimizeResult, differential_evolution
@@ -24,14 +24,16 @@ from ..motion.numbers import com_rise
 from ..motion.trajectory import Trajectory
 from ..planning.problem import checked_goal
 from ..simulation.controllers.pfl import Pfl
+from ..simulation.controllers.piecewise import FASTEST
 from ..simulation.controllers.schedules import Legs, Reference
 from ..simulation.simulate import simulate
 from .flight import landing_time
-from .phase import Phase
+from .phase import BEFORE, Phase
 from .sequence import PhaseStart, Sequence
-from .unknowns import ANGLE, LONGER, Unknown, leg_rate, with_numbers
 from .wanted import Wanted
 
+ANGLE = 0.9  # rad, that an angle may move to each side of the first guess
+LONGER = 2.0  # times, that a duration may become longer or shorter
 PEOPLE, ROUNDS = 8, 25  # tries of a round for each number; most rounds
 AFTER = 0.03  # s that a push is followed after its last move
 LANDING = 1.0  # s that a landing is followed
@@ -39,8 +41,52 @@ SWINGS = 0.1  # s in which the tail goes to its goal
 ABOVE = 1e-4  # m, of the feet where a landing begins
 FAILED = 1e3  # cost of a run that fails
 SAMPLES = 100
+AllPhases = list[Phase] | tuple[Phase, ...]
 Measured = Callable[[Sequence], dict[str, float]]  # of a sequence
 RTOL = 1e-4  # of the searches; the leap itself has the sequence's own
+
+
+class Unknown(NamedTuple):
+    """A number of a move: its phase, move and key, and its first guess (rad or s)."""
+
+    phase: int
+    move: int
+    key: str
+    guess: float
+
+
+def unknowns_of(phases: AllPhases, k: int) -> list[Unknown]:
+    """Return the angles of all moves of phase k, and durations of moves on the ground.
+
+    SimulationError about moves that have a rate in place of a duration.
+    """
+    found = []
+    for j, move in enumerate(phases[k].moves):
+        if "rate" in move:
+            field = f"phase {phases[k].name!r}: moves[{j}].rate"
+            remedy = "optimise changes durations: give duration, and limits.leg_rate"
+            raise SimulationError(f"{field}: value {move['rate']}: {remedy}")
+        keys = ("gamma", "delta") if BEFORE in move else ("gamma", "delta", "duration")
+        found += [Unknown(k, j, key, float(move[key])) for key in keys if key in move]
+    return found
+
+
+def with_numbers(phases: AllPhases, unknowns: list[Unknown], x: np.ndarray) -> tuple[Phase, ...]:
+    """Return phases whose moves have the numbers x."""
+    moves = [[{**move} for move in phase.moves] for phase in phases]
+    for unknown, value in zip(unknowns, x.tolist(), strict=True):
+        moves[unknown.phase][unknown.move][unknown.key] = value
+    return tuple(replace(phase, moves=each) for phase, each in zip(phases, moves, strict=True))
+
+
+def leg_rate(angles: Iterable[float], phases: AllPhases) -> float:
+    """Return the largest rate (rad/s) of the legs in all moves, from their first angles on."""
+    (gamma, delta), fastest = angles, 0.0
+    for move in (move for phase in phases for move in phase.moves):
+        before, gamma, delta = (gamma, delta), move.get("gamma", gamma), move.get("delta", delta)
+        way = max(abs(gamma - before[0]), abs(delta - before[1]))
+        fastest = max(fastest, FASTEST[move.get("shape", "linear")] * way / move["duration"])
+    return float(fastest)
 
 
 def searched(
@@ -110,7 +156,7 @@ def push_measures(sequence: Sequence, start: PhaseStart, aim: Any) -> dict[str, 
         "push": _weights(sequence, pushed),
         "rise": sum(com_rise(model, motion) or 0.0 for motion in (pushed, flown)),
         "spin": float(np.linalg.norm(pushed.angular_momentum[-1])),
-        "leg_rate": leg_rate(first, [push]),
+        "leg_rate": leg_rate(first, (push,)),
         "tilt": float(tilts.max()),
         "miss": miss,
     }
@@ -134,7 +180,7 @@ def landing_measures(sequence: Sequence, touch: PhaseStart) -> dict[str, float]:
     return {
         "landing": _weights(sequence, motion),
         "tilt": float(tilts.max()),
-        "leg_rate": leg_rate((gamma, delta), [phase]),
+        "leg_rate": leg_rate((gamma, delta), (phase,)),
         "lean": float(np.degrees(tilts[-1])),
         "carried": float(carried / weight_of(model.parameters)),
     }
