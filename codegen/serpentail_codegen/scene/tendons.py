@@ -31,12 +31,19 @@ def tendons_of(kind: str, values: Mapping[str, Any]) -> TailDescription:
     if not isinstance(tables, Mapping) or not tables:
         return TailDescription({})
     links, problems = kind == "articulated", _refused(values, kind)
-    found = {name: _numbers(f"tendon.{name}", name, t, problems) for name, t in tables.items()}
+    unnamed = "needs a name of a-z, 0-9 and _"
+    problems += [Problem(f"tendon.{n}", n, unnamed) for n in tables if not NAME.holds(n)]
+    wrong = {n: t for n, t in tables.items() if not isinstance(t, Mapping)}
+    problems += [Problem(f"tendon.{n}", t, EXAMPLE) for n, t in wrong.items()]
+    tables = {n: t for n, t in tables.items() if n not in wrong}
+    found: dict[str, Numbers] = {}
+    for name, table in tables.items():
+        numbers = {key: value for key, value in table.items() if key not in TENDON_COUNTS}
+        found[name] = numbers_of(f"tendon.{name}", numbers, TENDON, 1, problems)
     differ = shape.own or shape.counts or any({*GUIDES[1:]} & {*own} for own in found.values())
     guided = bool(links and differ)
     for name, table in tables.items():
-        if isinstance(table, Mapping):
-            problems += _problems(f"tendon.{name}", table, found[name], links, guided, m)
+        problems += _problems(f"tendon.{name}", table, found[name], links, guided, m)
     if problems or not isinstance(values["parameters"], Mapping):
         return TailDescription({}, tuple(problems))
     names = names_of_tendons(tables)
@@ -55,23 +62,12 @@ def tendons_of(kind: str, values: Mapping[str, Any]) -> TailDescription:
     return TailDescription({"shape": shape, "parameters": {**given, **values["parameters"]}})
 
 
-def _numbers(place: str, name: str, table: Any, problems: list[Problem]) -> Numbers:
-    """Return the numbers of a table."""
-    if not NAME.holds(name):
-        problems.append(Problem(place, name, "needs a name of a-z, 0-9 and _"))
-    if not isinstance(table, Mapping):
-        problems.append(Problem(place, table, EXAMPLE))
-        return {}
-    wrong = {k: table[k] for k in TENDON_COUNTS if k in table and not COUNT.holds(table[k])}
-    problems += [Problem(f"{place}.{k}", x, f"needs {COUNT.text}") for k, x in wrong.items()]
-    numbers = {key: value for key, value in table.items() if key not in TENDON_COUNTS}
-    return numbers_of(place, numbers, TENDON, 1, problems)
-
-
 def _problems(
     place: str, table: Mapping[str, Any], own: Numbers, links: bool, guided: bool, segments: int
 ) -> Iterator[Problem]:
     """Yield what is missing, wrong or too much in a table."""
+    for key in [key for key in TENDON_COUNTS if not COUNT.holds(table.get(key, 1))]:
+        yield Problem(f"{place}.{key}", table[key], f"needs {COUNT.text}")
     start = ("count", "radius") if {"count", "radius"} & {*table} else ("offset",)
     for key in (*start, "tension", *["root"] * guided):
         if key not in table:

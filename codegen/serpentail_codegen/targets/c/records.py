@@ -20,10 +20,7 @@ def records(has: SimulationFeatures) -> dict[str, list[Field]]:
     """Return the C records by name."""
     return {
         "piecewise": PIECEWISE,
-        "controller": CONTROLLER[:2]
-        + (TENSIONS if has.tendons else [])
-        + (PFL if has.pfl else [])
-        + CONTROLLER[2:],
+        "controller": [*CONTROLLER[:2], *TENSIONS[: has.tendons], *PFL * has.pfl, *CONTROLLER[2:]],
         "drive": DRIVE + (LEGS if has.legs else []),
         "run": START
         + (BRISTLES[:1] if has.contacts else [])

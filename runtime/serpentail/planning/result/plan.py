@@ -216,22 +216,9 @@ class Plan(NearNames):
         return torques_of(self.trajectory.model, self._at(times))
 
     def tension(self, times: ArrayLike) -> np.ndarray:
-        """Evaluate the planned tensions.
+        """Evaluate the planned tensions (n, tendons), N, at times (n,) from the start, s.
 
-        Parameters
-        ----------
-        times : array_like, shape (n,)
-            Times from the start (s).
-
-        Returns
-        -------
-        ndarray, shape (n, tendons)
-            Tensions (N).
-
-        Raises
-        ------
-        PlanningError
-            The plan is of a tail without tendons.
+        PlanningError is raised about a plan of a tail without tendons.
         """
         if TENSION not in self.curve.nodes:
             raise PlanningError("tension: this plan has no tendons: use torque")

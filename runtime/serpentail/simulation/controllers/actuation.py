@@ -16,7 +16,8 @@ from .ctrl_c import CtrlC
 from .parts import NativeTorque, Parts, TorqueFunction
 from .piecewise import Piecewise
 from .schedules import Legs
-from .tensions import refuse_tensions
+
+ROUNDING = 1e-6  # of a tension's limit, by which those of a solver may go beyond it
 
 
 class Actuation:
@@ -71,12 +72,9 @@ class Actuation:
     def acts(self) -> bool:
         """Whether any torque acts."""
         return any(
-            each is not None
+            getattr(parts, name) is not None
             for parts in self.parts
-            for each in (
-                *(parts.damping, parts.torques, parts.tensions),
-                *(parts.pfl, parts.native, parts.user),
-            )
+            for name in ("damping", "torques", "tensions", "pfl", "native", "user")
         )
 
     @property
@@ -116,7 +114,7 @@ class Actuation:
             powers = parts.torques.coefficients.swapaxes(1, 2)
             refuse_driven(self.model, "controller", powers, SimulationError)
         if parts.tensions is not None:
-            refuse_tensions(self.model, parts.tensions)
+            _refuse_tensions(self.model, parts.tensions)
 
     def _available(self, parts: Parts) -> Parts:
         """Return the parts for this model: PFL in Python if its C is missing."""
@@ -204,6 +202,23 @@ class Actuation:
             )
         refuse_driven(self.model, f"controller at t = {t:.6g} s", torques, SimulationError)
         return torques
+
+
+def _refuse_tensions(model: Model, curve: Piecewise) -> None:
+    """SimulationError if a model has other tendons, or a tension is below 0 or above its limit."""
+    names = model.layout.tendons
+    if not names or curve.channels != len(names):
+        has = f"{len(names)} tendons" if names else "none: give its scene tables [tendon.NAME]"
+        raise SimulationError(f"tensions: {curve.channels} tendons: {model.name} has {has}")
+    times, limits = curve.times, np.atleast_1d(model.parameters["tendon_limits"])
+    looks = np.linspace(0, 1, max(curve.coefficients.shape[2], 2))
+    inner = (times[:-1, None] + np.diff(times)[:, None] * looks[:-1]).ravel()
+    found = curve.at(np.append(inner, np.nextafter(times[1:], 0)))[0]
+    wrong = (found < -ROUNDING * limits) | (found > (1 + ROUNDING) * limits)
+    if wrong.any():
+        row, k = np.argwhere(wrong)[0]
+        needs = f"tendon {names[k]} needs 0 to {limits[k]:g} N"
+        raise SimulationError(f"tensions[:, {k}]: value {found[row, k]:.6g}: {needs}")
 
 
 def _native(law: NativeTorque) -> dict[str, int | None]:
