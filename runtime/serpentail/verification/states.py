@@ -1,7 +1,7 @@
 """The states at which laws are checked, seeded and random, and a model's outputs there."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -33,7 +33,7 @@ class Case:
     dtau: np.ndarray
     multiplier: np.ndarray
     drift: np.ndarray  # in air, velocity of B against it and omega, torso axes
-    tendons: int = field(default=0, kw_only=True)  # of the model
+    tension: np.ndarray  # of the tendons (N)
 
     @property
     def fixed(self) -> bool:
@@ -56,11 +56,6 @@ class Case:
         return self.f_ext[OMEGA] / 20
 
     @property
-    def tension(self) -> np.ndarray:
-        """Tensions of the tendons (N)."""
-        return np.abs(np.resize(self.multiplier, self.tendons))
-
-    @property
     def weights(self) -> np.ndarray:
         """Weights of an airborne state's rates and of omega."""
         return np.resize(self.multiplier, len(self.x) + 3)
@@ -77,8 +72,7 @@ def states(model: Model, count: int = 4, seed: int = 1) -> Iterator[Case]:
     for kind in KINDS:
         for k in range(count):
             arrays = random_arrays(model, rng, kind, k)
-            arrays = [x.astype(real).astype(float) for x in arrays]
-            yield Case(kind, *arrays, tendons=len(model.layout.tendons))
+            yield Case(kind, *(x.astype(real).astype(float) for x in arrays))
 
 
 def random_arrays(model: Model, rng: np.random.Generator, kind: str, k: int) -> list[np.ndarray]:
@@ -103,7 +97,8 @@ def random_arrays(model: Model, rng: np.random.Generator, kind: str, k: int) -> 
     directions = [rng.uniform(-1, 1, len(x)) for x in (v, v, tau, v)]
     flies = "air_density" in model.parameters and not model.fixed
     drift = blocks(rng, 0, (2.0, 20.0, 0.0)) if flies else np.zeros(0)
-    return [q, v, v_dot, tau, f_ext, *directions, drift]
+    tension = np.abs(np.resize(directions[-1], len(model.layout.tendons)))
+    return [q, v, v_dot, tau, f_ext, *directions, drift, tension]
 
 
 def direction(rng: np.random.Generator, size: int) -> np.ndarray:

@@ -181,9 +181,14 @@ static void chain_rows(const Node *node, Places at, const double *raw, int count
     }
 }
 
-/* H by (x, torques) as that by (x, tensions): P^T H P and the torques' own curvature. */
-static int chain_curvature(const Node *node, Places at)
+/* J and H by (x, torques) as those by (x, tensions): J P, and P^T H P with the torques' own
+   curvature. */
+static int chain(const Node *node, Places at, int order)
 {
+    chain_rows(node, at, at.raw_J, at.air_y, at.air_J);
+    if (order < 2) {
+        return 0;
+    }
     memset(at.pull_mu, 0, (size_t)at.raw * sizeof *at.pull_mu);
     for (int i = 0; i < at.air_y; i++) {
         add(at.raw, at.air_mu[i], at.raw_J + (size_t)i * at.raw, at.pull_mu);
@@ -342,10 +347,7 @@ int node_evaluate(const Node *node, const double *x, const double *u, const doub
             damp_columns(node, at.raw_H, at.raw, at.raw);
             damp_rows(node, at.raw_H, at.raw);
         }
-        if (node->tendons > 0 && order > 0) {
-            chain_rows(node, at, at.raw_J, at.air_y, at.air_J);
-        }
-        if (node->tendons > 0 && order == 2 && chain_curvature(node, at) != 0) {
+        if (node->tendons > 0 && order > 0 && chain(node, at, order) != 0) {
             return 1;
         }
     }
