@@ -46,7 +46,7 @@ Measured = Callable[[Sequence], dict[str, float]]  # of a sequence
 RTOL = 1e-4  # of the searches; the leap itself has the sequence's own
 
 
-class Unknown(NamedTuple):
+class MoveNumber(NamedTuple):
     """A number of a move: its phase, move and key, and its first guess (rad or s)."""
 
     phase: int
@@ -55,7 +55,7 @@ class Unknown(NamedTuple):
     guess: float
 
 
-def unknowns_of(phases: AllPhases, k: int) -> list[Unknown]:
+def unknowns_of(phases: AllPhases, k: int) -> list[MoveNumber]:
     """Return the angles of all moves of phase k, and durations of moves on the ground.
 
     SimulationError about moves that have a rate in place of a duration.
@@ -67,11 +67,11 @@ def unknowns_of(phases: AllPhases, k: int) -> list[Unknown]:
             remedy = "optimise changes durations: give duration, and limits.leg_rate"
             raise SimulationError(f"{field}: value {move['rate']}: {remedy}")
         keys = ("gamma", "delta") if BEFORE in move else ("gamma", "delta", "duration")
-        found += [Unknown(k, j, key, float(move[key])) for key in keys if key in move]
+        found += [MoveNumber(k, j, key, float(move[key])) for key in keys if key in move]
     return found
 
 
-def with_numbers(phases: AllPhases, unknowns: list[Unknown], x: np.ndarray) -> tuple[Phase, ...]:
+def with_numbers(phases: AllPhases, unknowns: list[MoveNumber], x: np.ndarray) -> tuple[Phase, ...]:
     """Return phases whose moves have the numbers x."""
     moves = [[{**move} for move in phase.moves] for phase in phases]
     for unknown, value in zip(unknowns, x.tolist(), strict=True):
@@ -91,7 +91,7 @@ def leg_rate(angles: Iterable[float], phases: AllPhases) -> float:
 
 def searched(
     sequence: Sequence,
-    unknowns: list[Unknown],
+    unknowns: list[MoveNumber],
     measured: Measured,
     wanted: Wanted,
     end: float,

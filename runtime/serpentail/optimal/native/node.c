@@ -22,7 +22,7 @@ static int airborne_of(const Node *node)
 
 static Places places_of(const Node *node, double *scratch)
 {
-    Places at;
+    Places at = {0};
     const int m = node->tail;
     at.zeta = zeta_of(node);
     at.y = y_of_node(node);
