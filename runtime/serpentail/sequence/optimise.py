@@ -102,7 +102,11 @@ def optimise(
     for turn in range(TURNS):
         until = min(time.monotonic() + SHARE * time_limit, begun + time_limit)
         if flies:
-            leap = _landing(leap, kept[-1].run, wanted, until, turn)
+            before = kept[-1].run
+            touch = replace(state_at(before, before.phases[2].begin), bristles=None)
+            lands, enough = partial(landing_measures, touch=touch), -np.inf if best else ENOUGH
+            unknowns = [*unknowns_of(leap.phases, 1)[-2:], *unknowns_of(leap.phases, 2)]
+            leap = searched(leap, unknowns, lands, wanted, until, enough, turn)
         else:
             leap = searched(leap, unknowns_of(leap.phases, 0), push, asked, until, seed=turn)
         run = leap.simulate(q, v, bristles0)
@@ -142,14 +146,6 @@ def _flies(run: SequenceRun, wanted: Wanted, measures: Mapping[str, Any]) -> boo
     tilts = tilt(run.trajectory)[run.trajectory.t <= run.phases[2].begin]
     shares = wanted.shares({**measures, "tilt": tilts.max()})
     return all(shares.get(name, 0.0) <= 1 for name in ("push", "rise", "spin", "tilt"))
-
-
-def _landing(leap: Sequence, run: SequenceRun, wanted: Wanted, end: float, seed: int) -> Sequence:
-    """Return a leap with a better landing from where a motion comes down."""
-    touch = replace(state_at(run, run.phases[2].begin), bristles=None)
-    unknowns = [*unknowns_of(leap.phases, 1)[-2:], *unknowns_of(leap.phases, 2)]
-    measured, enough = partial(landing_measures, touch=touch), -np.inf if wanted.best else ENOUGH
-    return searched(leap, unknowns, measured, wanted, end, enough, seed)
 
 
 def _check(leap: Any) -> None:

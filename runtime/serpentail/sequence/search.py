@@ -153,7 +153,7 @@ def push_measures(sequence: Sequence, start: PhaseStart, aim: Any) -> dict[str, 
     elif aim is not None:
         miss = 2 * float(np.arccos(min(1.0, abs(flown.q[-1, QUATERNION] @ aim))))
     return {
-        "push": _weights(sequence, pushed),
+        "push": float(peaks(pushed)["all"].force / weight_of(model.parameters)),
         "rise": sum(com_rise(model, motion) or 0.0 for motion in (pushed, flown)),
         "spin": float(np.linalg.norm(pushed.angular_momentum[-1])),
         "leg_rate": leg_rate(first, (push,)),
@@ -175,25 +175,20 @@ def landing_measures(sequence: Sequence, touch: PhaseStart) -> dict[str, float]:
     legs = Legs.moves(gamma, delta, phase.moves)
     motion = _run(sequence, phase, replace(touch, q=q), legs, LANDING)
     assert motion.contact is not None
-    tilts = tilt(motion)
+    tilts, weight = tilt(motion), weight_of(model.parameters)
     carried = motion.contact.of("feet").forces[-SAMPLES // 4 :, :, 2].sum(axis=1).mean()
     return {
-        "landing": _weights(sequence, motion),
+        "landing": float(peaks(motion)["all"].force / weight),
         "tilt": float(tilts.max()),
         "leg_rate": leg_rate((gamma, delta), (phase,)),
         "lean": float(np.degrees(tilts[-1])),
-        "carried": float(carried / weight_of(model.parameters)),
+        "carried": float(carried / weight),
     }
 
 
 def tilt(motion: Trajectory) -> np.ndarray:
     """Return the angle (rad) of the torso's z axis from the vertical in each sample."""
     return np.radians(tilt_deg(motion.attitude))
-
-
-def _weights(sequence: Sequence, motion: Trajectory) -> float:
-    """Return the largest force of the ground, in body weights."""
-    return float(peaks(motion)["all"].force / weight_of(sequence.model.parameters))
 
 
 def _run(sequence: Sequence, phase: Phase, start: PhaseStart, legs: Legs, end: float) -> Trajectory:
