@@ -18,11 +18,11 @@ from serpentail_scene.layout import QUATERNION, TAIL_Q
 from ..basics.attitude import tilt_deg
 from ..basics.errors import SimulationError
 from ..basics.progress import Stage
-from ..model.weight import weight_of
+from ..model.weight import fall, weight_of
 from ..motion.ground import peaks
-from ..motion.numbers import com_rise
 from ..motion.trajectory import Trajectory
 from ..planning.problem import checked_goal
+from ..planning.result.full_state import com_at_start
 from ..simulation.controllers.pfl import Pfl
 from ..simulation.controllers.piecewise import FASTEST
 from ..simulation.controllers.schedules import Legs, Reference
@@ -142,6 +142,9 @@ def push_measures(sequence: Sequence, start: PhaseStart, aim: Any) -> dict[str, 
     # the flight, to the landing
     goal = checked_goal(flight.plan[0].get("goal"), model.layout.nt)
     q, v = pushed.q[-1], pushed.v[-1]
+    down = fall(model.parameters)
+    height, speed = (-(part @ down) for part in com_at_start(model, (q, v)))
+    height += com_at_start(model, (start.q, start.v))[0] @ down
     tails = [q[TAIL_Q], 0 * q[TAIL_Q] if goal.tail is None else np.nan_to_num(goal.tail)]
     follows = replace(flight, controller=Pfl(model, Reference([0.0, SWINGS], tails)))
     angles = sequence.last_angles(flight, push.moves)
@@ -154,8 +157,8 @@ def push_measures(sequence: Sequence, start: PhaseStart, aim: Any) -> dict[str, 
         miss = 2 * float(np.arccos(min(1.0, abs(flown.q[-1, QUATERNION] @ aim))))
     return {
         "push": float(peaks(pushed)["all"].force / weight_of(model.parameters)),
-        "rise": sum(com_rise(model, motion) or 0.0 for motion in (pushed, flown)),
-        "spin": float(np.linalg.norm(pushed.angular_momentum[-1])),
+        "rise": float((height + speed * abs(speed) / (2 * down @ down)) / np.linalg.norm(down)),
+        "spin": float(np.linalg.norm(model.momentum(q, v)[1])),
         "leg_rate": leg_rate(first, (push,)),
         "tilt": float(tilts.max()),
         "miss": miss,
