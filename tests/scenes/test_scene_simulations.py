@@ -130,7 +130,6 @@ def test_a_rat_stands_on_a_slope_that_friction_holds_and_else_slides():
         assert st.summary(scene.model, scene.simulate())["standing_end"] == (mu > np.tan(0.35))
 
 
-
 def test_bends_are_shared_among_links(scenario):
     times = "[simulate.reference]\ntimes = [0.01, 0.02]\n"
     with pytest.raises(st.SimulationError, match="bends"):
