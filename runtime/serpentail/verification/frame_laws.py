@@ -81,7 +81,8 @@ def turned_outputs(model: Model, results: dict, X: np.ndarray, shift: np.ndarray
         "velocities": lambda u: u @ Z.T,
         "J": lambda J: Z @ J @ X.T,
         "dparameters": lambda D: X @ np.hstack([D[:, :world] @ Z.T[:world, :world], D[:, world:]]),
-        **dict.fromkeys(("mount_force", "mount_moment"), lambda f: f),  # torso axes
+        # in torso axes, and of the tail alone
+        **dict.fromkeys(("mount_force", "mount_moment", "lengths", "B"), lambda f: f),
     }
     return {key: turn[key](x) if key in turn else turned_array(x, X) for key, x in results.items()}
 
