@@ -49,9 +49,8 @@ class Plan(NearNames):
         The planned motion and torques, before damping. Its samples include all ends of
         intervals.
     report : dict
-        JSON-ready summary: errors at the end, effort (N^2 m^2 s, of
-        tensions N^2 s), energy (J), peak power (W),
-        times (s), counts; docs/planning.md lists its keys.
+        JSON-ready summary: errors at the end, effort (N^2 m^2 s; of tensions N^2 s), energy (J),
+        peak power (W), times (s), counts; docs/planning.md lists its keys.
     problem : PlanningProblem
         What was asked.
     curve : Curve
@@ -182,8 +181,7 @@ class Plan(NearNames):
         """Return the planned motion and, if the model is known, the true and the passive one."""
         if model is None:
             return [self.trajectory]
-        damping = self.problem.damping
-        laws = (planned_law(self.curve, damping), Damping(damping))
+        laws = (self.controller, Damping(self.problem.damping))
         return [self.trajectory, *(self._flown(model, law) for law in laws)]
 
     def _flown(self, model: Model, law: Controller) -> Trajectory:
