@@ -17,7 +17,7 @@ SETTINGS = {
     **dict.fromkeys(
         ADAPTIVE, ("rtol", "atol", "first_step", "least_step", "most_step", "most_steps")
     ),
-    **dict.fromkeys(SCIPY, ("rtol", "atol")),
+    **dict.fromkeys(SCIPY, ("rtol", "atol", "most_steps")),
 }
 # times the tolerances, times the steps, of runs that are made again to estimate errors
 LOOSER, LONGER = (4.0, 10.0), (2, 3)

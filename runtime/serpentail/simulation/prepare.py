@@ -20,7 +20,7 @@ from .controllers.actuation import RunActuations
 from .controllers.controller import Controller
 from .ground import GroundSettings
 from .methods import (
-    ADAPTIVE,
+    FIXED,
     LONG,
     SCIPY,
     IntegrationMethod,
@@ -86,7 +86,7 @@ def choose(
     refuse_misplaced(model, settings)
     span = start.end - start.start
     method = checked_method(name, settings, available, single)
-    if name in ADAPTIVE:
+    if name not in FIXED:
         most: dict[str, float] = {"most_steps": usual_most_steps(span)}
         method = replace(method, settings=most | method.settings)
     most_steps = method.settings.get("most_steps", MOST_STEPS)

@@ -121,8 +121,8 @@ def simulate(
     first_step, least_step, most_step : float, optional
         Bounds of the steps of adaptive methods in C (s).
     most_steps : int, optional
-        Largest number of steps of these. Default: 300000 for each second, at least 300000 and at
-        most 1000000.
+        Largest number of steps of these and of SciPy's methods. Default: 300000 for each second,
+        at least 300000 and at most 1000000.
     step : float, default 1e-4
         Step of "rk4" and "implicit_euler" (s); it is shortened to divide ``output_step``.
     legs : Legs

@@ -8,7 +8,7 @@ import numpy as np
 from serpentail_scene.layout import QUATERNION
 
 from ...basics.errors import SimulationError
-from ...model.library import NOT_FINITE
+from ...model.library import NOT_FINITE, TOO_MANY_STEPS
 from ..callback import Watched, samples_from
 from ..methods import IntegrationMethod
 from .outcomes import Samples, failed
@@ -123,9 +123,12 @@ def _smooth_part(
 
     t, y, end = part
     rate.torque(t, y)  # where the rate is NaN, DOP853's first step would be, and never end
-    solver = {"dop853": DOP853, "lsoda": LSODA}[method.name](rate, t, y, end, **method.settings)
+    tolerances = {name: method.settings[name] for name in ("rtol", "atol")}
+    solver = {"dop853": DOP853, "lsoda": LSODA}[method.name](rate, t, y, end, **tolerances)
     steps = 0
     while solver.status == "running":
+        if counts["steps"] + steps >= method.settings["most_steps"]:
+            raise failed(TOO_MANY_STEPS, solver.t)
         message = solver.step()
         if solver.status == "failed" and rate.refused is not None:
             raise rate.refused
