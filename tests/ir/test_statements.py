@@ -28,9 +28,9 @@ from tests.support.rows import row
 
 ROW = 8  # numbers that store a row of a small matrix
 DIFFERENTIATED = {ir.Apply, ir.Copy, ir.Fill, ir.Guard, ir.Loop}
-REVERSED = {ir.Solve, ir.SolvePair}  # also, but not carried along
+REVERSED = {ir.Solve}  # also, but not carried along
 TREES = {ir.Loop, ir.When, ir.Call}  # asked of what is in them
-MATRICES = {ir.Factor, ir.Solve, ir.FactorPair, ir.SolvePair}
+MATRICES = {ir.Factor, ir.Solve}
 
 
 @dataclass(frozen=True)
@@ -70,15 +70,18 @@ EXAMPLES = {
     ir.Factor: (lambda b, x, A, wide: b.factor(A, 2), [EXACT.const(1) / 4, 1]),
     # L^T D L with L = 1 below 1 / D = (5, 1)
     ir.Solve: (lambda b, x, A, wide: b.solve(A, x[0]), [-5, 8]),
-    ir.FactorPair: (lambda b, x, A, wide: b.factor_pair(A, 2), [EXACT.const(1) / 3, 1]),
-    ir.SolvePair: (lambda b, x, A, wide: b.solve_pair(A, x[0]), [-20, 23]),
     ir.Guard: (lambda b, x, A, wide: b.guard(x[0], "TOO_SMALL", x[0]), [2, 3]),
     ir.Call: (record_call, [4, 6]),
 }
+PAIRS = {
+    ir.Factor: (lambda b, x, A, wide: b.factor(A, 2, True), [EXACT.const(1) / 3, 1]),
+    ir.Solve: (lambda b, x, A, wide: b.solve(A, x[0], True), [-20, 23]),
+}
+CASES = [(kind, table) for table in (EXAMPLES, PAIRS) for kind in table]
 UNKNOWN = lambda b, x, A, wide: b.emit(Sort(x[0]))  # noqa: E731 - as those above
 
 
-def example(kind):
+def example(kind, table):
     """A program with a statement of a type; A = [[5, 1], [1, 1]], and [[5, 2], [1, 1]] in pairs."""
     b = Builder("example", "One statement.")
     a, x = b.array("a", 2, role="input"), b.array("x", 2, role="output")
@@ -88,10 +91,10 @@ def example(kind):
             b.fill(A.part(first, 1), 5)
             b.fill(A.part(first + ROW, 2), 1 + bool(first), 1)
     b.copy(x[0], a[0])
-    EXAMPLES.get(kind, (UNKNOWN,))[0](b, x, A, wide)
+    table.get(kind, (UNKNOWN,))[0](b, x, A, wide)
     if kind is ir.Unit:
         b.copy(x[0], wide.lane(0, 0, 2))
-    if kind in (ir.Factor, ir.FactorPair):
+    if kind is ir.Factor:
         b.copy(x[0], A.part(0, 2, ROW))
     return b.finish()
 
@@ -104,16 +107,16 @@ def test_the_list_of_statements_is_complete():
 
 def test_the_interpreter_runs_each():
     given = {"a": [EXACT.const(2), EXACT.const(3)]}
-    for kind, (_, expected) in EXAMPLES.items():
+    for kind, table in CASES:
         with row(kind):
-            assert Run(example(kind), EXACT, given).values["x"] == expected
+            assert Run(example(kind, table), EXACT, given).values["x"] == table[kind][1]
     with pytest.raises(TypeError, match=r"^no rule runs Sort$"):
-        Run(example(Sort), EXACT, given)
+        Run(example(Sort, {}), EXACT, given)
 
 
 def test_what_each_reads_and_writes_is_known_or_it_is_refused():
-    for kind in EXAMPLES:
-        (statement,) = [s for s in example(kind).body if type(s) is kind][-1:]
+    for kind, table in CASES:
+        (statement,) = [s for s in example(kind, table).body if type(s) is kind][-1:]
         with row(kind):
             if kind in TREES:
                 for question in (reads, writes):
@@ -123,13 +126,13 @@ def test_what_each_reads_and_writes_is_known_or_it_is_refused():
                 assert all(isinstance(ref, ir.Ref) for ref in reads(statement) + writes(statement))
                 assert writes(statement) or kind is ir.Guard
             if kind in MATRICES:
-                own = {"A"} | ({"x"} if kind in (ir.Solve, ir.SolvePair) else set())
+                own = {"A"} | ({"x"} if kind is ir.Solve else set())
                 assert {ref.array.name for ref in reads(statement)} == own
 
 
 def test_each_is_differentiated_or_refused_by_its_name():
-    for kind in (*EXAMPLES, Sort):
-        program = example(kind)
+    for kind, table in (*CASES, (Sort, {})):
+        program = example(kind, table)
         for derive, more in ((tangent_program, ()), (adjoint_program, (("x",),))):
             with row(kind):
                 if kind in DIFFERENTIATED or (kind in REVERSED and derive is adjoint_program):

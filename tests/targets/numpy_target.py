@@ -140,23 +140,15 @@ class NumpyPrinter:
 
     @statement.register
     def _factor(self, factor: ir.Factor):
-        name = factor.matrix.name
-        return [f"factor({name}, {name}, {factor.size}, {ir.padded(factor.size)})"]
+        name, row = factor.matrix.name, ir.padded(factor.size)
+        first = f"{name}[{factor.size * row} :]" if factor.pair else name
+        return [f"factor({first}, {name}, {factor.size}, {row})"]
 
     @statement.register
     def _solve(self, solve: ir.Solve):
-        name = solve.matrix.name
-        return [f"solve({name}, {name}, {view(solve.x)}, {ir.padded(solve.x.size)})"]
-
-    @statement.register
-    def _factor_pair(self, factor: ir.FactorPair):
-        name, row = factor.matrix.name, ir.padded(factor.size)
-        return [f"factor({name}[{factor.size * row} :], {name}, {factor.size}, {row})"]
-
-    @statement.register
-    def _solve_pair(self, solve: ir.SolvePair):
         name, row = solve.matrix.name, ir.padded(solve.x.size)
-        return [f"solve({name}[{solve.x.size * row} :], {name}, {view(solve.x)}, {row})"]
+        first = f"{name}[{solve.x.size * row} :]" if solve.pair else name
+        return [f"solve({first}, {name}, {view(solve.x)}, {row})"]
 
     @statement.register
     def _call(self, call: ir.Call):

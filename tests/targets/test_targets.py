@@ -68,8 +68,8 @@ def test_what_cannot_be_printed_is_refused():
     rows = [
         ("When", branch, casadi),
         ("Guard", lambda b, x, y: b.guard(x[0], "TOO_SMALL", y[0]), casadi),
-        ("FactorPair", lambda b, x, y: b.factor_pair(y, 2), casadi),
-        ("SolvePair", lambda b, x, y: b.solve_pair(y, x.part(0, 2)), casadi),
+        ("Factor", lambda b, x, y: b.factor(y, 2, True), casadi),
+        ("Solve", lambda b, x, y: b.solve(y, x.part(0, 2), True), casadi),
         ("wide has lanes", lambda b, x, y: b.fill(b.wide("wide", 1, 8)[0], 0), casadi),
         (
             "cannot be added to the lanes of wide",

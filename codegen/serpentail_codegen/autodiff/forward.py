@@ -8,7 +8,6 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from ..ir import program as ir
-from ..ir.builder import narrowed
 from ..ir.dataflow import (
     forward_slice,
     inner_arrays,
@@ -17,6 +16,7 @@ from ..ir.dataflow import (
     reads,
     rewritten,
     rule_of,
+    with_outputs,
     writes,
 )
 from .angles import SinesAndCosinesArray, angle_inputs, kinds, sines_and_cosines_arrays
@@ -230,16 +230,10 @@ class _Together:
         """
         found = [sweep.step(call, loops) for sweep in self.sweeps]
         steps = [both for both in found if both]
-        yield from (tangents_alone(both, call) for both in steps[:-1])
+        first = len(call.writes)
+        for step in steps[:-1]:
+            yield with_outputs(step, [name for name, _ in step.step.outputs[first:]])
         yield steps[-1] if steps else call
         for sweep, both in zip(self.sweeps, found, strict=True):
             if not both:
                 yield from sweep.cleared(*call.stored())
-
-
-def tangents_alone(both: ir.Apply, call: ir.Apply) -> ir.Apply:
-    """Return a step of values and tangents without the values."""
-    first = len(call.writes)
-    step = narrowed(both.step, {name for name, _ in both.step.outputs[first:]})
-    alone = ir.Apply.named(step, both.inputs(), both.writes[first:], call.adds)
-    return replace(alone, columns=both.columns)

@@ -154,12 +154,15 @@ class _Reversal:
         backward: list[ir.Statement] = [replace(when, body=tuple(back))] if back else []
         return [replace(when, body=tuple(there))], backward
 
-    def solve_pair(self, solve: ir.SolvePair, loops: Loops) -> BothWays:
-        """Return a solve, and that with the transpose of a matrix that has no adjoints: its two
-        triangles change places.
+    def solve(self, solve: ir.Solve, loops: Loops) -> BothWays:
+        """Return a solve, and that with the transpose of a matrix that has no adjoints: the two
+        triangles of a pair change places.
         """
         if self.matters(solve.matrix[0]):
             raise ValueError(f"{solve.matrix.name}: a factored matrix has no adjoints")
+        back = replace(solve, x=self.of(solve.x))
+        if not solve.pair:
+            return [solve], [back]
         half = solve.x.size * ir.padded(solve.x.size)
         turned = ir.Array(f"turned_{solve.matrix.name}", "local", 2 * half)
         self.kept.append(turned)
@@ -167,15 +170,7 @@ class _Reversal:
             ir.Copy(turned.part(half - first, half), solve.matrix.part(first, half))
             for first in (0, half)
         ]
-        return [solve], [*swapped, ir.SolvePair(turned, self.of(solve.x))]
-
-    def solve(self, solve: ir.Solve, loops: Loops) -> BothWays:
-        """Return a solve and its reverse: the same with the adjoints, the matrix being symmetric
-        and without adjoints.
-        """
-        if self.matters(solve.matrix[0]):
-            raise ValueError(f"{solve.matrix.name}: a factored matrix has no adjoints")
-        return [solve], [ir.Solve(solve.matrix, self.of(solve.x))]
+        return [solve], [*swapped, replace(back, matrix=turned)]
 
     def guard(self, guard: ir.Guard, loops: Loops) -> BothWays:
         """Return a guard, which has no reverse."""

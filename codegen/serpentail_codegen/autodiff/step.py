@@ -5,14 +5,13 @@ Both walk the operations once and differentiate each by its rule.  Tangents are 
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from functools import cache
 
-from ..ir.step import Step, compacted
+from ..ir.step import Step, Vectors, compacted, spans
 from ..ir.tape import LEAVES, Tape, live_nodes, operands, replay
 from .angles import AngleInputs, SinesAndCosines
 
-Vectors = Sequence[tuple[str, int]]  # names and sizes
 Combination = dict[int, int]  # a sum of tangents: the coefficient of each
 
 
@@ -74,15 +73,6 @@ def some_of(vectors: Vectors, chosen: frozenset[str], word: str = "") -> str:
     if len(chosen) == len(vectors):
         return ""
     return "_".join([word, *(name for name, _ in vectors if name in chosen)])
-
-
-def spans(vectors: Vectors) -> dict[str, range]:
-    """Return the positions of named vectors that follow each other."""
-    out, first = {}, 0
-    for name, size in vectors:
-        out[name] = range(first, first + size)
-        first += size
-    return out
 
 
 class Combinations:

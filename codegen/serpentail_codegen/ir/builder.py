@@ -7,7 +7,7 @@ from functools import cache
 
 from . import program as ir
 from .algebra import Number
-from .step import Step, compacted
+from .step import Step, compacted, spans
 
 
 @dataclass
@@ -86,21 +86,13 @@ class Builder:
         """Store unit vectors, the first of them 1 in lane ``first``."""
         self.emit(ir.Unit(target, ir.as_index(first)))
 
-    def factor(self, matrix: ir.Array, size: int) -> None:
-        """Factor a matrix in place."""
-        self.emit(ir.Factor(matrix, size))
+    def factor(self, matrix: ir.Array, size: int, pair: bool = False) -> None:
+        """Factor a matrix, or a pair of triangles, in place."""
+        self.emit(ir.Factor(matrix, size, pair))
 
-    def solve(self, matrix: ir.Array, x: ir.Ref) -> None:
-        """Solve in place with a factored matrix."""
-        self.emit(ir.Solve(matrix, x))
-
-    def factor_pair(self, matrix: ir.Array, size: int) -> None:
-        """Factor a pair of triangles in place."""
-        self.emit(ir.FactorPair(matrix, size))
-
-    def solve_pair(self, matrix: ir.Array, x: ir.Ref) -> None:
-        """Solve in place with a factored pair of triangles."""
-        self.emit(ir.SolvePair(matrix, x))
+    def solve(self, matrix: ir.Array, x: ir.Ref, pair: bool = False) -> None:
+        """Solve in place with a factored matrix, or with a factored pair of triangles."""
+        self.emit(ir.Solve(matrix, x, pair))
 
     def guard(self, scalar: ir.Ref, status: str, *protects: ir.Ref) -> None:
         """Give up with a status unless all scalars of a vector are positive."""
@@ -150,20 +142,15 @@ class Builder:
 @cache
 def _narrowed(step: Step, wanted: frozenset[str]) -> Step:
     # the outputs that are wanted, and their part of the results
-    outputs: list[tuple[str, int]] = []
-    results: list[int] = []
-    first = 0
-    for name, size in step.outputs:
-        if name in wanted:
-            outputs.append((name, size))
-            results += step.results[first : first + size]
-        first += size
+    kept = {name: span for name, span in spans(step.outputs).items() if name in wanted}
+    outputs = tuple((name, len(span)) for name, span in kept.items())
+    results = tuple(step.results[k] for span in kept.values() for k in span)
 
     # a step that lost outputs is named by those that it still has
     name = step.name
     if len(outputs) < len(step.outputs):
-        name = "_".join([name, *(output for output, _ in outputs)])
-    return compacted(replace(step, name=name, outputs=tuple(outputs), results=tuple(results)))
+        name = "_".join([name, *kept])
+    return compacted(replace(step, name=name, outputs=outputs, results=results))
 
 
 def narrowed(step: Step, wanted: set[str]) -> Step:

@@ -1,13 +1,12 @@
 """Dependences in a program, and programs rewritten: pruned, inlined, on other arrays."""
 
-import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import fields, replace
-from functools import cache
 from typing import Any
 
 from . import program as ir
 from .builder import narrowed
+from .step import Step
 
 
 def overlap(ref: ir.Ref, other: ir.Ref) -> bool:
@@ -22,39 +21,34 @@ def overlap(ref: ir.Ref, other: ir.Ref) -> bool:
     return first <= other_last and other_first <= last
 
 
-def reads(statement: ir.Statement) -> tuple[ir.Ref, ...]:
-    """Return what a statement reads, including targets that it adds to or overwrites in place."""
+def accesses(statement: ir.Statement) -> tuple[tuple[ir.Ref, ...], tuple[ir.Ref, ...]]:
+    """Return what a statement reads, including targets that it adds to or overwrites in place, and
+    what it writes.
+    """
     match statement:
-        case ir.Apply():
-            targets = zip(statement.writes, statement.adds, strict=True)
-            return (*statement.reads, *(ref for ref, adds in targets if adds))
-        case ir.Copy():
-            return (statement.source, statement.target) if statement.adds else (statement.source,)
-        case ir.Fill() | ir.Unit():
-            return ()
-        case ir.Factor() | ir.FactorPair():
-            return (statement.matrix[0],)
-        case ir.Solve() | ir.SolvePair():
-            return (statement.matrix[0], statement.x)
-        case ir.Guard():
-            return (statement.scalar,)
-    raise TypeError(f"no rule says what {type(statement).__name__} reads")
+        case ir.Apply(_, reads, writes, adds):
+            return (*reads, *(ref for ref, sums in zip(writes, adds, strict=True) if sums)), writes
+        case ir.Copy(target, source, adds):
+            return (source, target) if adds else (source,), (target,)
+        case ir.Fill(target) | ir.Unit(target):
+            return (), (target,)
+        case ir.Factor(matrix):
+            return (matrix[0],), (matrix[0],)
+        case ir.Solve(matrix, x):
+            return (matrix[0], x), (x,)
+        case ir.Guard(scalar):
+            return (scalar,), ()
+    raise TypeError(f"no rule says what {type(statement).__name__} reads and writes")
+
+
+def reads(statement: ir.Statement) -> tuple[ir.Ref, ...]:
+    """Return what a statement reads."""
+    return accesses(statement)[0]
 
 
 def writes(statement: ir.Statement) -> tuple[ir.Ref, ...]:
     """Return what a statement writes."""
-    match statement:
-        case ir.Apply():
-            return statement.writes
-        case ir.Copy() | ir.Fill() | ir.Unit():
-            return (statement.target,)
-        case ir.Factor() | ir.FactorPair():
-            return (statement.matrix[0],)
-        case ir.Solve() | ir.SolvePair():
-            return (statement.x,)
-        case ir.Guard():
-            return ()
-    raise TypeError(f"no rule says what {type(statement).__name__} writes")
+    return accesses(statement)[1]
 
 
 def names(refs: Iterable[ir.Ref]) -> set[str]:
@@ -62,19 +56,13 @@ def names(refs: Iterable[ir.Ref]) -> set[str]:
     return {ref.array.name for ref in refs}
 
 
-@cache
-def _method_name(name: str) -> str:
-    """Return the name of a class in the style of a method."""
-    return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
-
-
 def rule_of(visitor: object, statement: ir.Statement, does: str) -> Callable[..., Any]:
-    """Return the method of a visitor that is named like a statement: ``solve_pair`` of SolvePair.
+    """Return the method of a visitor that is named like a statement: ``solve`` of Solve.
 
     does: what the visitor's methods do, for the error if it has none.
     """
     name = type(statement).__name__
-    rule = getattr(visitor, _method_name(name), None)
+    rule = getattr(visitor, name.lower(), None)
     if rule is None:
         raise TypeError(f"no rule {does} {name}")
     return rule
@@ -153,23 +141,27 @@ def backward_slice(body: ir.Body, end: Collection[str]) -> set[str]:
         targets = statement.protects if isinstance(statement, ir.Guard) else writes(statement)
         if not names(targets) & reached:
             return set()
-        return names(reads(_with_outputs(statement, reached)))
+        return names(reads(_narrowed(statement, reached)))
 
     return _fixpoint(body, end, more)
 
 
-def _with_outputs(statement: ir.Statement, needed: Collection[str]) -> ir.Statement:
+def with_outputs(call: ir.Apply, wanted: Iterable[str], step: Step | None = None) -> ir.Apply:
+    """Return an application of a step with only some outputs; ``step``: another one in its place,
+    which reads no more.
+    """
+    step = narrowed(step or call.step, set(wanted))
+    targets = dict(zip(call.outputs(), zip(call.writes, call.adds, strict=True), strict=True))
+    writes, adds = zip(*(targets[name] for name, _ in step.outputs), strict=True)
+    return replace(ir.Apply.named(step, call.inputs(), writes, adds), columns=call.columns)
+
+
+def _narrowed(statement: ir.Statement, needed: Collection[str]) -> ir.Statement:
     """Return an Apply without the outputs that go to unneeded arrays."""
     if not isinstance(statement, ir.Apply):
         return statement
-    kept = [k for k, ref in enumerate(statement.writes) if ref.array.name in needed]
-    if len(kept) == len(statement.writes):
-        return statement
-    step = narrowed(statement.step, {statement.step.outputs[k][0] for k in kept})
-    outputs = [statement.writes[k] for k in kept]
-    sums = [statement.adds[k] for k in kept]
-    narrow = ir.Apply.named(step, statement.inputs(), outputs, sums)
-    return replace(narrow, columns=statement.columns)
+    kept = {name for name, ref in statement.outputs().items() if ref.array.name in needed}
+    return statement if len(kept) == len(statement.writes) else with_outputs(statement, kept)
 
 
 def pruned(program: ir.Program) -> ir.Program:
@@ -188,7 +180,7 @@ def pruned(program: ir.Program) -> ir.Program:
             if protects:
                 yield with_arrays(replace(statement, protects=protects), array)
         elif names(writes(statement)) & needed:
-            yield with_arrays(_with_outputs(statement, needed), array)
+            yield with_arrays(_narrowed(statement, needed), array)
 
     body = rewritten(program.body, rewrite)
     kept = {a.name for a in program.arrays if a.role in ("input", "output", "parameters")} | needed

@@ -12,7 +12,7 @@ from typing import Any
 from . import program as ir
 from .algebra import Algebra, Number, positive_in_lanes
 from .dataflow import inlined, rule_of
-from .ldl import ldl_factor, ldl_solve, pair_factor, pair_solve
+from .ldl import ldl_factor, pair_factor, pair_solve
 from .step import Step
 from .tape import Tape, replay
 
@@ -216,29 +216,19 @@ class Run:
             self.values[matrix.name][start : start + k + 1] = row
 
     def factor(self, factor: ir.Factor, at: dict[str, int]) -> None:
-        """Factor a symmetric matrix."""
-        rows, pivots = ldl_factor(self.algebra, self.triangle(factor.matrix, factor.size))
+        """Factor a symmetric matrix, or a pair of triangles."""
+        starts = (0, factor.size) if factor.pair else (0,)
+        given = [self.triangle(factor.matrix, factor.size, first) for first in starts]
+        *found, pivots = (pair_factor if factor.pair else ldl_factor)(self.algebra, *given)
         self.guards += [("NOT_POSITIVE_DEFINITE", pivot) for pivot in pivots]
-        self.store_triangle(factor.matrix, rows)
+        for rows, first in zip(found, starts, strict=True):
+            self.store_triangle(factor.matrix, rows, first)
 
     def solve(self, solve: ir.Solve, at: dict[str, int]) -> None:
-        """Solve with a factored matrix."""
-        rows = self.triangle(solve.matrix, solve.x.size)
-        self.write(solve.x, at, ldl_solve(self.algebra, rows, self.read(solve.x, at)))
-
-    def factor_pair(self, factor: ir.FactorPair, at: dict[str, int]) -> None:
-        """Factor a pair of triangles."""
-        size = factor.size
-        lower, upper = (self.triangle(factor.matrix, size, first) for first in (0, size))
-        lower, upper, pivots = pair_factor(self.algebra, lower, upper)
-        self.guards += [("NOT_POSITIVE_DEFINITE", pivot) for pivot in pivots]
-        self.store_triangle(factor.matrix, lower)
-        self.store_triangle(factor.matrix, upper, size)
-
-    def solve_pair(self, solve: ir.SolvePair, at: dict[str, int]) -> None:
-        """Solve with a factored pair."""
+        """Solve with a factored matrix, or with a factored pair."""
         size = solve.x.size
-        lower, upper = (self.triangle(solve.matrix, size, first) for first in (0, size))
+        starts = (0, size if solve.pair else 0)
+        lower, upper = (self.triangle(solve.matrix, size, first) for first in starts)
         self.write(solve.x, at, pair_solve(self.algebra, lower, upper, self.read(solve.x, at)))
 
 

@@ -34,11 +34,6 @@ def _reduced(algebra: Algebra, row: list, factor: Any, other: list) -> list:
     return [algebra.sub(entry, algebra.mul(factor, taken)) for entry, taken in pairs]
 
 
-def ldl_solve(algebra: Algebra, A: Triangle, b: list) -> list:
-    """Solve L^T D L x = b with what ``ldl_factor`` returns."""
-    return pair_solve(algebra, A, A, b)
-
-
 def pair_factor(algebra: Algebra, A: Triangle, B: Triangle) -> tuple[Triangle, Triangle, list]:
     """Factor A = U D L, not symmetric, of the lower triangles A of it and B of its transpose.
 
@@ -59,7 +54,7 @@ def pair_factor(algebra: Algebra, A: Triangle, B: Triangle) -> tuple[Triangle, T
 
 
 def pair_solve(algebra: Algebra, A: Triangle, B: Triangle, b: list) -> list:
-    """Solve U D L x = b with what ``pair_factor`` returns."""
+    """Solve U D L x = b with what ``pair_factor`` returns; A = B is what ``ldl_factor`` returns."""
     size, b = len(b), list(b)
     for k in reversed(range(size)):
         for i in range(k):

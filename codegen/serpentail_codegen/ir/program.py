@@ -202,39 +202,25 @@ class When:
 class Factor:
     """Factor A = L^T D L in place; A symmetric positive definite, its lower triangle row-major.
 
-    The rows are ``padded(size)`` apart, so that whole vectors of a row can be computed.
+    The rows are ``padded(size)`` apart, so that whole vectors of a row can be computed.  As a pair:
+    A = U D L, not symmetric but with positive pivots, by its lower triangle and, after it, that of
+    its transpose.
     """
 
     matrix: Array
     size: int
+    pair: bool = False
 
 
 @dataclass(frozen=True)
 class Solve:
-    """Solve L^T D L x = x in place with a factored matrix; a wide x is solved for all lanes."""
-
-    matrix: Array
-    x: Ref
-
-
-@dataclass(frozen=True)
-class FactorPair:
-    """Factor A = U D L in place, A not symmetric but with positive pivots.
-
-    The matrix holds the lower triangle of A, then that of its transpose, each stored as ``Factor``
-    takes it.
+    """Solve L^T D L x = x, or U D L x = x of a pair of triangles, in place with a factored matrix;
+    a wide x is solved for all lanes.
     """
 
     matrix: Array
-    size: int
-
-
-@dataclass(frozen=True)
-class SolvePair:
-    """Solve U D L x = x in place with a factored pair of triangles."""
-
-    matrix: Array
     x: Ref
+    pair: bool = False
 
 
 @dataclass(frozen=True)
@@ -261,8 +247,7 @@ class Call:
 
 
 Body = tuple["Statement", ...]
-LinearEquations = Factor | Solve | FactorPair | SolvePair
-Statement = Apply | Fill | Unit | Copy | Loop | When | LinearEquations | Guard | Call
+Statement = Apply | Fill | Unit | Copy | Loop | When | Factor | Solve | Guard | Call
 STATEMENTS: tuple[type, ...] = get_args(Statement)
 
 

@@ -3,10 +3,22 @@
 Steps are what SymPy derives, what is differentiated, and what the loops of a program apply.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from .algebra import Number
 from .tape import LEAVES, Node, Tape, live_nodes, operands, replay
+
+Vectors = Sequence[tuple[str, int]]  # names and sizes
+
+
+def spans(vectors: Vectors) -> dict[str, range]:
+    """Return the positions of named vectors that follow each other."""
+    out, first = {}, 0
+    for name, size in vectors:
+        out[name] = range(first, first + size)
+        first += size
+    return out
 
 
 @dataclass(frozen=True)
@@ -33,13 +45,10 @@ def compacted(step: Step) -> Step:
     used = {step.nodes[n][1] for n in live if step.nodes[n][0] == "input"}
     inputs: list[tuple[str, int]] = []
     new_scalar: dict[int, int] = {}
-    first = 0
-    for name, size in step.inputs:
-        span = range(first, first + size)
+    for name, span in spans(step.inputs).items():
         if used.intersection(span):
-            new_scalar |= {k: len(new_scalar) + k - first for k in span}
-            inputs.append((name, size))
-        first += size
+            new_scalar |= {k: len(new_scalar) + k - span.start for k in span}
+            inputs.append((name, len(span)))
 
     # nodes: those alive, at their new positions
     new_node = {node: k for k, node in enumerate(live)}

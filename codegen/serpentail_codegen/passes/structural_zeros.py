@@ -8,11 +8,10 @@ scalar counts for every lane.
 from collections.abc import Iterator
 from dataclasses import replace
 
-from ..ir.builder import narrowed
-from ..ir.dataflow import inlined, pruned, rewritten
+from ..ir.dataflow import inlined, pruned, rewritten, with_outputs
 from ..ir.interpret import Run
 from ..ir.program import Apply, Copy, Fill, Program, Ref, Statement
-from ..ir.step import Step
+from ..ir.step import Step, spans
 from .split_steps import without
 
 NONE, ALL = 0, -1
@@ -101,23 +100,17 @@ def without_still(program: Program) -> Program:
 def _at_rest(call: Apply, still: frozenset[str]) -> Iterator[Statement]:
     """Yield a step some of whose inputs are zero, and zeros in place of outputs that then are."""
     step, targets = without(call.step, still), call.outputs()
-    adds = dict(zip(targets, call.adds, strict=True))
     zero = {name for name in _zero_outputs(step) if targets[name].lanes} if still else set()
     kept = [name for name in targets if name not in zero]
     if kept:
-        step = narrowed(step, set(kept))
-        sums = [adds[name] for name in kept]
-        one = Apply.named(step, call.inputs(), [targets[name] for name in kept], sums)
-        yield replace(one, columns=call.columns)
-    for name in targets:
-        if name in zero and not adds[name]:
-            yield Fill(targets[name], (0,) * targets[name].size)
+        yield with_outputs(call, kept, step)
+    for name, ref in targets.items():
+        if name in zero and ref in call.stored():
+            yield Fill(ref, (0,) * ref.size)
 
 
 def _zero_outputs(step: Step) -> Iterator[str]:
     """Yield the names of the outputs that are zero."""
-    first = 0
-    for name, size in step.outputs:
-        if all(step.nodes[r] == ("const", 0) for r in step.results[first : first + size]):
+    for name, span in spans(step.outputs).items():
+        if all(step.nodes[step.results[k]] == ("const", 0) for k in span):
             yield name
-        first += size

@@ -20,11 +20,11 @@ def unrolled_ldl(program: ir.Program, largest: int) -> ir.Program:
     pivots: dict[str, ir.Array] = {}
 
     def rewrite(statement: ir.Statement) -> Iterator[ir.Statement]:
-        if isinstance(statement, ir.Factor) and statement.size <= largest:
+        if isinstance(statement, ir.Factor) and not statement.pair and statement.size <= largest:
             name = f"pivots_{statement.matrix.name}"
             pivots[name] = ir.Array(name, "local", statement.size)
             yield from _factored(statement, pivots[name])
-        elif isinstance(statement, ir.Solve | ir.SolvePair) and statement.x.size <= largest:
+        elif isinstance(statement, ir.Solve) and statement.x.size <= largest:
             yield _solved(statement)
         elif isinstance(statement, ir.Call):
             yield replace(statement, program=unrolled_ldl(statement.program, largest))
@@ -43,9 +43,9 @@ def _factored(factor: ir.Factor, pivots: ir.Array) -> Iterator[ir.Statement]:
     yield ir.Guard(pivots[0], "NOT_POSITIVE_DEFINITE", rows)
 
 
-def _solved(solve: ir.Solve | ir.SolvePair) -> ir.Apply:
+def _solved(solve: ir.Solve) -> ir.Apply:
     """Return the step that solves with a factored matrix, or with a factored pair."""
-    size, triangles = solve.x.size, 2 if isinstance(solve, ir.SolvePair) else 1
+    size, triangles = solve.x.size, 2 if solve.pair else 1
     rows = _rows(solve.matrix, triangles * size, size)
     step = _solve_step(size, triangles)
     inputs = {f"row_{k}": row for k, row in enumerate(rows)} | {"x": solve.x}

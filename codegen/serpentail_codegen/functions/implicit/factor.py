@@ -56,7 +56,7 @@ def assemble_factor(draft: Draft, arrays: dict[str, Array]) -> None:
     if draft.tail.contacts:
         add_contacts(draft, f, state, R, segments, arrays)
         add_sliding(draft, f, R)
-        draft.factor_pair(f.array, nv)
+        draft.factor(f.array, nv, pair=True)
     else:
         draft.factor(f.array, nv)
 

@@ -30,7 +30,7 @@ def assemble_solve(draft: Draft, arrays: dict[str, Array]) -> None:
     pressed = None
     if draft.tail.contacts:
         pressed = contact_response(draft, f, arrays)
-        draft.solve_pair(f.array, k_v[0])
+        draft.solve(f.array, k_v[0], pair=True)
     else:
         draft.solve(f.array, k_v[0])
 

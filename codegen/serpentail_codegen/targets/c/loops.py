@@ -5,7 +5,7 @@ from functools import singledispatchmethod
 
 from ...ir import program as ir
 from ..expressions import called, index_text
-from ..target import UnprintableStatement, body_lines, unknown_statement
+from ..target import UnprintableStatement, body_lines, refused, unknown_statement
 from .conditions import copied_where, stored_where, when_in_lanes
 from .routine import CFunction, Routine, dialect, pointer, scalar, singles
 
@@ -167,10 +167,9 @@ class LoopPrinter:
             holds = f"({' && '.join(tests)})"
         return [f"if (!{holds}) {{", f"  return STATUS_{guard.status};", "}"]
 
-    @statement.register(ir.Factor)
-    @statement.register(ir.FactorPair)
-    def _factor(self, factor: ir.Factor | ir.FactorPair) -> list[str]:
-        helper = "pair_factor" if isinstance(factor, ir.FactorPair) else "ldl_factor"
+    @statement.register
+    def _factor(self, factor: ir.Factor) -> list[str]:
+        helper = "pair_factor" if factor.pair else "ldl_factor"
         matrix = self._ref(factor.matrix[0])
         self.helpers.add("all_positive" if matrix.lanes else "lanes")
         if matrix.lanes:
@@ -181,22 +180,17 @@ class LoopPrinter:
     @statement.register
     def _solve(self, solve: ir.Solve) -> list[str]:
         matrix, x = self._ref(solve.matrix[0]), self._ref(solve.x)
+        helper = "pair_solve" if solve.pair else "ldl_solve"
         if not x.lanes:
-            return [f"{self.helper('ldl_solve')}({x.size}, {pointer(matrix)}, {pointer(x)});"]
+            return [f"{self.helper(helper)}({x.size}, {pointer(matrix)}, {pointer(x)});"]
         self.helpers.add("lanes")
         if matrix.lanes:
-            helper = self.helper("ldl_solve_side_by_side")
+            helper = self.helper(f"{helper}_side_by_side")
             return [f"{helper}({x.size}, {x.array.row}, {pointer(matrix)}, {pointer(x)});"]
-        helper = self.helper("ldl_solve_rows")
+        if solve.pair:
+            raise refused(self, solve, "of a pair, all is wide or nothing")
+        helper = self.helper(f"{helper}_rows")
         return [f"{helper}({x.size}, {x.lanes}, {x.array.row}, {pointer(matrix)}, {pointer(x)});"]
-
-    @statement.register
-    def _solve_pair(self, solve: ir.SolvePair) -> list[str]:
-        matrix, x = pointer(self._ref(solve.matrix[0])), pointer(self._ref(solve.x))
-        if solve.x.lanes:
-            helper = self.helper("pair_solve_side_by_side")
-            return [f"{helper}({solve.x.size}, {solve.x.array.row}, {matrix}, {x});"]
-        return [f"{self.helper('pair_solve')}({solve.x.size}, {matrix}, {x});"]
 
     @statement.register
     def _call(self, call: ir.Call) -> list[str]:

@@ -14,6 +14,7 @@ PYTHON = Dialect(
     {"sin": "sin", "cos": "cos", "sqrt": "sqrt"},
     select="if_else({c} > {zero}, {a}, {b})",
 )
+COMPILED = "only functions that CasADi gets as compiled C have it"
 
 
 def slice_text(ref: ir.Ref) -> str:
@@ -101,11 +102,15 @@ class PythonPrinter:
 
     @statement.register
     def _factor(self, factor: ir.Factor) -> list[str]:
+        if factor.pair:
+            raise refused(self, factor, COMPILED)
         matrix, distance = factor.matrix.name, ir.padded(factor.size)
         return [f"{matrix} = ldl_factor({matrix}, {factor.size}, {distance})"]
 
     @statement.register
     def _solve(self, solve: ir.Solve) -> list[str]:
+        if solve.pair:
+            raise refused(self, solve, COMPILED)
         x, distance = slice_text(solve.x), ir.padded(solve.x.size)
         return [f"{x} = ldl_solve({solve.matrix.name}, {x}, {distance})"]
 
@@ -128,8 +133,8 @@ class PythonPrinter:
         raise refused(self, statement, "a symbolic graph has no branches")
 
     @statement.register
-    def _compiled_only(self, statement: ir.Unit | ir.FactorPair | ir.SolvePair) -> list[str]:
-        raise refused(self, statement, "only functions that CasADi gets as compiled C have it")
+    def _unit(self, unit: ir.Unit) -> list[str]:
+        raise refused(self, unit, COMPILED)
 
     @statement.register
     def _call(self, statement: ir.Call) -> list[str]:
