@@ -43,24 +43,31 @@ BATCHED = {name: part for part, names in PARTS.items() for name in names}
 
 
 @dataclass(frozen=True)
-class Batch:
-    """One function over lanes of states: its program, and its C."""
+class LaneFunction:
+    """A function over lanes of states, and maybe of their own parameters: its program, its C."""
 
-    function: Function
-    states: int
     program: Program
     body: CFunction
+
+
+@dataclass(frozen=True)
+class Batch:
+    """One function of a model over lanes of states."""
+
+    function: Function
+    lanes: LaneFunction
 
     @property
     def arguments_work(self) -> int:
         """Reals of workspace for its arguments."""
-        arguments = (*self.program.of_role("input"), *self.program.of_role("output"))
-        return self.states * sum(a.length for a in arguments)
+        program = self.lanes.program
+        arguments = (*program.of_role("input"), *program.of_role("output"))
+        return sum(a.length * a.row for a in arguments)
 
     @property
     def work(self) -> int:
         """Reals of workspace in all."""
-        return self.arguments_work + self.body.work
+        return self.arguments_work + self.lanes.body.work
 
 
 def batches(scene: Scene, tail: Tail, printed: Sequence[PrintedFunction]) -> list[Batch]:
@@ -70,13 +77,16 @@ def batches(scene: Scene, tail: Tail, printed: Sequence[PrintedFunction]) -> lis
 
 def _batch(scene: Scene, tail: Tail, function: Function) -> Batch:
     fixed, single = baked_values(scene), of_one_state(scene, tail, function)
-    states = STATES[scene.real]
     if has_directions(assemble(function, tail)):
         single = _of_directions(scene, single, fixed)
     elif straight(scene, single):
         single = unrolled_step(single, fixed)
-    lanes = batched(single, states)
-    return Batch(function, states, lanes, in_loops(lanes, scene.real, scene.name, fixed))
+    return Batch(function, _in_lanes(scene, single))
+
+
+def _in_lanes(scene: Scene, single: Program) -> LaneFunction:
+    lanes = batched(single, STATES[scene.real])
+    return LaneFunction(lanes, in_loops(lanes, scene.real, scene.name, baked_values(scene)))
 
 
 def of_one_state(scene: Scene, tail: Tail, function: Function) -> Program:
@@ -119,22 +129,11 @@ def straight(scene: Scene, program: Program) -> bool:
     return scene.emission == "straight"
 
 
-@dataclass(frozen=True)
-class LaneFunction:
-    """A function over lanes of states and of their own parameters: its program, and its C."""
-
-    program: Program
-    body: CFunction
-
-
 def lane_function(scene: Scene, single: Program, name: str) -> LaneFunction:
     """Return a program of one state over lanes; name: of the program with its own parameters."""
-    fixed = baked_values(scene)
-    single = unrolled_step(single, fixed) if straight(scene, single) else single
-    if not scene.baked:
-        single = with_own_parameters(single, name)
-    lanes = batched(single, STATES[scene.real])
-    return LaneFunction(lanes, in_loops(lanes, scene.real, scene.name, fixed))
+    if straight(scene, single):
+        single = unrolled_step(single, baked_values(scene))
+    return _in_lanes(scene, single if scene.baked else with_own_parameters(single, name))
 
 
 class BatchView:
@@ -142,10 +141,8 @@ class BatchView:
 
     def __init__(self, batch: Batch, tail: Tail, prefix: str):
         function = batch.function
-        self.name, self.lanes_function = (
-            function.name,
-            callee_view(batch.program, batch.body, prefix),
-        )
+        self.name = function.name
+        self.lanes_function = callee_view(batch.lanes.program, batch.lanes.body, prefix)
         self.inputs = [ArgumentView(a, tail) for a in function.inputs]
         self.outputs = [ArgumentView(a, tail) for a in function.outputs]
         free = not tail.fixed
@@ -163,12 +160,13 @@ def batch_files(
         here = [batch for batch in batches if BATCHED[batch.function.name] == part]
         if here:
             views = [BatchView(batch, tail, scene.name) for batch in here]
-            own = context | lanes_context(scene, here) | {"functions": views}
+            own = context | lanes_context(scene, [batch.lanes for batch in here])
+            own |= {"functions": views}
             files[f"src/{scene.name}_{part}.c"] = render("c", "batch/batch.c.jinja", own)
     return files
 
 
-def lanes_context(scene: Scene, parts: Sequence[Batch | LaneFunction]) -> dict[str, Any]:
+def lanes_context(scene: Scene, parts: Sequence[LaneFunction]) -> dict[str, Any]:
     """Return what the template of a file needs for its functions over lanes."""
     helpers = set().union(*(part.body.helpers for part in parts))
     return {

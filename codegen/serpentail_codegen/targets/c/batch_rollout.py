@@ -137,7 +137,7 @@ def batch_rollout_file(
         | {
             "places": runs.places,
             "parameter_count": runs.parameters,
-            "lanes_functions": [callee_view(p.program, p.body, scene.name) for p in parts],
+            "bodies": [callee_view(p.program, p.body, scene.name) for p in parts],
             "steps_record": member_views(steps_record(tail.bristles), scene.name),
             "steps_type": name,
             "legs": tail.leg_numbers > 0,

@@ -17,7 +17,6 @@ from .simulation import simulation_context
 from .simulation_features import SimulationFeatures, simulation_features
 from .views import (
     FunctionView,
-    UncheckedView,
     callee_view,
     callees_of,
     parameter_views,
@@ -142,10 +141,7 @@ def function_context(
     outputs = [a for f in views for a in f.outputs]
     return {
         "functions": views,
-        "unchecked": [
-            UncheckedView(view, function.body, scene.name)
-            for view, function in zip(views, printed, strict=True)
-        ],
+        "unchecked": [f.unchecked for f in views],
         "names": [f.name for f in views],
         "works": [{"name": f.name, "work": f.work} for f in views],
         "most_arrays": max(len(f.inputs) + len(f.outputs) for f in views),

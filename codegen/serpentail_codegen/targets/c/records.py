@@ -11,26 +11,23 @@ from collections.abc import Sequence
 
 from .fields import Field, fields
 from .simulation_features import SimulationFeatures
-from .tape import tape_fields
 
 TYPES = r"\b(real|piecewise|controller|drive|parameters|torque)\b"  # that get the model's prefix
 
 
 def records(has: SimulationFeatures) -> dict[str, list[Field]]:
     """Return the C records by name."""
-    return {
+    ground, legs = bool(has.contacts), has.legs
+    touched = [*BRISTLES[1:], *EVENT_FIELDS] * ground
+    found = {
         "piecewise": PIECEWISE,
         "controller": [*CONTROLLER[:2], *TENSIONS[: has.tendons], *PFL * has.pfl, *CONTROLLER[2:]],
-        "drive": DRIVE + (LEGS if has.legs else []),
-        "run": START
-        + (BRISTLES[:1] if has.contacts else [])
-        + SETTINGS
-        + (BRISTLES[1:] + EVENT_FIELDS if has.contacts else [])
-        + KEPT
-        + (CONTACT_KEPT if has.contacts else [])
-        + (LANDED if has.legs else []),
-        **({"tape": tape_fields(has)} if has.gradients else {}),
+        "drive": DRIVE + LEGS * legs,
+        "run": [*START, *BRISTLES[:1] * ground, *SETTINGS, *touched, *KEPT]
+        + CONTACT_KEPT * ground
+        + LANDED * legs,
     }
+    return found | ({"tape": TAPE + TIES * ground + LANDINGS * legs} if has.gradients else {})
 
 
 DESCRIPTIONS = {
@@ -163,6 +160,36 @@ CONTACT_KEPT = fields("""
 """)
 LANDED = fields("""
     real landed_at: time (s) at which `landing` began; far off: not yet
+""")
+
+TAPE = fields("""
+    long pause: largest number of steps in one call
+    long room: length of the arrays of nodes
+    long nodes: nodes so far: the start, then the end of each step
+    real *times: [room] times (s)
+    real *states: [room][STATE] q, v and bristles
+    real *rates: [room][STATE] their rates
+    real *untils: [room] ends of the smooth parts (s)
+    int *kinds: [room] what moves a node: 0 those around it, 1 its own time, 2 a touch, 3 the
+      landing
+    real *state: [STATE] gradient by the end, then by the start
+    real *by_parameters: [PARAMETERS] gradient by the parameters
+    real *by_times: [room] gradients by the times of nodes
+    long row: rows so far
+    real *rows: [7 room][ROW] t, until, tail rates; gradients by torques and legs there
+    long step: number of the step that is computed again
+    real largest: largest gradient by q and v at a node
+""")
+TIES = fields("""
+    real *ties: [room][CONTACTS][3] weights of the margins whose zero moves a node
+    real *sides: [room][CONTACTS][2] of each step: positive where a point presses, and where it
+      slides
+    int *sunk: [room] whether a point is in the ground at an end of each step
+    real touched: last time (s) at which a point touched the ground
+""")
+LANDINGS = fields("""
+    real landed_at: time at which the legs' landing begins (s)
+    real by_landing: gradient by this time
 """)
 
 

@@ -53,7 +53,11 @@ class FunctionView:
         self.inputs, self.outputs = views[: len(function.inputs)], views[len(function.inputs) :]
         self.prototype = self.prototype_of(f"{prefix}_{self.name}", prefix)
         self.names = ", ".join(a.name for a in views)
-        self.unchecked = f"{prefix}_unchecked_{self.name}(parameters, {self.names}, work)"
+        unchecked = f"{prefix}_unchecked_{self.name}"
+        self.call = f"{unchecked}(parameters, {self.names}, work)"
+        inputs = [a.name for a in self.inputs]
+        body = self.prototype_of(unchecked, prefix), printed.body, inputs
+        self.unchecked = body_view(self.name, self.doc, *body)
 
         # factors are many and not checked: the results of solving with them are
         self.quaternion = "" if tail.fixed else quaternion_in(self.inputs[0].name)
@@ -78,17 +82,6 @@ def quaternion_in(name: str, states: str = "") -> str:
     if start is None:
         return ""
     return f"{name} + {start}{states}" if start else name
-
-
-class UncheckedView:
-    """A function without checks in the form that the templates need: its prototype and its
-    lines.
-    """
-
-    def __init__(self, view: FunctionView, body: CFunction, prefix: str):
-        self.doc, self.lines = view.doc, body.lines
-        self.prototype = view.prototype_of(f"{prefix}_unchecked_{view.name}", prefix)
-        self.unused = unused(body.lines, [a.name for a in view.inputs])
 
 
 def zero_where_finite(helper: str, arguments: Sequence[ArgumentView]) -> str:
@@ -167,17 +160,18 @@ def callee_view(program: Program, body: CFunction, prefix: str) -> dict[str, Any
     arguments = [f"const {prefix}_parameters *parameters"]
     arguments += [f"const real *{a.name}" for a in program.of_role("input")]
     arguments += [f"real *{a.name}" for a in program.of_role("output")]
-    head = f"static int {prefix}_{program.name}("
-    return {
-        "name": program.name,
-        "doc": program.doc,
-        "prototype": wrapped(head, [*arguments, "real *work"]),
-        "lines": body.lines,
-        "unused": unused(body.lines, [a.name for a in program.of_role("input")]),
-    }
+    prototype = wrapped(f"static int {prefix}_{program.name}(", [*arguments, "real *work"])
+    inputs = [a.name for a in program.of_role("input")]
+    return body_view(program.name, program.doc, prototype, body, inputs)
 
 
-def unused(lines: Iterable[str], names: Iterable[str] = ()) -> list[str]:
-    """Return which of these arguments, parameters and work a body does not read."""
-    words = set(re.findall(r"\w+", " ".join(lines)))
-    return [name for name in ("parameters", "work", *names) if name not in words]
+def body_view(
+    name: str, doc: str, prototype: str, body: CFunction, inputs: Iterable[str]
+) -> dict[str, Any]:
+    """Return a function without checks in the form that the templates need; ``unused``: which
+    arguments it does not read.
+    """
+    words = set(re.findall(r"\w+", " ".join(body.lines)))
+    unused = [name for name in ("parameters", "work", *inputs) if name not in words]
+    view = {"name": name, "doc": doc, "prototype": prototype}
+    return view | {"lines": body.lines, "unused": unused}
