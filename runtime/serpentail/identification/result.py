@@ -230,7 +230,7 @@ class Identification(NearNames):
         ExtraMissing
             Matplotlib is not installed.
         """
-        from ..show.pictures.residuals import residual_figure
+        from ..show.pictures.results import residual_figure
 
         if not isinstance(trial, int) or not 0 <= trial < len(self.trials):
             raise refusal("trial", trial, f"0 to {len(self.trials) - 1}", IdentificationError)

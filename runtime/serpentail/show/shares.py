@@ -69,7 +69,7 @@ class MomentumShares(NearNames):
         path: also write the figure to this .pdf, .png or .svg file. ViewError for another suffix,
         ExtraMissing without the extra "plot".
         """
-        from .pictures.shares import shares_figure
+        from .pictures.results import shares_figure
 
         return shares_figure(self, path)
 

@@ -3,9 +3,13 @@
 import importlib.util
 import shutil
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from io import BytesIO
+from itertools import chain
 from pathlib import Path
+from tempfile import TemporaryFile
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,28 +69,19 @@ def write_mp4(path: Path, pictures: Iterator[Picture]) -> None:
     coded = ["-c:v", "libx264", "-crf", "20", "-pix_fmt", "yuv420p", "-movflags", "+faststart"]
     with replacing(path) as part:
         command = [encoder(), "-v", "error", "-y", *raw, *coded, *plain, "-f", "mp4", str(part)]
-        _feed(command, first, pictures)
+        _feed(command, chain([first], pictures))
 
 
-def _feed(command: list[str], first: Picture, pictures: Iterator[Picture]) -> None:
+def _feed(command: list[str], pictures: Iterable[Picture]) -> None:
     """Run ffmpeg on pictures; OSError with its last message if it fails."""
-    pipe = subprocess.PIPE
-    process = subprocess.Popen(command, stdin=pipe, stdout=subprocess.DEVNULL, stderr=pipe)
-    assert process.stdin is not None and process.stderr is not None
-    try:
-        try:
-            process.stdin.write(first.tobytes())
-            for picture in pictures:
-                process.stdin.write(picture.tobytes())
-            process.stdin.close()
-        except BrokenPipeError:
-            pass  # it ended, and says why
-        messages = process.stderr.read().decode(errors="replace").split("\n")
-        if process.wait() != 0:
-            lines = [line for line in messages if line.strip()]
-            raise OSError(f"ffmpeg: {lines[-1] if lines else process.returncode}")
-    finally:
-        process.kill()
-        process.wait()
-        process.stdin.close()
-        process.stderr.close()
+    with TemporaryFile() as told:
+        ways: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": told}
+        with subprocess.Popen(command, stdin=subprocess.PIPE, **ways) as process:
+            assert process.stdin is not None
+            with suppress(BrokenPipeError), process.stdin as raw:  # it ended, and says why
+                for picture in pictures:
+                    raw.write(picture.tobytes())
+        if process.returncode:
+            told.seek(0)
+            lines = told.read().decode(errors="replace").strip().split("\n")
+            raise OSError(f"ffmpeg: {lines[-1] or process.returncode}")

@@ -6,7 +6,6 @@ The pictures of a moving film are drawn one after another on one figure, whose b
 import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,12 +21,8 @@ from .filmstrip import VIEWS, filmstrip
 from .frames import drawn_points, window_around
 from .pen import Pen, draw_ground, draw_moment
 from .strip import Strip, strip_of
-from .style import INK, METADATA, STYLE, Array
+from .style import INK, METADATA, STYLE, Array, Axes, Figure
 from .views import View, views_of
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 MOVING = {".gif": write_gif, ".mp4": write_mp4}
 MOST = 10_000  # frames
@@ -168,7 +163,7 @@ def even(length: float) -> float:
     return (2 * round(DPI * length / 2) + 0.01) / DPI
 
 
-def _stage(strip: Strip) -> tuple["Figure", list[tuple["Axes", View, int]]]:
+def _stage(strip: Strip) -> tuple[Figure, list[tuple[Axes, View, int]]]:
     """The figure with empty panels: a view of a motion each, all at one scale."""
     from matplotlib.figure import Figure
 
@@ -204,9 +199,7 @@ def _window(strip: Strip, view: View) -> Array:
     return window_around(shown)
 
 
-def _draw_frame(
-    figure: "Figure", panels: list[tuple["Axes", View, int]], strip: Strip, k: int
-) -> None:
+def _draw_frame(figure: Figure, panels: list[tuple[Axes, View, int]], strip: Strip, k: int) -> None:
     """Draw frame k over the empty panels, and remove its artists again."""
     renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
     time = figure.text(0.01, 0.03, f"{strip.films[0][k].time:.3f} s", fontsize=9, color=INK)

@@ -3,7 +3,7 @@
 import math
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,12 +14,8 @@ from .frames import Frame, drawn_points, window_around
 from .pen import Pen, draw_animal, draw_ground, draw_moment
 from .sheet import LEFT, Sheet, sheet_of
 from .strip import Strip, strip_of
-from .style import INK, Array, drawn
+from .style import INK, Array, Axes, Figure, drawn
 from .views import SIDE, View, views_of
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 VIEWS = ("side", "oblique")
 
@@ -76,7 +72,7 @@ def filmstrip(
     return drawn(lambda: _draw(strip), path)
 
 
-def _draw(strip: Strip) -> tuple["Figure", np.ndarray]:
+def _draw(strip: Strip) -> tuple[Figure, np.ndarray]:
     """The strip's sheet."""
     from .figure import Drawing
 
@@ -110,8 +106,8 @@ def _path_window(strip: Strip) -> Array:
 
 
 def _draw_row(
-    figure: "Figure", sheet: Sheet, line: int, strip: Strip, which: tuple[int, int], window: Array
-) -> list["Axes"]:
+    figure: Figure, sheet: Sheet, line: int, strip: Strip, which: tuple[int, int], window: Array
+) -> list[Axes]:
     """One view of every frame of a motion; its name and directions at the left."""
     film, view = strip.films[which[0]], strip.views[which[1]]
     every = []
@@ -141,7 +137,7 @@ def _label(k: int, film: list[Frame]) -> str:
     return rf"$\mathbf{{{k + 1}}}$  {1e3 * film[k].time:.{decimals}f} ms"
 
 
-def _draw_directions(axes: "Axes", view: View, motion: str) -> None:
+def _draw_directions(axes: Axes, view: View, motion: str) -> None:
     """The motion's and the view's name and the world's directions, in a margin."""
     axes.set(xlim=(-0.36, 0.36), ylim=(-0.35, 0.55), xticks=[], yticks=[])
     axes.set_axis_off()
@@ -156,9 +152,7 @@ def _draw_directions(axes: "Axes", view: View, motion: str) -> None:
             axes.text(place[0], place[1], f"${name}$", ha="center", va="center", fontsize=7)
 
 
-def _draw_key(
-    figure: "Figure", sheet: Sheet, window: Array, key: dict[str, dict[str, Any]]
-) -> None:
+def _draw_key(figure: Figure, sheet: Sheet, window: Array, key: dict[str, dict[str, Any]]) -> None:
     """The scale bar and what the marks mean, at the foot of the sheet."""
     from matplotlib.lines import Line2D
 
@@ -174,7 +168,7 @@ def _draw_key(
     figure.legend(handles=handles, loc="upper left", bbox_to_anchor=corner, **look)
 
 
-def _draw_path(axes: "Axes", strip: Strip) -> None:
+def _draw_path(axes: Axes, strip: Strip) -> None:
     """The motion from the side in true scale, every frame in its place, numbered at its COM."""
     film, com = strip.films[0], strip.coms[0]
     low, high = _path_window(strip)

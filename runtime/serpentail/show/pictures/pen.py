@@ -1,16 +1,13 @@
 """Draws the animal at one moment in a view: torso, tail, legs and forces of the ground."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from .frames import Frame, tick
-from .style import FORCE, HEAD, INK, LEG, QUIET, SHADE, SHADOW, TAIL, TORSO, Array
+from .style import FORCE, HEAD, INK, LEG, QUIET, SHADE, SHADOW, TAIL, TORSO, Array, Axes
 from .views import TOP, View
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 WIDTH = 1.4  # points, of the tail
 THIN, THICK = 0.4, 2.5  # of a tail of its own: least and largest width over that
@@ -30,7 +27,7 @@ class Pen:
     If there is ground, z = 0, parts below it are pale.
     """
 
-    axes: "Axes"
+    axes: Axes
     frame: Frame
     view: View
     origin: Array
@@ -195,7 +192,7 @@ def _draw_shadow(pen: Pen) -> None:
     pen.plot(pen.frame.tail * (1, 1, 0), "-", 0.02, color=SHADOW, linewidth=1.4)
 
 
-def draw_ground(axes: "Axes", view: View, origin: Array) -> None:
+def draw_ground(axes: Axes, view: View, origin: Array) -> None:
     """The ground z = 0: from aside a line over a shaded half, from above a grid."""
     (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
     height = -view.of(origin)[1]

@@ -3,7 +3,7 @@
 import math
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,11 +14,7 @@ from ...model.model import Model
 from ...motion.trajectory import Trajectory
 from ..motions import Motions, checked_motions, checked_names
 from .panels import PANELS, Panel, beside, colour_of
-from .style import QUIET, Array, drawn
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from .style import QUIET, Array, Axes, Figure, drawn
 
 WIDTH, TALL, ROW = 7.2, 1.05, 0.15  # inches: the figure, a panel, a row of its legend on top
 LETTER, HANDLE = 0.056, 0.55  # inches in a legend
@@ -106,7 +102,7 @@ def plot(
     return given[0].figure, ax
 
 
-def stacked(motions: list[Trajectory], chosen: list[Panel]) -> tuple["Figure", Array]:
+def stacked(motions: list[Trajectory], chosen: list[Panel]) -> tuple[Figure, Array]:
     """A figure of stacked panels."""
     from .figure import Drawing
 
@@ -135,7 +131,7 @@ def _draw(every: Any, motions: list[Trajectory], chosen: list[Panel]) -> None:
     every[-1].set(xlabel="time [s]", xlim=(t.min(), t.max()))
 
 
-def _draw_panel(axes: "Axes", t: Array, panel: Panel) -> None:
+def _draw_panel(axes: Axes, t: Array, panel: Panel) -> None:
     """Curves, grid, and above them a legend."""
     from matplotlib.ticker import MaxNLocator
 
@@ -159,7 +155,7 @@ def _draw_panel(axes: "Axes", t: Array, panel: Panel) -> None:
         labelled(axes, columns)
 
 
-def labelled(axes: "Axes", columns: int) -> None:
+def labelled(axes: Axes, columns: int) -> None:
     """A legend of all that has a label."""
     axes.legend(loc="upper left", ncols=columns, **LEGEND)
 
@@ -183,7 +179,7 @@ def _legend_rows(panel: Panel, width: float) -> tuple[int, int]:
     return math.ceil(len(labels) / columns), columns
 
 
-def _draw_events(axes: "Axes", events: Sequence[Event]) -> None:
+def _draw_events(axes: Axes, events: Sequence[Event]) -> None:
     """A vertical line at each event."""
     for kind, dash in (("touch_down", "-"), ("take_off", "--")):
         marks = [(colour, event["time"]) for colour, event in events if event["kind"] == kind]
@@ -194,7 +190,7 @@ def _draw_events(axes: "Axes", events: Sequence[Event]) -> None:
             axes.vlines(times, 0, 1, linestyles=dash, **look)
 
 
-def _label_events(axes: "Axes", events: Sequence[Event], apart: float) -> None:
+def _label_events(axes: Axes, events: Sequence[Event], apart: float) -> None:
     """What happens, above the first axes, in two rows: feet first, then torso, then tail."""
     words = {"touch_down": "on", "take_off": "off"}
     rows = [[math.inf], [math.inf]]

@@ -3,15 +3,10 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .style import Array
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from .style import Array, Axes, Figure
 
 GAP, LEFT, TITLES = 0.06, 0.72, 0.24  # margins, inches
 RULER, TICKS = 0.62, 0.42  # margins at the left of and below the path, inches
@@ -83,7 +78,7 @@ class Sheet:
         reach = RULER + self.path_size[0] if self.beside else 0
         return LEFT + max(self.film[0] + reach, LEAST_WIDTH) + 3 * GAP, self.base + self.film[1]
 
-    def add(self, figure: "Figure", place: Sequence[float]) -> "Axes":
+    def add(self, figure: Figure, place: Sequence[float]) -> Axes:
         """Axes at (x, y, w, h) inches."""
         (width, height), (x, y, w, h) = self.size, place
         return figure.add_axes((x / width, y / height, w / width, h / height))

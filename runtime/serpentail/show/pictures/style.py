@@ -13,7 +13,10 @@ from ...basics.errors import ViewError
 from ...basics.files import replacing
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+else:  # Matplotlib is an extra
+    Axes = Figure = Any
 
 Array = NDArray[np.float64]
 METADATA: dict[str, dict[str, Any]] = {
@@ -39,9 +42,7 @@ STYLE: dict[str, Any] = {
     "legend.frameon": False,
     "legend.handlelength": 2.2,
 }
-
-
-Drawn = tuple["Figure", Any]  # with its axes
+Drawn = tuple[Figure, Any]  # with its axes
 
 
 def figure_path(path: str | os.PathLike[str]) -> Path:

@@ -1,18 +1,16 @@
-"""Draws the results of an identification over time: residuals of markers, torques and power."""
+"""Figures of results over time: residuals of an identification, and what turned the torso."""
 
 import os
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ...basics.extras import needed
 from ...motion.trajectory import Trajectory
-from .panels import Panel, of_segments, torque
+from ..shares import AXES, SUM, MomentumShares
+from .panels import Panel, colour_of, of_segments, torque
 from .plot import labelled, stacked
-from .style import QUIET, Array, drawn
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .style import INK, QUIET, Array, Figure, drawn
 
 Residuals = tuple[tuple[str, ...], Array, float]  # names, (F, M, 3) m, noise m
 Bands = tuple[Array, Array, Array, float] | None  # times (U,), low and high (U, 2m), probability
@@ -24,7 +22,7 @@ def residual_figure(
     residuals: Residuals,
     bands: Bands = None,
     path: str | os.PathLike[str] | None = None,
-) -> tuple["Figure", Any]:
+) -> tuple[Figure, Any]:
     """Draw distances of seen from modelled markers, torques with their intervals, and power.
 
     path: also write the figure to this .pdf, .png or .svg file.  ExtraMissing without the extra
@@ -34,7 +32,7 @@ def residual_figure(
     return drawn(lambda: _figure(motion, residuals, bands), path)
 
 
-def _figure(motion: Trajectory, residuals: Residuals, bands: Bands) -> tuple["Figure", Any]:
+def _figure(motion: Trajectory, residuals: Residuals, bands: Bands) -> tuple[Figure, Any]:
     """A figure of three panels on one time axis."""
     from matplotlib import colormaps
 
@@ -64,3 +62,19 @@ def _figure(motion: Trajectory, residuals: Residuals, bands: Bands) -> tuple["Fi
             axes.set_ylim(least, least + (most - least) / (1 - ROOM))
             labelled(axes, len(styles) + 1)
     return figure, every
+
+
+def shares_figure(
+    shares: MomentumShares, path: str | os.PathLike[str] | None
+) -> tuple[Figure, Any]:
+    """Draw turns by cause and their sum, about the axes that the torso turns about."""
+    needed("matplotlib", "plot")
+    names = [*shares.turns, SUM]
+    styles = [*((colour_of(k), "-") for k in range(len(shares.turns))), (INK, "--")]
+    curves = np.degrees([*shares.turns.values(), shares.turned])
+    panels = [
+        Panel(f"turned about\n{axis} axis [deg]", curves[..., k].T, names, styles, 1.0)
+        for k, axis in enumerate(AXES)
+    ]
+    moving = [panel for panel in (each.without_still() for each in panels) if panel.names]
+    return drawn(lambda: stacked([shares.motion], moving or panels[:1]), path)
