@@ -218,7 +218,7 @@ def test_faults_of_a_tail_with_stops_break_its_law_of_flight(monkeypatch):
     for name, change in (("energy", stored), ("momentum", times(1 + 1e-4))):
         with row(name):
             assert notices(NAMED[PASSIVE], name, change)
-    monkeypatch.setattr("serpentail.verification.passive_laws.flight", flight)
+    monkeypatch.setattr("serpentail.verification.acting_laws.flight", flight)
     assert notices(NAMED[PASSIVE], "energy", lambda result, *_: result)
 
 

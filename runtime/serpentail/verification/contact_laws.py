@@ -1,5 +1,6 @@
 """Laws of contact with the ground, of tracking by the tail, and of implicit steps."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -67,34 +68,35 @@ def tracking_moves_as_its_torques_do(model: Model, s: Case) -> Errors:
 @law("implicit_factor implicit_solve mass_matrix", VALUE_LIMIT)
 def implicit_steps_solve_their_system(model: Model, s: Case) -> Errors:
     """High up, (1 - w J) k = r with J of damping and gains alone, relative to cond(H)."""
-    w, damping = 1e-3, np.linspace(1e-3, 2e-3, len(s.tau))
-    H = model.mass_matrix(s.q).astype(float)
-    k_q, k_v, *k_u = implicit_step(model, s, w, damping, GAINS)
+    tail = model.layout.tail_v
+    inertia = model.mass_matrix(s.q).astype(float)[tail, tail]
+    return implicit_errors(model, s, GAINS, lambda k_q, k_v: inertia @ (GAINS @ [k_q, k_v]))
+
+
+def implicit_errors(
+    model: Model, s: Case, gains: np.ndarray, force: Callable[[np.ndarray, np.ndarray], np.ndarray]
+) -> dict[str, float]:
+    """Return the errors of k high up, of right-hand sides dq and dv, and of bristles if there are
+    contacts. force: what acts against k of the tail's angles and rates, besides damping.
+    """
+    w, damping, tail = 1e-3, np.linspace(1e-3, 2e-3, len(s.tau)), model.layout.tail_v
+    u = (bristles(model),) if model.contacts else ()
+    weight, ground = ([w, 1.0], (*u, *legs(model))) if u else ([w], ())
+    high = raised(s, HEIGHT)
+    factors = model.kernel("implicit_factor")(high, s.v, damping, gains, weight, *ground)
+    solved = model.kernel("implicit_solve")(factors, s.dq, s.dv, *u)
+    k_q, k_v, *k_u = (x.astype(float) for x in solved)
 
     # the expected k; q is in the tangent space, so tail angles have the places of their rates
-    change, load = k_v - s.dv, np.zeros(model.nv)
-    tail = model.layout.tail_v
-    tracked = H[tail, tail] @ (GAINS @ [k_q[tail], k_v[tail]])
-    load[tail] = -w * (tracked + damping * k_v[tail])
+    H, load = model.mass_matrix(s.q).astype(float), np.zeros(model.nv)
+    load[tail] = -w * (force(k_q[tail], k_v[tail]) + damping * k_v[tail])
     scale = np.sqrt(np.diag(H))
     relaxed = [bristles(model) / (1 + w / model.parameters["D_f"])] if k_u else []
     return {
-        "v": relative(H @ change / scale, load / scale) / sensitivity(model, s.q),
+        "v": relative(H @ (k_v - s.dv) / scale, load / scale) / sensitivity(model, s.q),
         "q": relative(k_q, s.dq + w * k_v),
         "bristles": worst(map(relative, k_u, relaxed)),
     }
-
-
-def implicit_step(
-    model: Model, s: Case, w: float, damping: np.ndarray, gains: np.ndarray
-) -> list[np.ndarray]:
-    """Return k of right-hand sides dq and dv, and of bristles if there are contacts, high up."""
-    u = (bristles(model),) if model.contacts else ()
-    weight = [w, 1.0] if u else [w]
-    ground = (*u, *legs(model)) if u else ()
-    high = raised(s, HEIGHT)
-    factors = model.kernel("implicit_factor")(high, s.v, damping, gains, weight, *ground)
-    return [x.astype(float) for x in model.kernel("implicit_solve")(factors, s.dq, s.dv, *u)]
 
 
 @law("contact_points", SLOPE_LIMIT, only="contact")

@@ -18,14 +18,12 @@ from ..basics.extras import needed
 from ..model.model import Model
 from ..model.passive import idle
 from . import (
-    air_laws,
+    acting_laws,
     airborne_laws,
     call_laws,
     contact_laws,
     derivative_laws,
     frame_laws,
-    passive_laws,
-    tendon_laws,
     value_laws,
 )
 from .law import Law, rid_of
@@ -33,7 +31,7 @@ from .states import Case, states
 
 FILES = (
     *(value_laws, frame_laws, call_laws, derivative_laws),
-    *(contact_laws, passive_laws, air_laws, tendon_laws, airborne_laws),
+    *(contact_laws, acting_laws, airborne_laws),
 )
 LAWS = tuple(each for file in FILES for each in vars(file).values() if isinstance(each, Law))
 OF = {"free": "a torso that moves"}

@@ -237,7 +237,11 @@ def energy_is_constant_in_flight(model: Model, s: Case) -> Errors:
 @law("rollout energy momentum", 4 * STEPS, floor=1e-10, only="free", without=ACTING)
 def momentum_is_constant_in_flight(model: Model, s: Case) -> Errors:
     """In flight angular momentum about the COM is constant, and momentum changes by - M g t."""
-    motion = flight(model, s)
+    return momentum_errors(model, flight(model, s))
+
+
+def momentum_errors(model: Model, motion: Trajectory) -> dict[str, float]:
+    """Return the errors of the momenta of a flight, under gravity alone."""
     pull = total_mass(model.parameters) * fall(model.parameters)
     linear = motion.linear_momentum[0] + np.outer(motion.t, pull)
     angular = motion.angular_momentum
