@@ -75,6 +75,7 @@ def tail_of(scene: Scene) -> Tail:
         sloped = scene.shape.sloped
         shape = replace(described.scene.shape, weightless=scene.weightless, sloped=sloped)
         one = replace(_chain_of(described.scene), shape=shape, owner=described.name)
+        one = replace(one, prescribed=described.prescribed)
         for name in described.names:
             last = chains[-1]
             chains.append(
@@ -83,7 +84,9 @@ def tail_of(scene: Scene) -> Tail:
                     name=name,
                     mirrored=described.pair and name != described.names[0],
                     segments_before=last.segments_before + last.segments,
-                    coordinates_before=last.coordinates_before + last.nt,
+                    coordinates_before=sum(
+                        c.nt + c.given for c in chains if c.prescribed == one.prescribed
+                    ),
                     points_before=last.points_before + last.tail_points,
                 )
             )
@@ -135,6 +138,7 @@ def needed(scene: Scene) -> list[str]:
     names = scene.functions
     flight = ["forward_dynamics", *["tracked_dynamics"] * ("pfl" in names)]
     called = ["contact_points", "contact_rates"] if scene.contacts else flight
+    called += ["inverse_dynamics"] * any(chain.prescribed for chain in scene.chains)
     called += ["air_force"] * bool(scene.widths) + ["tendon_torques"] * bool(scene.shape.tendons)
     margins = ["margins", "margins_vjp"] * bool(scene.contacts)
     transposed = ["implicit_solve_transposed"] * ("implicit" in names)

@@ -5,7 +5,7 @@ from typing import Any
 
 from .rules import one_of
 
-DRIVES = ("torque", "passive")  # actuators; or springs, damping and stops alone
+DRIVES = ("torque", "passive", "prescribed")  # actuators; springs, damping, stops alone; a schedule
 DRIVE = one_of(DRIVES)
 
 

@@ -25,17 +25,18 @@ class Sizes:
     """The sizes of a model of m segments: q (nq,), v (nv,), tau (nt,).
 
     fixed: the base never moves, so that q and v are those of the tail alone. hinges: how many
-    segments have one coordinate.
+    segments have one coordinate. given: how many coordinates are prescribed; they are not in q.
     """
 
     segments: int
     fixed: bool
     hinges: int
+    given: int
 
     @property
     def nt(self) -> int:
         """Number of tail coordinates and of torques: two for a segment, one for a hinge."""
-        return PER_SEGMENT * self.segments - self.hinges
+        return PER_SEGMENT * self.segments - self.hinges - self.given
 
     @property
     def nq(self) -> int:

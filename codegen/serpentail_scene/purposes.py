@@ -5,7 +5,7 @@ from typing import Any
 
 from .drives import drives_of
 from .parameters import AIR_NAMES, PARTS, parts_of
-from .signatures.table import AIRBORNE, ALL, DERIVATIVES, EXACT_DERIVATIVES, FIXED, NEEDS, OF_TREES
+from .signatures.table import AIRBORNE, ALL, DERIVATIVES, EXACT_DERIVATIVES, FIXED, NEEDS, OF_GIVEN, OF_TREES
 
 MOTION = ("forward_dynamics", "energy", "momentum", "tail_points", "center_of_mass")
 TENDONS = ("tendon_lengths", "tendon_torques")
@@ -79,10 +79,10 @@ def possible(tables: Mapping[str, Any], names: Collection[str], polar: bool = Tr
     if tables.get("base") == "fixed":
         without |= {*ALL} - {*FIXED}
     if tables.get("chain"):
-        without |= {*ALL} - {*OF_TREES}
         tables_of_chains = _keys(tables["chain"]).values()
-        passive = any("passive" in drives_of(_keys(each)) for each in tables_of_chains)
-        without |= {"pfl"} if passive else set()
+        drives = [drive for each in tables_of_chains for drive in drives_of(_keys(each))]
+        without |= {*ALL} - {*(OF_GIVEN if "prescribed" in drives else OF_TREES)}
+        without |= {"pfl"} if "passive" in drives else set()
     return [name for name in ALL if name in names and name not in without]
 
 

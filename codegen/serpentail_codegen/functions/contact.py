@@ -172,10 +172,10 @@ def press(draft: Draft, torso: Torso, points: Points, arrays: dict[str, Array]) 
 
 
 def gather_contact_loads(
-    draft: Draft, R: Ref, points: Points, forces: Array, torques: Array
+    draft: Draft, R: Ref, points: Points, forces: Array, torques: Array, given: Array | None = None
 ) -> Vectors:
     """J^T f (Eq. 10): returns ``load_force, load_moment`` at B in torso axes; the joints' part is
-    added to ``torques``.
+    added to ``torques``, that of prescribed ones to ``given``.
     """
     load = draft.vector("load", 6)
     draft.fill(load, 0)
@@ -191,8 +191,10 @@ def gather_contact_loads(
         for i, g in each_point(draft, downward=True):
             add(g + points.first[chain.group], beyond)
             reads = {"S": points.columns[chain.group][g], "F_beyond": beyond}
-            own = chain.segment_tau(torques, i)
-            draft.step(draft.of_segment(loads.joint_load), reads, torque_=own)
+            on = given if chain.prescribed else torques
+            if on:
+                own = chain.segment_tau(on, i)
+                draft.step(draft.of_segment(loads.joint_load), reads, torque_=own)
         if chain.name:
             draft.copy(load, beyond, adds=True)
     for group in [name for name in draft.tail.contacts if name not in points.columns]:
@@ -213,7 +215,17 @@ def contact_load(
     if "powers" in arrays:
         balance_powers(draft, state.torso(R), points, arrays)
     torques = copied_torques(draft, net_torques(draft, state, arrays["tau"]))
-    return gather_contact_loads(draft, R, points, arrays["forces"], torques), torques
+    held = draft.array("held", draft.tail.given) if state.given and "powers" in arrays else None
+    if held:
+        draft.fill(held[0], 0)
+    load = gather_contact_loads(draft, R, points, arrays["forces"], torques, held)
+    if held and state.given:  # the ground's part of the power of the drives
+        with draft.loop("k", draft.tail.given) as k:
+            rate = state.given.part(k + draft.tail.given, 1)
+            reads = {"torque": held.part(k, 1), "rate": rate}
+            power = derive(contact.taken_power, one_coordinate=True)
+            draft.step(power, reads, power_=arrays["powers"].part(1, 1))
+    return load, torques
 
 
 def balance_powers(draft: Draft, torso: Torso, points: Points, arrays: dict[str, Array]) -> None:

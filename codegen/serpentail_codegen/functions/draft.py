@@ -89,7 +89,13 @@ class Draft(Builder):
 
     def state(self, q: Array, v: Array | None = None) -> State:
         """Return a state; leave out the velocity if it is not used."""
-        return State(self.tail, q, v, self.zero(3) if self.tail.fixed else None)
+        still = self.zero(3) if self.tail.fixed else None
+        return State(self.tail, q, v, still, self.given.get("given"))
+
+    @property
+    def given(self) -> dict[str, Array]:
+        """The argument that tells how prescribed joints move, by its name; empty without one."""
+        return {a.name: a for a in self.arrays if a.name == "given"}
 
     def of_torso(self, array: Array, part: slice) -> Ref:
         """Return the torso's part of a velocity or an acceleration, zeros on a fixed base."""

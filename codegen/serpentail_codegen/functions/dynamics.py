@@ -77,7 +77,7 @@ def assemble_inverse_dynamics(draft: Draft, arrays: dict[str, Array], world: boo
     R = attitude(draft, state)
     segments = prepared(draft, state)
     motion = _torso_motion(draft, state, R, v_dot, unmoved)
-    inertial_forces(draft, segments, motion, v_dot, force)
+    inertial_forces(draft, segments, motion, v_dot, force, arrays.get("given_torques"))
     add_passive_forces(draft, state, lambda i: draft.tail.segment_v(force, i), v_dot)
 
     # forces on p_dot act in world axes

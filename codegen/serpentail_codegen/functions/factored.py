@@ -181,7 +181,7 @@ def factored_dynamics(draft: Draft, q: Array, v: Array) -> FactoredDynamics:
     function = FACTORED_DYNAMICS.of(draft.tail)
     arrays = {a.name: draft.array(a.name, a.length(draft.tail)) for a in function.outputs}
     dynamics = "composite" if draft.dynamics == "composite" else "lanes"  # segments have no H
-    draft.call(assemble(function, draft.tail, dynamics), q=q, v=v, **arrays)
+    draft.call(assemble(function, draft.tail, dynamics), q=q, v=v, **draft.given, **arrays)
     if draft.tail.fixed:
         body = {"R": draft.fixed("identity", IDENTITY), "inverse_mass": draft.zero(1)}
     else:

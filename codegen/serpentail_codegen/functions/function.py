@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 
-from serpentail_scene.signatures.arguments import Argument
+from serpentail_scene.signatures.arguments import GIVEN, GIVEN_TORQUES, Argument
 from serpentail_scene.signatures.table import SIGNATURES
 
 from ..ir.program import Array, Program
@@ -41,15 +41,19 @@ class Function:
     assemble: Assembly
 
     def of(self, tail: Tail) -> "Function":
-        """Return this function with those of its arguments that are not empty for this tail."""
+        """Return this function with those of its arguments that are not empty for this tail; what
+        depends on q depends on prescribed joints, too.
+        """
         meanings = FIXED_MEANINGS if tail.fixed else {}
+        known = (GIVEN,) * any(a.name == "q" for a in self.inputs)
+        torques = (GIVEN_TORQUES,) * (self.name == "inverse_dynamics")
         inputs, outputs = (
             tuple(
                 replace(a, meaning=meanings.get(a.name, a.meaning))
                 for a in arguments
                 if a.length(tail)
             )
-            for arguments in (self.inputs, self.outputs)
+            for arguments in (self.inputs + known, self.outputs + torques)
         )
         return replace(self, inputs=inputs, outputs=outputs)
 

@@ -1,10 +1,13 @@
 """The tail's points and their Jacobians."""
 
 from serpentail_scene.layout import OMEGA, TORSO_NV
+from serpentail_scene.signatures.arguments import ANGULAR, LINEAR, Q, V
 
 from ..ir.program import Array, Index, Ref
 from ..mechanics import loads, torso
 from .draft import Draft
+from .dynamics import assemble_momentum
+from .function import Function, assemble
 from .layout import coordinate
 from .sweeps.chains import each_chain, facing
 from .sweeps.inertia import column_of, columns_and_inertia
@@ -15,6 +18,11 @@ from .sweeps.pieces import (
     mechanism,
     points_of,
     torso_pose,
+)
+
+
+MOMENTUM = Function(
+    "all_momentum", "momentum of the animal", (Q, V), (LINEAR, ANGULAR), assemble_momentum
 )
 
 
@@ -97,6 +105,11 @@ def assemble_center_of_mass(draft: Draft, arrays: dict[str, Array]) -> None:
         }
         writes = {"J_column": J.part(tail.torso_nv + k, 3, stride=tail.nv), "velocity_": velocity}
         draft.step(torso.com_of_coordinate, mass, reads, **writes)
+    if tail.given:  # J v lacks the prescribed rates
+        inner, linear = assemble(MOMENTUM.of(tail), tail), draft.array("linear", 3)
+        known = {name: arrays[name] for name in ("q", "v", "given")}
+        draft.call(inner, **known, linear=linear, angular=draft.array("angular", 3))
+        draft.step(torso.com_velocity, mass, {"linear": linear[0]}, velocity=velocity)
 
 
 ASSEMBLIES = {

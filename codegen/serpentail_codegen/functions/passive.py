@@ -91,6 +91,8 @@ def net_torques(draft: Draft, state: State, tau: Array) -> Array:
         return tau
     net = draft.array("net_torques", draft.tail.nt)
     for chain in each_chain(draft):
+        if chain.prescribed:
+            continue
         with each_passive_force(draft, state.on(chain)) as (i, passive_force):
             reads = {"tau": chain.segment_tau(tau, i), "passive": passive_force}
             draft.step(draft.of_segment(passive.net_torque), reads, net=chain.segment_tau(net, i))

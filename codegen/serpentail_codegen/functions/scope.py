@@ -94,13 +94,15 @@ class Torso(Fields):
 class State:
     """The arguments q and v of a function; v is missing if the function does not use it.
 
-    still: zeros in place of what a fixed base does not have: it rests at the world's origin.
+    still: zeros in place of what a fixed base does not have: it rests at the world's origin. given:
+    angles, rates and accelerations of prescribed joints, if there are any.
     """
 
     tail: Tail
     q: Array
     v: Array | None = None
     still: Ref | None = None
+    given: Array | None = None
 
     @property
     def quaternion(self) -> Ref:
@@ -138,8 +140,19 @@ class State:
 
     def angles(self, i: Index | int) -> Ref:
         """Return the coordinates of segment i."""
-        return self.tail.segment_q(self.q, i)
+        return self._given(0, i) or self.tail.segment_q(self.q, i)
 
     def rates(self, i: Index | int) -> Ref:
         """Return the rates of the coordinates of segment i."""
-        return self.tail.segment_v(self._v, i)
+        return self._given(1, i) or self.tail.segment_v(self._v, i)
+
+    def accelerations(self, i: Index | int, v_dot: Array | None) -> Ref | None:
+        """Return the accelerations of the coordinates of segment i; None if there are none."""
+        return self._given(2, i) or (self.tail.segment_v(v_dot, i) if v_dot else None)
+
+    def _given(self, order: int, i: Index | int) -> Ref | None:
+        """Return angles, rates or accelerations of a segment that is prescribed."""
+        if self.given is None or not self.tail.prescribed:
+            return None
+        first = order * (self.given.length // 3)
+        return self.given.part(self.tail.coordinate(i) + first, self.tail.width)

@@ -43,8 +43,9 @@ class Tail(Sizes):
     owner: str = ""
     mirrored: bool = False
     segments_before: int = 0
-    coordinates_before: int = 0
+    coordinates_before: int = 0  # of its own sort: free ones, or prescribed ones
     points_before: int = 0
+    prescribed: bool = False  # its coordinates are in `given`
 
     @property
     def chains(self) -> tuple["Tail", ...]:
@@ -86,6 +87,13 @@ class Tail(Sizes):
         if self.branches:
             return sum(chain.hinges for chain in self.branches)
         return self.segments * (PER_SEGMENT - self.width)
+
+    @property
+    def given(self) -> int:  # type: ignore[override]
+        """Number of prescribed coordinates."""
+        if self.branches:
+            return sum(chain.given for chain in self.branches)
+        return self.width * self.segments * self.prescribed
 
     @property
     def free(self) -> int:

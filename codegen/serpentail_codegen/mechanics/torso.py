@@ -137,6 +137,11 @@ def com_of_coordinate(let, R: M33, inverse_mass: V1, column: V6, rate: V1) -> di
     return {"J_column": J, "velocity": J * rate[0]}
 
 
+def com_velocity(let, inverse_mass: V1, linear: V3) -> dict:
+    """Velocity of the COM from the animal's momentum."""
+    return {"velocity": linear * inverse_mass[0]}
+
+
 def mass_matrix_base(let, R: M33, mass: V1, h: V3, I: V6) -> dict:
     """The 6 x 6 block of H for (p_dot world, omega body): M 1, -R skew(h), I."""
     skewed = R * Matrix([[0, h[2], -h[1]], [-h[2], 0, h[0]], [h[1], -h[0], 0]])

@@ -7,7 +7,7 @@ from typing import Any
 from serpentail_scene.drives import DRIVE, DRIVES, drives_of
 from serpentail_scene.keys import CHAIN, NAME, OF_LIMB
 from serpentail_scene.parameters import AIR_NAMES, NAMED, NAMES, key_in_chain, name_in
-from serpentail_scene.signatures.table import ALL, OF_TREES
+from serpentail_scene.signatures.table import ALL, OF_GIVEN, OF_TREES
 
 from .checks import MOST_SEGMENTS, MOST_STRAIGHT, segments_in
 from .limbs import limb
@@ -66,7 +66,7 @@ def chains_of(values: Mapping[str, Any], parse: Parse) -> Chains:
             own = {n: given.pop(n) for n in [n for n in given if _belongs(n, name)]}
             problems += _key_problems(place, table)
             try:
-                chains.append(_chain(name, table, own, parse))
+                chains.append(_driven(_chain(name, table, own, parse), drives_of(table)))
             except SceneError as error:
                 problems += [_in_table(place, p) for p in error.problems]
     problems += _clashes(chains, tables)
@@ -101,6 +101,10 @@ def _key_problems(place: str, table: Mapping[str, Any]) -> list[Problem]:
         problems.append(Problem(f"{place}.on", table["on"], remedy))
     if not DRIVE.holds(table.get("drive", DRIVES[0])):
         problems.append(Problem(f"{place}.drive", table["drive"], f"needs {DRIVE.text}"))
+    drives = drives_of(table)
+    if "prescribed" in drives and any(drive != "prescribed" for drive in drives):
+        remedy = 'all joints of a chain or none: set drive = "prescribed" beside `joints`'
+        problems.append(Problem(f"{place}.drive", "prescribed", remedy))
     if not isinstance(table.get("pair", False), bool):
         problems.append(Problem(f"{place}.pair", table["pair"], "needs true or false"))
     return problems
@@ -125,6 +129,16 @@ def _chain(name: str, table: Mapping[str, Any], own: Mapping[str, Any], parse: P
     if missing:
         raise SceneError(missing)
     return Chain(name, table.get("pair") is True, scene)
+
+
+def _driven(chain: Chain, drives: list[str]) -> Chain:
+    """Return a chain with its drives; SceneError if forces act on angles that are given."""
+    if any(drive != "prescribed" for drive in drives):
+        return chain
+    if chain.scene.passive:
+        remedy = f"{', '.join(chain.scene.passive)}: does nothing to angles that are given: remove it"
+        raise SceneError([Problem("drive", "prescribed", remedy)])
+    return replace(chain, prescribed=True)
 
 
 def _clashes(chains: Collection[Chain], tables: Mapping[str, Any]) -> list[Problem]:
@@ -158,16 +172,20 @@ def tree_problems(values: Mapping[str, Any], chains: Collection[Chain]) -> list[
         if has(values[key])
     ]
     listed = values["functions"] if isinstance(values["functions"], list | tuple) else ()
-    others = [name for name in listed if name in ALL and name not in OF_TREES]
-    remedy = f"{this}leave it out; there are {', '.join(OF_TREES)}"
-    problems += [Problem("functions", name, remedy) for name in others]
-    passive = [
-        n
+    driven = {
+        drive: n
         for n, t in values["chain"].items()
-        if isinstance(t, Mapping) and "passive" in drives_of(t)
-    ]
-    if passive and "pfl" in listed:
-        remedy = f"needs a torque for each coordinate, and chain.{passive[0]} has passive ones"
+        for drive in (drives_of(t) if isinstance(t, Mapping) else ())
+        if isinstance(drive, str)
+    }
+    known = OF_GIVEN if "prescribed" in driven else OF_TREES
+    others = [name for name in listed if name in ALL and name not in known]
+    remedy = f"{this}leave it out; there are {', '.join(known)}"
+    if "prescribed" in driven:
+        remedy = f"chain.{driven['prescribed']} is prescribed: {remedy}"
+    problems += [Problem("functions", name, remedy) for name in others]
+    if "passive" in driven and "pfl" in listed:
+        remedy = f"needs a torque for each coordinate, and chain.{driven['passive']} has passive ones"
         problems.append(Problem("functions", "pfl", f"{remedy}: leave it out"))
     named = values["parameters"] if isinstance(values["parameters"], Mapping) else {}
     problems += [

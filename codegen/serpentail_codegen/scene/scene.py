@@ -40,12 +40,14 @@ def _default(key: str) -> Any:
 class Chain:
     """A chain besides the tail, or a pair of them, whose numbers are those of the right one.
 
-    scene: what its table describes, as if it were a tail; its functions mean nothing.
+    scene: what its table describes, as if it were a tail; its functions mean nothing. prescribed:
+    how its joints move is an input.
     """
 
     name: str
     pair: bool
     scene: "Scene"
+    prescribed: bool = False
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -62,6 +62,13 @@ ACCELERATIONS = Argument("accelerations", ("nt",),
     "desired accelerations of the tail coordinates (rad/s^2)")
 MULTIPLIER = nv_numbers("multiplier", "weights lambda, one for each row of the force or of v_dot")
 
+# Prescribed joints: of functions of q, and their own torques among what inverse dynamics gives
+GIVEN = Argument("given", (3, "given"),
+    "angles of the prescribed coordinates (rad), then their rates (rad/s), then accelerations "
+    "(rad/s^2)")
+GIVEN_TORQUES = Argument("given_torques", ("given",),
+    "torques of the drives of the prescribed coordinates (N m)")
+
 TENSIONS = Argument("tension", ("tendons",), "tensions of the tendons (N)")
 
 # What plain functions return

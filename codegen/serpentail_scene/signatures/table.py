@@ -45,6 +45,8 @@ OF_TREES = (
     *("forward_dynamics_jvp", "pfl", "implicit", "rollout", "mount_wrench"),
     *("contact_points", "contact_dynamics"),
 )
+# of several chains of which some are prescribed
+OF_GIVEN = tuple(name for name in OF_TREES if name not in (*DERIVATIVES, "pfl"))
 AIRBORNE = in_group(PLANNING)
 NEEDS = {name: signature.needs for name, signature in SIGNATURES.items() if signature.needs}
 # functions from which first, then second derivatives of a compiled function are computed

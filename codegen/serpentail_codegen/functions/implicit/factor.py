@@ -138,14 +138,16 @@ def add_contacts(
     law = derive(stiffness.linearised_contact, friction=draft.tail.friction)
     weights = Vectors({**weight, **drag})
     ground = ContactLinearisation(state.torso(R), weights, arrays["bristles"], law, points)
-    for group in [name for name in draft.tail.contacts if name not in points.columns]:
+    moving = [chain.group for chain in draft.tail.chains if not chain.prescribed]
+    for group in [name for name in draft.tail.contacts if name not in moving]:
         with draft.loop("k", draft.tail.groups[group]) as k:
             number = k + points.first[group]
             keep_point(draft, f, ground, number)
             with draft.when(f("depth", number)):
                 stiffen(draft, f, ground, number)
-    for _ in touching(draft):
-        add_chain_contacts(draft, f, ground)
+    for chain in touching(draft):
+        if not chain.prescribed:
+            add_chain_contacts(draft, f, ground)
 
 
 def keep_point(draft: Draft, f: Factors, ground: ContactLinearisation, number: Index) -> None:

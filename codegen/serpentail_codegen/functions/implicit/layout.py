@@ -64,13 +64,16 @@ class Place:
 
 
 def each_contact(draft: Draft, respond: Callable[[Index, Place | None], None]) -> None:
-    """Call ``respond(number, place)`` for all points; those of feet and torso have no place."""
+    """Call ``respond(number, place)`` for all points; those of feet, torso and prescribed chains
+    have no place.
+    """
     first, chains = 0, {chain.group: chain for chain in draft.tail.chains}
     for group, count in draft.tail.groups.items():
         if group in chains:
             with draft.on(chains[group]):
                 for i, g in each_point(draft):
-                    respond(g + first, Place(chains[group], i, g))
+                    place = None if draft.tail.prescribed else Place(chains[group], i, g)
+                    respond(g + first, place)
         else:
             with draft.loop("j", count) as j:
                 respond(j + first, None)

@@ -28,20 +28,22 @@ def gather_inertia(
     """
     composite, tail = draft.vectors(mass=1, h=3, I=6), draft.tail
     names = ("column",) if tail.width == 1 else ("pitch", "yaw")
+    names = () if tail.prescribed else names
     to_torso = hinge.hinge_at_torso if tail.width == 1 else torso.column_at_torso
     momenta = draft.vectors(**dict.fromkeys(names, 6))
     for ref in composite.named.values():
         draft.fill(ref, 0)
     for stretch, i in each_segment(draft, downward=True):
         # the segment's own block of H and its columns start from zero; the sums of all beyond go on
-        own = _own_block(H_tail, tail, i) if H_tail else {}
+        own = _own_block(H_tail, tail, i) if H_tail and names else {}
         for ref in (*momenta.named.values(), *own.values()):
             draft.fill(ref, 0)
         with pieces_of(draft, stretch, i, downward=True) as g:
             step = mechanism(draft).gather
             draft.step(step, segments.at(i, g), composite, momenta, **composite, **momenta, **own)
-        root = {name: array[i] for name, array in roots.items()}
-        draft.step(to_torso, root, momenta, columns=columns_of(tail, columns, i))
+        if names:
+            root = {name: array[i] for name, array in roots.items()}
+            draft.step(to_torso, root, momenta, columns=columns_of(tail, columns, i))
     across(draft, mount.composite_at_mount, composite.only("h", "I").named)
     return composite
 
@@ -141,6 +143,8 @@ def tail_inertia(
     before it.
     """
     segments = mechanism(draft).prepare(draft, state, True)
+    if draft.tail.prescribed:  # a body of the torso at each time
+        return segments, with_torso(draft, gather_inertia(draft, segments, {}, columns), total)
     pose = torso_pose(draft, R)
     roots = segment_roots(draft)
     tail, step = draft.tail, draft.of_segment(torso.segment_coupling)
@@ -161,7 +165,7 @@ def tail_inertia(
 
 def turn_columns(draft: Draft, columns: Array) -> None:
     """Turn the momentum columns of a mirrored chain into the axes of the torso."""
-    if draft.tail.mirrored:
+    if draft.tail.mirrored and not draft.tail.prescribed:
         step = sided(draft, branch.mirrored_columns)
         with draft.loop("i", draft.tail.segments) as i:
             own = columns_of(draft.tail, columns, i)
@@ -175,8 +179,9 @@ def columns_and_inertia(draft: Draft, state: State) -> tuple[list[Segments], Arr
     found, total = prepared(draft, state, True), Vectors({})
     columns = draft.array("columns", 12, draft.tail.segments)
     for segments in on_each(draft, found):
-        roots = segment_roots(draft)
-        forward_roots(draft, segments, torso_pose(draft), roots)
+        roots = {} if draft.tail.prescribed else segment_roots(draft)
+        if roots:
+            forward_roots(draft, segments, torso_pose(draft), roots)
         total = with_torso(draft, gather_inertia(draft, segments, roots, columns), total)
         turn_columns(draft, columns)
     return found, columns, total

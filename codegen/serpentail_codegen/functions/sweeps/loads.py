@@ -50,7 +50,8 @@ def gather_chain_loads(draft: Draft, state: State, R: Ref, f_ext: Array, torques
 
     for i, g in each_point(draft, downward=True):
         add_load(g + 1)
-        own = draft.tail.segment_tau(torques, i)
-        draft.step(draft.of_segment(loads.joint_load), {"S": S[g]}, beyond, torque_=own)
+        if not draft.tail.prescribed:
+            own = draft.tail.segment_tau(torques, i)
+            draft.step(draft.of_segment(loads.joint_load), {"S": S[g]}, beyond, torque_=own)
     add_load(Index())
     return beyond

@@ -71,15 +71,26 @@ def gather_wrenches(
 
 
 def inertial_forces(
-    draft: Draft, segments: list[Segments], motion: Motion, v_dot: Array | None, force: Array
+    draft: Draft,
+    segments: list[Segments],
+    motion: Motion,
+    v_dot: Array | None,
+    force: Array,
+    drives: Array | None = None,
 ) -> None:
     """Compute the generalised forces of a motion of the torso and ``v_dot`` of the chains, in torso
-    axes; ``segments`` are those of each chain.
+    axes; ``segments`` are those of each chain. ``drives`` receives those on prescribed joints.
     """
+
+    def torque(i: Index) -> Ref:
+        tail = draft.tail
+        return tail.segment_tau(drives, i) if drives and tail.prescribed else tail.segment_v(force, i)
+
     sums = Vectors({"force": block(force, VELOCITY), "moment": block(force, OMEGA)})
     for own in on_each(draft, segments):
         wrenches = forward_wrenches(draft, own, seen(draft, motion), v_dot)
-        total = gather_wrenches(draft, own, wrenches, lambda i: draft.tail.segment_v(force, i))
+        wanted = drives or not draft.tail.prescribed
+        total = gather_wrenches(draft, own, wrenches, torque if wanted else None)
         if draft.tail.name:
             add(draft, branch.chain_wrench, total, sums)
         elif not draft.tail.fixed:

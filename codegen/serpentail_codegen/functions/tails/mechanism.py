@@ -38,9 +38,8 @@ class Segments:
     def motion(self, i: Index, v_dot: Array | None = None) -> Vectors:
         """Return the rates of segment i if it moves, and its accelerations if there are any."""
         named = {"rates": self.state.rates(i)} if self.state.v else {}
-        if v_dot:
-            named["accelerations"] = self.state.tail.segment_v(v_dot, i)
-        return Vectors(named)
+        accelerations = self.state.accelerations(i, v_dot)
+        return Vectors(named | ({"accelerations": accelerations} if accelerations else {}))
 
 
 def in_turn(
@@ -114,6 +113,7 @@ class Mechanism:
 def simplified(function: StepFunction | Step, state: State, forced: bool = True) -> Step:
     """Return a step, specialised to an animal at rest or to a tail that does not accelerate."""
     step, none = derived(function), (0,) * state.tail.width
+    forced = forced or state.tail.prescribed
     if state.v is None:
         step = specialised(step, f"{step.name}_rest", rates=none, w=(0, 0, 0))
     if not forced:

@@ -22,7 +22,7 @@ def records(has: SimulationFeatures) -> dict[str, list[Field]]:
     found = {
         "piecewise": PIECEWISE,
         "controller": [*CONTROLLER[:2], *TENSIONS[: has.tendons], *PFL * has.pfl, *CONTROLLER[2:]],
-        "drive": DRIVE + LEGS * legs,
+        "drive": DRIVE + LEGS * legs + GIVEN * has.given,
         "run": [*START, *BRISTLES[:1] * ground, *SETTINGS, *touched, *KEPT]
         + CONTACT_KEPT * ground
         + LANDED * legs,
@@ -96,6 +96,9 @@ LEGS = fields("""
     const piecewise *landing: the same from a touch-down of the feet on, in one piece over the time
         since then; NULL: `legs` go on
     real landing_from: the first touch-down from this time (s) on counts
+""")
+GIVEN = fields("""
+    const piecewise *given: a channel for each prescribed coordinate (rad)
 """)
 START = fields("""
     const parameters *parameters: parameters of the model

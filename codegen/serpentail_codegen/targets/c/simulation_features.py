@@ -25,6 +25,7 @@ class SimulationFeatures:
     contacts: int  # points that can touch the ground
     groups: tuple[tuple[str, int], ...]  # of these points: name and count
     legs: bool
+    given: int  # prescribed coordinates
     air: bool
     gradients: bool  # derivatives of whole runs
     tendons: int
@@ -35,8 +36,14 @@ class SimulationFeatures:
         groups (N s), work and impulse of the air.
         """
         works = ["torques", "damping"] + ["ground"] * bool(self.contacts) + ["legs"] * self.legs
+        works += ["prescribed"] * bool(self.given)
         sums = tuple((name, 1) for name in works) + tuple((name, 3) for name, _ in self.groups)
         return sums + (("air", 1), ("air", 3)) * self.air
+
+    @property
+    def schedule(self) -> tuple[str, int, int]:
+        """Return what follows a schedule: its name in C, its angles, numbers with their rates."""
+        return ("given", self.given, 3 * self.given) if self.given else ("legs", 4 * self.legs, 8)
 
     @property
     def parts(self) -> tuple[tuple[str, int, int], ...]:
@@ -77,5 +84,5 @@ def simulation_features(tail: Tail, names: Collection[str], factors: int) -> Sim
     factors.
     """
     groups, legs = tuple(tail.groups.items()), "feet" in tail.contacts
-    more = tail.widths > 0, "rates_vjp" in names, tail.tendons
+    more = tail.given, tail.widths > 0, "rates_vjp" in names, tail.tendons
     return SimulationFeatures("pfl" in names, factors, tail.points, groups, legs, *more)
