@@ -55,7 +55,8 @@ class ChainLayout:
     tail points.
 
     owner: the beginning of the names of its parameters; a mirrored chain is their mirror image.
-    names: of its coordinates; driven: whether each has an actuator.
+    names: of its coordinates; driven: whether each has an actuator; given: names of coordinates that
+    are prescribed, which are in none of q, v and tau.
     """
 
     name: str
@@ -68,6 +69,7 @@ class ChainLayout:
     points: slice
     names: tuple[str, ...]
     driven: tuple[bool, ...]
+    given: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,7 @@ class Layout(Sizes):
     """Where numbers lie in q, v and tau; ``layout["hind_left"]`` is that of one chain.
 
     chains: those of a model, the tail first. hinges: how many segments have one coordinate.
-    tendons: their names.
+    tendons: their names. given: how many coordinates are prescribed.
     """
 
     segments: int
@@ -83,6 +85,7 @@ class Layout(Sizes):
     chains: tuple[ChainLayout, ...] = field(default=(), compare=False)
     hinges: int = 0
     tendons: tuple[str, ...] = field(default=(), compare=False)
+    given: int = 0
 
     @property
     def widths(self) -> tuple[int, ...]:

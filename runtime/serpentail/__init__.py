@@ -26,6 +26,7 @@ _HOME = {
     "Sampled": "simulation.controllers.sampled",
     "Piecewise": "simulation.controllers.piecewise",
     **dict.fromkeys(["Legs", "Reference"], "simulation.controllers.schedules"),
+    "Prescribed": "simulation.controllers.prescribed",
     "Contact": "motion.contact",
     "Trajectory": "motion.trajectory",
     "summary": "motion.summary",

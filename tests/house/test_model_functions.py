@@ -9,7 +9,7 @@ from pathlib import Path
 
 from serpentail_scene.signatures.arguments import LEGS, Argument
 from serpentail_scene.signatures.signature import Signature
-from serpentail_scene.signatures.table import ALL, SIGNATURES
+from serpentail_scene.signatures.table import ALL, OF_GIVEN, SIGNATURES
 
 PATH = Path(__file__).parents[2] / "runtime" / "serpentail" / "model" / "functions.py"
 BY_HAND = ("forward_dynamics", "forward_dynamics_external")  # one method, in model/methods.py
@@ -46,7 +46,10 @@ Array = NDArray[Any]  # of doubles, or of floats if the scene asks for them
 class ModelFunctions:
     """The functions of a scene, for one state or with a leading batch axis.
 
-    ``Model`` says what q and v are, and what a derivative with respect to q is.
+    ``Model`` says what q and v are, and what a derivative with respect to q is. ``given``, only of
+    models with prescribed joints, and in place of ``legs``: all their angles (rad), then rates, then
+    accelerations, (3, n), in the order of the chains. ``inverse_dynamics`` then returns (force, the
+    torques of these joints).
 
     Raises
     ------
@@ -75,7 +78,9 @@ def method(signature: Signature) -> str:
         typed[-1] += " | None = None"
         given = ", ".join(names[:-1])
         call = f'self.kernels.with_legs("{signature.name}", legs, {given}, out=out)'
-    typed += ["*", "out: Out = None"]
+    elif signature.name in OF_GIVEN:
+        call = call.replace(", out=", ", *given, out=")
+    typed += ["*given: ArrayLike" if "*given" in call else "*", "out: Out = None"]
     results = ", ".join(["Array"] * len(signature.outputs))
     result = f"tuple[{results}]" if len(signature.outputs) > 1 else results
     of_state = [name for name in names if name in ("q", "v")]

@@ -52,7 +52,11 @@ def bend_ranges(manifest: Mapping[str, Any]) -> np.ndarray:
 def layout_of(manifest: Mapping[str, Any], kinds: tuple[str, ...]) -> Layout:
     """Return the layout of a model whose segments are of these kinds."""
     fixed = manifest["scene"].get("base") == "fixed"
-    layout = Layout(len(kinds), fixed, (), kinds.count(HINGE))
+    given = 0
+    for entry in entries(manifest):
+        if owner_of(entry) and "prescribed" in drives_of(manifest["scene"]["chain"][owner_of(entry)]):
+            given += sum(1 if kind == HINGE else 2 for kind in kinds[slice(*entry["segments"])])
+    layout = Layout(len(kinds), fixed, (), kinds.count(HINGE), given=given)
     polar = manifest["scene"]["coordinates"] == "polar"
     chains, first = [], 0
     for entry in entries(manifest):
@@ -64,7 +68,10 @@ def layout_of(manifest: Mapping[str, Any], kinds: tuple[str, ...]) -> Layout:
         else:
             pairs = [COORDINATES["polar" if polar else kind] for kind in own]
             names = [f"{name}_{i + 1}" for i, pair in enumerate(pairs) for name in pair]
-        stop, drives = first + len(names), drives_of(table)
+        names, drives = [f"{start}{name}" for name in names], drives_of(table)
+        moved = tuple(names) if "prescribed" in drives else ()
+        names = [] if moved else names
+        stop = first + len(names)
         chains.append(
             ChainLayout(
                 name=entry["name"],
@@ -75,13 +82,14 @@ def layout_of(manifest: Mapping[str, Any], kinds: tuple[str, ...]) -> Layout:
                 tau=slice(first, stop),
                 segments=slice(*entry["segments"]),
                 points=slice(*entry["points"]),
-                names=tuple(f"{start}{name}" for name in names),
+                names=tuple(names),
                 driven=tuple(drives[k % len(drives)] != "passive" for k in range(len(names))),
+                given=moved,
             )
         )
         first = stop
     tendons = names_of_tendons(manifest["scene"].get("tendon", {}))
-    return Layout(len(kinds), fixed, tuple(chains), layout.hinges, tendons)
+    return Layout(len(kinds), fixed, tuple(chains), layout.hinges, tendons, given)
 
 
 def values_of(chain: ChainLayout, values: Mapping[str, Any]) -> dict[str, Any]:

@@ -50,8 +50,12 @@ class CompiledFunctions(dict[str, Kernel]):
         return model.kernels[name]
 
     def with_legs(self, name: str, legs: ArrayLike | None, *arrays: ArrayLike, out: Out) -> Any:
-        """Call a function that takes legs last if the model has feet."""
+        """Call a function that takes legs last if the model has feet, or how prescribed joints
+        move.
+        """
         kernel, model = self[name], self.manifest["prefix"]
+        if "given" in kernel.names:
+            return kernel(*arrays, *(() if legs is None else (legs,)), out=out)
         feet = any(entry["group"] == "feet" for entry in self.manifest["contacts"])
         if feet and legs is None:
             raise StateError(f"{model} has feet: give legs, 4 angles (rad) and 4 rates (rad/s)")

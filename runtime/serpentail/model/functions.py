@@ -16,7 +16,10 @@ Array = NDArray[Any]  # of doubles, or of floats if the scene asks for them
 class ModelFunctions:
     """The functions of a scene, for one state or with a leading batch axis.
 
-    ``Model`` says what q and v are, and what a derivative with respect to q is.
+    ``Model`` says what q and v are, and what a derivative with respect to q is. ``given``, only of
+    models with prescribed joints, and in place of ``legs``: all their angles (rad), then rates, then
+    accelerations, (3, n), in the order of the chains. ``inverse_dynamics`` then returns (force, the
+    torques of these joints).
 
     Raises
     ------
@@ -28,7 +31,7 @@ class ModelFunctions:
 
     kernels: CompiledFunctions
 
-    def mass_matrix(self, q: ArrayLike, *, out: Out = None) -> Array:
+    def mass_matrix(self, q: ArrayLike, *given: ArrayLike, out: Out = None) -> Array:
         """Compute the inertia matrix H(q), Eq. 2.
 
         Parameters
@@ -40,9 +43,9 @@ class ModelFunctions:
         H : ndarray, shape (nv, nv)
             Inertia matrix, symmetric and positive definite (kg, kg m, kg m^2).
         """
-        return self.kernels["mass_matrix"](q, out=out)
+        return self.kernels["mass_matrix"](q, *given, out=out)
 
-    def bias_force(self, q: ArrayLike, v: ArrayLike, *, out: Out = None) -> Array:
+    def bias_force(self, q: ArrayLike, v: ArrayLike, *given: ArrayLike, out: Out = None) -> Array:
         """Compute the bias force C(q, v), Eq. 3: centrifugal and Coriolis terms, gravity, the
         passive tail.
 
@@ -56,10 +59,10 @@ class ModelFunctions:
             Generalised force: at B (N, world), moment (N m, body), torques of the tail coordinates
             (N m).
         """
-        return self.kernels["bias_force"](q, v, out=out)
+        return self.kernels["bias_force"](q, v, *given, out=out)
 
     def inverse_dynamics(
-        self, q: ArrayLike, v: ArrayLike, v_dot: ArrayLike, *, out: Out = None
+        self, q: ArrayLike, v: ArrayLike, v_dot: ArrayLike, *given: ArrayLike, out: Out = None
     ) -> Array:
         """Compute the generalised force H v_dot + C that an acceleration v_dot needs.
 
@@ -75,7 +78,7 @@ class ModelFunctions:
             Generalised force: at B (N, world), moment (N m, body), torques of the tail coordinates
             (N m).
         """
-        return self.kernels["inverse_dynamics"](q, v, v_dot, out=out)
+        return self.kernels["inverse_dynamics"](q, v, v_dot, *given, out=out)
 
     def air_force(self, q: ArrayLike, v: ArrayLike, *, out: Out = None) -> Array:
         """Compute the generalised force of the air, of the law in mechanics/air.py.
@@ -92,7 +95,9 @@ class ModelFunctions:
         """
         return self.kernels["air_force"](q, v, out=out)
 
-    def energy(self, q: ArrayLike, v: ArrayLike, *, out: Out = None) -> tuple[Array, Array]:
+    def energy(
+        self, q: ArrayLike, v: ArrayLike, *given: ArrayLike, out: Out = None
+    ) -> tuple[Array, Array]:
         """Compute the kinetic and potential energy of torso and tail.
 
         Parameters
@@ -106,9 +111,11 @@ class ModelFunctions:
         potential : float
             Potential energy, zero at the height of the world's origin (J).
         """
-        return self.kernels["energy"](q, v, out=out)
+        return self.kernels["energy"](q, v, *given, out=out)
 
-    def momentum(self, q: ArrayLike, v: ArrayLike, *, out: Out = None) -> tuple[Array, Array]:
+    def momentum(
+        self, q: ArrayLike, v: ArrayLike, *given: ArrayLike, out: Out = None
+    ) -> tuple[Array, Array]:
         """Compute the linear and angular momentum of torso and tail.
 
         Parameters
@@ -122,9 +129,9 @@ class ModelFunctions:
         angular : ndarray, shape (3,)
             Angular momentum about the centre of mass (kg m^2/s, world).
         """
-        return self.kernels["momentum"](q, v, out=out)
+        return self.kernels["momentum"](q, v, *given, out=out)
 
-    def tail_points(self, q: ArrayLike, *, out: Out = None) -> Array:
+    def tail_points(self, q: ArrayLike, *given: ArrayLike, out: Out = None) -> Array:
         """Compute the positions of the tail points, Eqs. 13 to 15.
 
         Parameters
@@ -136,7 +143,7 @@ class ModelFunctions:
         points : ndarray, shape (N + 1, 3)
             Positions of the joints, then of the tip (m, world).
         """
-        return self.kernels["tail_points"](q, out=out)
+        return self.kernels["tail_points"](q, *given, out=out)
 
     def tail_point_jacobians(self, q: ArrayLike, *, out: Out = None) -> Array:
         """Compute the Jacobians of the tail points, Eqs. A5 to A8.
@@ -153,7 +160,7 @@ class ModelFunctions:
         return self.kernels["tail_point_jacobians"](q, out=out)
 
     def center_of_mass(
-        self, q: ArrayLike, v: ArrayLike, *, out: Out = None
+        self, q: ArrayLike, v: ArrayLike, *given: ArrayLike, out: Out = None
     ) -> tuple[Array, Array, Array]:
         """Compute the centre of mass of torso and tail, its velocity and its Jacobian.
 
@@ -170,7 +177,7 @@ class ModelFunctions:
         J : ndarray, shape (3, nv)
             Jacobian of the centre of mass, world.
         """
-        return self.kernels["center_of_mass"](q, v, out=out)
+        return self.kernels["center_of_mass"](q, v, *given, out=out)
 
     def mass_matrix_world(self, q: ArrayLike, *, out: Out = None) -> Array:
         """Compute the inertia matrix H for the velocity (p_dot, omega in world axes, q_t_dot).
@@ -234,7 +241,7 @@ class ModelFunctions:
         return self.kernels["tendon_torques"](q, tension, out=out)
 
     def mount_wrench(
-        self, q: ArrayLike, v: ArrayLike, v_dot: ArrayLike, *, out: Out = None
+        self, q: ArrayLike, v: ArrayLike, v_dot: ArrayLike, *given: ArrayLike, out: Out = None
     ) -> tuple[Array, Array]:
         """Compute the force and moment of the tail on the torso at the tail's mount; the ground's
         forces on the tail are left out.
@@ -252,7 +259,7 @@ class ModelFunctions:
         mount_moment : ndarray, shape (3,)
             Moment on the torso about the mount (N m, torso axes).
         """
-        return self.kernels["mount_wrench"](q, v, v_dot, out=out)
+        return self.kernels["mount_wrench"](q, v, v_dot, *given, out=out)
 
     def inverse_dynamics_derivatives(
         self, q: ArrayLike, v: ArrayLike, v_dot: ArrayLike, *, out: Out = None

@@ -16,7 +16,7 @@ from serpentail_scene.layout import QUATERNION
 from ..basics.checks import real_array, refuse_not_finite
 from ..basics.errors import StateError
 from ..compiling.threads import shared
-from .chains import HINGE, bend_ranges
+from .chains import bend_ranges, layout_of
 from .fast_call import Call, fast_call, no_call
 from .library import NOT_POSITIVE_DEFINITE, OUT_OF_RANGE, BatchLibrary, RecordFunction
 from .memory import Out, address_of, aligned, aligned_rows, received
@@ -117,6 +117,7 @@ class Kernel:
         self.bend_ranges = bend_ranges(manifest)
         self.polar = manifest["scene"]["coordinates"] == "polar"
         self.kinds = manifest["dimensions"].get("kinds") or ("continuum",)  # of all: arcs alone
+        self.manifest = manifest
         self.thread = threading.local()  # buffers of each thread
         self.fast: Call | None = None  # made at the first call
 
@@ -270,7 +271,8 @@ class Kernel:
         if self.names[0] == "x":  # the rates are there, too
             tail = tail[: len(tail) // 2]
         kinds = np.broadcast_to(self.kinds, self.bend_ranges.shape)
-        widths, arcs = np.where(kinds == HINGE, 1, 2), kinds == "continuum"
+        widths = np.array(layout_of(self.manifest, tuple(kinds)).widths)
+        arcs = (kinds == "continuum") & (widths > 0)
         firsts = (widths.cumsum() - widths)[arcs]
         first, second = tail[firsts], tail[firsts + 1]
         bends = np.zeros(len(arcs))  # only arcs have a range

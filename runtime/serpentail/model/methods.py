@@ -54,7 +54,7 @@ class ModelMethods(ModelFunctions):
         v: ArrayLike,
         tau: ArrayLike,
         f_ext: ArrayLike | None = None,
-        *,
+        *given: ArrayLike,
         out: Out = None,
     ) -> Array:
         """Compute the acceleration v_dot of Eq. 1.
@@ -67,6 +67,8 @@ class ModelMethods(ModelFunctions):
         f_ext : array_like, shape (6 + 3 (N + 1),), optional
             External forces: a force at B (N, world), a moment on the torso (N m, body), then a
             force (N, world) at each of the N + 1 tail points; see ``external_force``.
+        given : array_like, shape (3, n)
+            How prescribed joints move, of models with any: after f_ext, which may be None.
 
         Returns
         -------
@@ -74,8 +76,8 @@ class ModelMethods(ModelFunctions):
             Acceleration: time derivative of v (m/s^2, rad/s^2).
         """
         if f_ext is None:
-            return self.kernels["forward_dynamics"](q, v, tau, out=out)
-        return self.kernels["forward_dynamics_external"](q, v, tau, f_ext, out=out)
+            return self.kernels["forward_dynamics"](q, v, tau, *given, out=out)
+        return self.kernels["forward_dynamics_external"](q, v, tau, f_ext, *given, out=out)
 
     aba = forward_dynamics
 

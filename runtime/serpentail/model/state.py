@@ -188,7 +188,7 @@ def _numbers(model: Model, field: str, word: str, value: Any, error: type[Except
     if word in OF_TAIL:
         if model.manifest["scene"]["coordinates"] == "polar":
             raise error(f"{field}: is no polar coordinate: leave it out, and set q")
-        m, nt, hinges = model.segments, model.layout.nt, model.layout.hinges
+        m, nt, hinges = model.segments, model.layout.nt, model.layout.hinges + model.layout.given
         if array.shape not in ((), (m,), (nt,), *[(m, 2)] * (not hinges)):
             each = "the angle of each hinge, " if hinges else ""
             needs = f"pitch and yaw of each segment, {each}{nt} numbers; {m} pitches; or one pitch"

@@ -14,9 +14,9 @@ def mount_wrenches(model: Model, motion: Any) -> tuple[Array, Array]:
     """Return force (K, 3), N, and moment (K, 3), N m, of the tail at its mount, torso axes."""
     pose, contact = pose_of(motion.q, model.layout), motion.contact
     if contact is None:
-        v_dot = model.forward_dynamics(motion.q, motion.v, motion.tau)
-        return model.mount_wrench(motion.q, motion.v, v_dot)
-    R, points = rotation_matrix(pose[:, QUATERNION]), model.tail_points(motion.q)
+        v_dot = model.forward_dynamics(motion.q, motion.v, motion.tau, None, *motion.given)
+        return model.mount_wrench(motion.q, motion.v, v_dot, *motion.given)
+    R, points = rotation_matrix(pose[:, QUATERNION]), model.tail_points(motion.q, *motion.given)
 
     # the ground pushes on the torso, by the massless legs too, and on all tail points but the first
     f_ext = np.zeros((len(pose), 6 + points[0].size))
@@ -29,8 +29,8 @@ def mount_wrenches(model: Model, motion: Any) -> tuple[Array, Array]:
         f_ext[:, VELOCITY] += part.forces.sum(axis=1)
         moment = np.cross(arms, part.forces).sum(axis=1)
         f_ext[:, 3:6] += np.einsum("kji,kj->ki", R, moment)
-    v_dot = model.forward_dynamics(motion.q, motion.v, motion.tau, f_ext)
-    force, moment = model.mount_wrench(motion.q, motion.v, v_dot)
+    v_dot = model.forward_dynamics(motion.q, motion.v, motion.tau, f_ext, *motion.given)
+    force, moment = model.mount_wrench(motion.q, motion.v, v_dot, *motion.given)
 
     # the torso holds what pushes on the tail
     forces, arms = f_ext[:, 6:].reshape(points.shape), points - points[:, :1]

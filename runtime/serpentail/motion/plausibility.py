@@ -89,12 +89,12 @@ def _depths(model: Model, motion: "Trajectory") -> dict[str, Moment]:
     """Return the largest depth (m) of each part without contact, and its time."""
     contact = motion.contact
     assert contact is not None
-    q, axes, depths = motion.q, semi_axes(model), {}
+    q, axes, depths, given = motion.q, semi_axes(model), {}, _given_in(motion)
     if "torso" not in contact.groups:
         depths["torso"] = _largest(motion, lambda rows: _depth_of_torso(q[rows], axes))
     if "tail" not in contact.groups and "tail_points" in model.kernels:
         depths["tail"] = _largest(
-            motion, lambda rows: -model.tail_points(q[rows])[..., 2].min(axis=1)
+            motion, lambda rows: -model.tail_points(q[rows], *given(rows))[..., 2].min(axis=1)
         )
     legs = contact.legs
     if legs is not None and "leg_points" in model.kernels:
@@ -117,7 +117,7 @@ def _through_the_torso(model: Model, motion: "Trajectory") -> list[str]:
         return []
 
     def depth(rows: slice) -> Array:
-        return depth_in_torso(model, motion.q[rows])
+        return depth_in_torso(model, motion.q[rows], *_given_in(motion)(rows))
 
     deepest, time = _largest(motion, depth)
     if not deepest > SUNK:
@@ -130,9 +130,14 @@ def torso_is_known(model: Model) -> bool:
     return "tail_points" in model.kernels and bool(semi_axes(model).all())
 
 
-def depth_in_torso(model: Model, q: Array) -> Array:
+def _given_in(motion: "Trajectory") -> Callable[[slice], list[Array]]:
+    """Return what gives the motion of prescribed joints in some rows."""
+    return lambda rows: [each[rows] for each in motion.given]
+
+
+def depth_in_torso(model: Model, q: Array, *given: Array) -> Array:
     """Return how far chains go into the torso, (K,), of states q (K, nq); see ``sunk``."""
-    from_b = model.tail_points(q) - q[:, None, POSITION]
+    from_b = model.tail_points(q, *given) - q[:, None, POSITION]
     own = np.einsum("kij,kpi->kpj", rotation_matrix(q[:, QUATERNION]), from_b)
     scaled = own / semi_axes(model)
     return np.max([sunk(scaled[:, chain.points]) for chain in model.layout.chains], axis=0)

@@ -20,6 +20,7 @@ from . import archive
 from .asked import Asked
 from .contact import Contact
 from .derived import Derived, Later, made, settled
+from .given import given_at
 from .methods import Exports, Showable
 from .plausibility import doubts, warnings_of
 from .resample import Interpolation, inside, monotone, states_between
@@ -176,6 +177,13 @@ class Trajectory(Asked, Exports, Showable):
     def tail_rate(self) -> Array:
         """Rates of the tail coordinates, (K, 2m), rad/s."""
         return self.v[:, self.layout.tail_v]
+
+    @property
+    def given(self) -> tuple[Array, ...]:
+        """How prescribed joints move: angles (rad), rates, accelerations, (K, 3, n), as functions
+        of a model take them; an empty tuple without such joints.
+        """
+        return given_at(self.info, self.t)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the motion to an .npz file, whole or not at all.

@@ -163,21 +163,23 @@ class Poses:
     legs: Array | None
 
 
-def poses_of(model: Model, q: Array, angles: Array | None) -> Poses:
-    """Return the poses of configurations (K, nq) with angles (K, 4) of the legs, rad."""
+def poses_of(model: Model, q: Array, angles: Array | None, *given: Array) -> Poses:
+    """Return the poses of configurations (K, nq) with angles (K, 4) of the legs, rad; ``given`` of
+    prescribed joints.
+    """
     legs = None
     if angles is not None and "leg_points" in model.kernels:
         legs = np.asarray(model.leg_points(q, angles))
-    return Poses(pose_of(q, model.layout), model.tail_points(q), legs)
+    return Poses(pose_of(q, model.layout), model.tail_points(q, *given), legs)
 
 
-def centre_of_mass(model: Model, q: Array, v: Array) -> Array:
+def centre_of_mass(model: Model, q: Array, v: Array, *given: Array) -> Array:
     """Return the centre of mass (K, 3), m; that of the torso if the scene left out
     ``center_of_mass``; on a fixed base the place of the base.
     """
     if model.fixed or "center_of_mass" not in model.kernels:
         return pose_of(q, model.layout)[:, POSITION]
-    return np.asarray(model.center_of_mass(q, v)[0])
+    return np.asarray(model.center_of_mass(q, v, *given)[0])
 
 
 def bends(model: Model, tail: Array) -> Array:

@@ -15,6 +15,7 @@ from ..basics.errors import SimulationError, StateError
 from ..model.model import Model
 from ..model.passive import behind_stops, stored_energy
 from ..motion.archive import origin
+from ..motion.given import PRESCRIBED
 from ..motion.trajectory import Trajectory
 from .audit import BALANCED, Between, allowance, audited, warnings_of
 from .ground import LANDED_AT, GroundSettings
@@ -103,7 +104,7 @@ class Energies:
             landed_at = samples.info.get(LANDED_AT, np.inf)
             return {"contact": self.ground.contact(self.model, samples.t, given, landed_at)}
         function, names = next(row for row in MEASURES.items() if name in row[1])
-        found = getattr(self.model, function)(*state)
+        found = getattr(self.model, function)(*state, *self.ground.given_at(samples.t))
         measures = {k: np.asarray(array, float) for k, array in zip(names, found, strict=True)}
         for array in measures.values():
             array.setflags(write=False)
@@ -113,6 +114,8 @@ class Energies:
         """Return the info of the run, with its audit."""
         samples = self.samples
         info = samples.info | origin(self.model)
+        if (curve := self.ground.given) is not None:
+            info[PRESCRIBED] = {name: array.tolist() for name, array in vars(curve).items()}
         if samples.failure is not None:
             return info | {"failure": str(samples.failure) or INTERRUPTED}
         if not samples.ledger.size:  # a part of a run
@@ -135,8 +138,9 @@ class Energies:
     def _ends(self) -> dict[str, np.ndarray]:
         """Return energies (2,), linear momentum (2, 3), stored energy at start and end."""
         rows = []
-        for q, v in zip(self.samples.q[[0, -1]], self.samples.v[[0, -1]], strict=True):
-            rows.append((*self.model.energy(q, v), self.model.momentum(q, v)[0]))
+        for k in (0, -1):
+            state = self.samples.q[k], self.samples.v[k], *self.ground.given_at(self.samples.t[k])
+            rows.append((*self.model.energy(*state), self.model.momentum(*state)[0]))
         columns = zip(*rows, strict=True)
         ends = {name: np.array(each, float) for name, each in zip(BALANCED, columns, strict=True)}
         return ends | {"stored": self._stored(self.samples.q[[0, -1]])}

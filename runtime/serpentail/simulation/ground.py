@@ -14,6 +14,8 @@ from ..model.model import Model
 from ..model.parameters import RunParameters
 from ..model.weight import weight_of
 from ..motion.contact import Contact
+from .controllers.piecewise import Piecewise
+from .controllers.prescribed import curve_of
 from .controllers.schedules import Legs
 from .start import Start
 
@@ -32,18 +34,25 @@ DEEP = (
 
 @dataclass(frozen=True, eq=False)
 class GroundSettings:
-    """Checked settings of runs on the ground, bristles (k, points, 2); without contacts none."""
+    """Checked settings of runs on the ground, bristles (k, points, 2); without contacts none.
+
+    given: angles of prescribed joints over time, if there are any, also in flight.
+    """
 
     groups: dict[str, int] = field(default_factory=dict)
     legs: Legs | None = None
     bristles: np.ndarray = field(default_factory=lambda: np.zeros((1, 0, 2)))
     stop_at: int = 0
+    given: Piecewise | None = None
 
     @classmethod
     def checked(
         cls, model: Model, start: Start, parameters: RunParameters, settings: dict
     ) -> "GroundSettings":
-        """Take legs, bristles0 and stop_at out of settings; SimulationError if one is wrong."""
+        """Take legs, prescribed, bristles0 and stop_at out of settings; SimulationError if one is
+        wrong.
+        """
+        given = curve_of(model, start.many, settings.pop("prescribed", None))
         choices = {name: settings.pop(name, None) for name in ("legs", "bristles0", "stop_at")}
         groups = model.contacts
         if not groups:
@@ -53,10 +62,10 @@ class GroundSettings:
                     raise SimulationError(
                         f"{name} {value!r}: {model.name} has no contacts: {remedy}"
                     )
-            return cls()
+            return cls(given=given)
         legs = _legs(groups, choices["legs"])
         bristles = _bristles(groups, start, choices["bristles0"])
-        ground = cls(groups, legs, bristles, _stops(groups, choices["stop_at"]))
+        ground = cls(groups, legs, bristles, _stops(groups, choices["stop_at"]), given)
         ground.refuse_deep(model, start, parameters)
         return ground
 
@@ -72,18 +81,23 @@ class GroundSettings:
         return point | numbers
 
     def legs_at(self, t: ArrayLike, landed_at: float = np.inf) -> tuple[np.ndarray, ...]:
-        """Return the argument ``legs`` (8,) or (K, 8) at t (s); nothing without feet.
+        """Return the argument ``legs`` (8,) or (K, 8) at t (s), or ``given``; nothing without feet
+        and prescribed joints.
 
         landed_at: the time (s) at which the landing of the legs began, if it did.
         """
         if self.legs is None:
-            return ()
+            return self.given_at(t)
         found = np.concatenate(self.legs.curve.at(t)[:2], axis=-1)
         if self.legs.landing is not None and np.isfinite(landed_at):
             since = np.asarray(t, float) - landed_at
             late = np.concatenate(self.legs.landing.at(since)[:2], axis=-1)
             found = np.where((since >= 0)[..., None], late, found)
         return (found,)
+
+    def given_at(self, t: ArrayLike) -> tuple[np.ndarray, ...]:
+        """Return the argument ``given`` (3, n) or (K, 3, n) at t (s); nothing without it."""
+        return () if self.given is None else (np.stack(self.given.at(t), axis=-2),)
 
     def refuse_deep(self, model: Model, start: Start, parameters: RunParameters) -> None:
         """SimulationError if a point begins deeper than a static force could press it."""
@@ -132,7 +146,7 @@ class GroundSettings:
         positions, _ = model.contact_points(q, v, *legs)
         stretch = bristles.reshape(len(bristles), -1)
         forces = model.kernel("contact_rates")(q, v, tau, stretch, *legs)[2]
-        angles = legs[0][:, :LEG_ANGLES] if legs else None
+        angles = legs[0][:, :LEG_ANGLES] if self.legs else None
         return Contact(positions, forces, bristles, self.groups, angles)
 
     def events(self, times: list[float], numbers: list[int]) -> list[dict[str, Any]]:

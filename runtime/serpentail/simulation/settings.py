@@ -6,6 +6,7 @@ from typing import Required, TypedDict
 from ..model.state import Quantities, Quantity
 from .callback import Watch
 from .controllers.controller import Controller
+from .controllers.prescribed import Prescribed
 from .controllers.schedules import Legs
 
 
@@ -23,6 +24,7 @@ class RunSettings(TypedDict, total=False):
     most_steps: float
     step: Quantity
     legs: Legs
+    prescribed: Prescribed
     bristles0: Quantities
     stop_at: Sequence[tuple[str, str]]
     watch: Watch

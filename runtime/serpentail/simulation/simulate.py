@@ -127,6 +127,8 @@ def simulate(
         Step of "rk4" and "implicit_euler" (s); it is shortened to divide ``output_step``.
     legs : Legs
         Leg angles over time; required if the model has feet.
+    prescribed : Prescribed
+        Angles of prescribed joints over time; required if the model has any. It takes one start.
     bristles0 : array_like, shape (points, 2), optional
         Stretch of the friction springs at the start (m), of models with contacts. Default:
         zero. For k starts also (k, points, 2).

@@ -41,12 +41,12 @@ def samples(model: Model, motion: Trajectory) -> dict[str, Array]:
     world; forces of the ground at ``touching``; then the plotted curves.
     """
     t, contact = motion.t.astype(np.float32), motion.contact
-    poses = poses_of(model, motion.q, None if contact is None else contact.legs)
+    poses = poses_of(model, motion.q, None if contact is None else contact.legs, *motion.given)
     arrays = {
         "t": np.stack([t, motion.t - t], axis=1),
         "pose": poses.torso,
         "tail": poses.tail,
-        "com": centre_of_mass(model, motion.q, motion.v),
+        "com": centre_of_mass(model, motion.q, motion.v, *motion.given),
         "height": poses.torso[:, 2],
         "tilt": tilt_deg(motion.attitude),
         "bends": np.degrees(bends(model, motion.tail)),

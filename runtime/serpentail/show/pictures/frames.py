@@ -76,9 +76,10 @@ def frames(model: Model, motion: Trajectory, rows: Sequence[int], largest: float
     """The frames of samples; `largest` (N) is the force whose arrow is LONGEST, 0 draws none."""
     rows, animal = list(rows), animal_of(model)
     angles = None if motion.contact is None else motion.contact.legs
-    poses = poses_of(model, motion.q[rows], None if angles is None else angles[rows])
+    given = [each[rows] for each in motion.given]
+    poses = poses_of(model, motion.q[rows], None if angles is None else angles[rows], *given)
     legs = np.zeros((len(rows), 0, 2, 3)) if poses.legs is None else poses.legs
-    coms = centre_of_mass(model, motion.q[rows], motion.v[rows])
+    coms = centre_of_mass(model, motion.q[rows], motion.v[rows], *given)
     rotations = rotation_matrix(poses.torso[:, QUATERNION])
     return [
         Frame(

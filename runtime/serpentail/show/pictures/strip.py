@@ -104,7 +104,7 @@ def strip_of(
     largest = largest_force(motions, rows)
     films = [frames(*each, largest) for each in zip(models, motions, rows, strict=True)]
     pairs = zip(models, motions, strict=True)
-    coms = [centre_of_mass(model, motion.q, motion.v) for model, motion in pairs]
+    coms = [centre_of_mass(model, motion.q, motion.v, *motion.given) for model, motion in pairs]
     lowest = min(frame.lowest for film in films for frame in film)
     grounded = lowest > 0 or any(motion.contact is not None for motion in motions)
     return Strip(films, coms, views, labels, grounded, largest)
@@ -137,7 +137,7 @@ def way_of(model: Model, motion: Trajectory) -> Array:
     _, length, height = animal_of(model).semi_axes
     marks, rotations = np.array([[0, length, 0], [0, 0, height]]), rotation_matrix(motion.attitude)
     torso = motion.pose[:, None, POSITION] + np.einsum("kij,nj->kni", rotations, marks)
-    points = np.concatenate([torso, model.tail_points(motion.q)], axis=1)
+    points = np.concatenate([torso, model.tail_points(motion.q, *motion.given)], axis=1)
     steps = np.linalg.norm(np.diff(points, axis=0), axis=2).mean(axis=1)
     return np.concatenate([[0.0], np.cumsum(steps)])
 

@@ -21,14 +21,16 @@ ROUNDING = 1e-6  # of a tension's limit, by which those of a solver may go beyon
 
 
 class Actuation:
-    """Controllers and legs as a C record, times to stop at, and errors of a user's function."""
+    """Controllers and legs, or angles of prescribed joints, as a C record, times to stop at, and
+    errors of a user's function.
+    """
 
     def __init__(
         self,
         records: Records,
         controller: Controller,
         span: tuple[float, float],
-        legs: Legs | None = None,
+        legs: Legs | Piecewise | None = None,
     ):
         self.records = records
         self.error: BaseException | None = None
@@ -46,7 +48,10 @@ class Actuation:
         # times at which something is not smooth; steps end there
         stops = {*self._kinks(begins, span)}
         members: dict[str, Any] = {}
-        if legs is not None:
+        if isinstance(legs, Piecewise):
+            stops |= {*legs.kinks(3).tolist()}
+            members["given"] = self._table(legs)
+        elif legs is not None:
             stops |= {*legs.curve.kinks(2).tolist()}
             members["legs"] = self._table(legs.curve)
             if legs.landing is not None:
@@ -239,7 +244,7 @@ class RunActuations:
     """
 
     def __init__(
-        self, records: Records, controller: object, start: Start, legs: Legs | None = None
+        self, records: Records, controller: object, start: Start, legs: Legs | Piecewise | None = None
     ):
         self.records = records
         self.span = start.start, start.end
@@ -264,7 +269,7 @@ class RunActuations:
         """The model whose tails are driven."""
         return self.records.model
 
-    def _of(self, controller: Controller, legs: Legs | None, k: int | None) -> Actuation:
+    def _of(self, controller: Controller, legs: Legs | Piecewise | None, k: int | None) -> Actuation:
         """Return the actuation of run k, or of all; SimulationError if it is impossible."""
         try:
             return Actuation(self.records, controller, self.span, legs)
