@@ -198,13 +198,14 @@ def _bend(model: Model, tail: Array) -> Array:
     turn on and on.
     """
     firsts, widths = np.array(model.layout.firsts), np.array(model.layout.widths)
-    first, second = tail[:, firsts], tail[:, firsts + widths - 1]
+    free = np.pad(tail, ((0, 0), (0, 1)))  # prescribed segments have no numbers
+    first, second = free[:, firsts], free[:, firsts + widths - 1]
     joints = model.joints_each * (widths > 1)
     if model.manifest["scene"]["coordinates"] == "polar":
         return np.abs(second)
     jointed = np.array(model.kinds) != "continuum"
     of_joints = joints * np.maximum(np.abs(first), np.abs(second))
-    return np.where(jointed, of_joints, np.hypot(first, second))
+    return np.where(jointed, of_joints, (widths > 1) * np.hypot(first, second))
 
 
 def _largest(motion: "Trajectory", measure: Measure) -> Moment:

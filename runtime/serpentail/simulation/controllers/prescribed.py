@@ -108,7 +108,7 @@ class Prescribed:
             goals = _goals(field, move, here)
             begin, duration = (
                 number(f"{field}.{key}", move[key], SimulationError, unit="s", above=least)
-                for key, least in (("at", None), ("duration", 0))
+                for key, least in (("at", -np.inf), ("duration", 0))
             )
             if rows and begin < times[-1]:
                 remedy = f"a time after {times[-1]:.6g} s, where the move before it ends"
