@@ -20,6 +20,7 @@ from tests.support.models import folder_of
 from tests.support.rows import row
 
 FEW = ["mass_matrix", "bias_force", "forward_dynamics"]
+RUNS = ["forward_dynamics", "energy", "momentum", "tail_points", "rollout"]
 ALONE = {"kind": "articulated", "segments": 1, "links": 3, "parameters": zoo.TORSO | zoo.MOUNTED}
 
 
@@ -64,6 +65,55 @@ def test_it_does_not_matter_which_chain_is_the_tail():
     most = FORWARD * equilibrated_condition(H)
     expected = one.forward_dynamics(q, v, tau)[swap]
     assert block_error(other.forward_dynamics(q2, v2, tau2), expected) < most
+
+
+def test_prescribed_legs_without_mass_are_those_of_the_paper():
+    """Points, forces and v_dot of a kick, its motion, and what the drives do; a heel that never
+    turns is where the paper's A is.
+    """
+    paper, names = zoo.model("ground"), ("L_h2d", "L_d2k", "L_k2a", "L_a2m", "L_m2t")
+    h2d, d2k, k2a, a2m, m2t = (float(paper.parameters[name]) for name in names)
+    bones = {"hip": h2d + k2a, "knee": d2k, "heel": a2m, "ankle": m2t}
+    light = {"mass": 1e-20, "inertia": [1e-26, 1e-27, 1e-26]}
+    joints = [{"name": name, "length": length, **light} for name, length in bones.items()]
+    leg = {"kind": "limb", "pair": True, "drive": "prescribed", "joints": joints}
+    leg |= {"mount": list(paper.parameters["hip"])}
+    keys = {"contacts": ["tail", "hind", "torso"], "parameters": {}}
+    keys |= {"functions": [*RUNS, "contact_points", "contact_dynamics", "implicit"]}
+    limbs = built("kicker", chain={"hind": leg}, **keys)
+
+    def bent(gamma, delta):
+        sole = gamma - paper.parameters["delta_m"]
+        return [gamma - np.pi, delta - gamma, 0, sole - delta + np.pi]
+
+    kick = {"at": 0.01, "duration": 0.03}
+    legs = st.Legs.moves(3.67, -0.26, [kick | {"delta": -1.2, "shape": "quintic"}])
+    given = st.Prescribed.moves({"hind": bent(3.67, -0.26)}, [kick | {"hind": bent(3.67, -1.2)}])
+    start = paper.state(height=0.055, spin=[0.3, -0.2, 0.1], velocity=[0.1, 0.2, -0.3])
+    settings = {"rtol": 1e-7, "output_step": 2e-3, "t_span": 0.06}
+    run = st.simulate(paper, start, legs=legs, **settings)
+    other = st.simulate(limbs, start, prescribed=given, **settings)
+    # where the points of feet, tail and torso are among those of the limbs
+    feet = np.r_[3 + 1 + np.arange(3), 3 + 5 + np.arange(3)]
+    places = np.r_[feet, 0:3, 11]
+    bristles = np.zeros((len(run.t), 12, 2))
+    bristles[:, places] = run.contact.bristles
+    state = run.q, run.v, run.tau
+    numbers = bristles.reshape(len(run.t), -1), *other.given
+    own = np.concatenate(legs.curve.at(run.t)[:2], axis=1)
+    v_dot, _, forces = limbs.contact_dynamics(*state, *numbers)
+    expected = paper.contact_dynamics(*state, run.contact.bristles.reshape(len(run.t), -1), own)
+    assert block_error(v_dot, expected[0]) < 1e-12
+    assert np.abs(forces[:, places] - expected[2]).max() < 1e-12 * np.abs(expected[2]).max()
+    points = limbs.contact_points(*state[:2], *other.given)[0][:, feet]
+    joints = paper.leg_points(run.q, own[:, :4])[:, :, 3:].reshape(len(run.t), 6, 3)
+    assert np.abs(points - joints).max() < 1e-15
+
+    assert run.contact.total.max() > 5 * weight_of(paper.parameters)
+    np.testing.assert_allclose(other.q[-1], run.q[-1], atol=1e-5)
+    work = [each.info["work_J"][name] for each, name in ((run, "legs"), (other, "prescribed"))]
+    assert work[1] == pytest.approx(work[0], rel=1e-4)
+    assert other.info["imbalance"]["relative"] < 1e-5
 
 
 @pytest.mark.slow  # it compiles a model
