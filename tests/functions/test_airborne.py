@@ -20,6 +20,7 @@ from .compared import model_of
 
 QUICK = ["m1_n3", "loops", "arcs2_loops", "elastic", "mixed", "air"]
 SLOW = ["m3_n4", "straight", "arcs3", "own_links", "own_arcs", "elastic_arcs", "weightless"]
+SLOW += ["limbs", "tree"]
 ROUNDING = 2e-13  # of a derivative, relative to its row; for each unit of the condition number
 every_model = pytest.mark.parametrize(
     "name", [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)]

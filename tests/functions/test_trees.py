@@ -90,6 +90,15 @@ def test_a_tree_is_its_set_of_bodies(name, bodies):
             assert np.abs(found - momentum).max() < 1e-13 * np.abs(momentum).max()
         assert np.abs(model.tail_points(q) - bodies.tail_points(q)).max() < 1e-15
 
+        # in the air: torso and acceleration by the momentum of the bodies; M' by that of H
+        x, h = np.concatenate([q[3:], v[6:]]), np.array(bodies.momentum(q, v)[1], float)
+        y, J = model.airborne_rates_derivatives(x, tau, h)
+        nt, most = model.layout.nt, 1e-13 * equilibrated_condition(H)
+        assert np.abs(y[-3:] - v[3:6]).max() < most * np.abs(v).max()
+        assert block_error(y[4 + nt : -3], expected[6:]) < most
+        left = H[6:, 6:] - H[6:, :6] @ np.linalg.solve(H[:6, :6], H[:6, 6:])
+        assert np.abs(J[4 + nt : -3, -nt:] @ left - np.eye(nt)).max() < most
+
 
 @pytest.mark.parametrize("name", ["tree", "limbs"])
 def test_loads_do_their_work(name):

@@ -55,8 +55,10 @@ def states(model, kind, count=2):
     q[:, 3:7] *= 3.7 if kind == "scaled" else 1
     v *= 0 if kind == "still" else 1
     multiplier = random_states(m, 29, count, "random")[1] / np.repeat([2, 20, 10], [3, 3, 2 * m])
-    own = slice(0 if model.nv > 2 * m else 6, None)  # without a torso, the tail's numbers alone
-    found = (q[:, own.start and 7 :], *(x[:, own] for x in (v, v_dot)), tau, multiplier[:, own])
+    first, count = 6 * model.fixed, model.nv  # without a torso, the tail's numbers alone
+    own = slice(first, first + count)
+    found = (q[:, first and 7 :][:, : model.nq], *(x[:, own] for x in (v, v_dot)))
+    found += (tau[:, : model.layout.nt], multiplier[:, own])
     return [
         dict(zip(("q", "v", "v_dot", "tau", "multiplier"), x, strict=True))
         for x in zip(*found, strict=True)

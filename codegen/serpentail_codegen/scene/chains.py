@@ -26,7 +26,6 @@ REFUSED: dict[str, tuple[Callable[[Any], bool], str]] = {
     "coordinates": (lambda x: x == "polar", 'use "bend", or remove the chains'),
     "base": (lambda x: x == "fixed", 'set base = "free", or remove the chains'),
     "baked": (lambda x: x is True, "set baked = false, or remove the chains"),
-    "plan": (bool, "remove the table [plan], or the chains"),
     "identify": (bool, "remove the table [identify], or the chains"),
 }
 ENDS = ("", "_dot")  # of the names of coordinates and of their rates

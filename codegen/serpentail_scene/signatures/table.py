@@ -27,6 +27,7 @@ def in_group(group: str) -> tuple[str, ...]:
 ALL = tuple(name for name, each in SIGNATURES.items() if not each.called)  # what a scene may name
 VALUES = in_group(VALUE)
 DERIVATIVES = in_group(DERIVATIVE)
+AIRBORNE = in_group(PLANNING)
 # of a tail on a fixed base
 FIXED = (
     *("mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics"),
@@ -43,11 +44,10 @@ OF_TREES = (
     *("momentum_derivatives", "inverse_dynamics_vjp", "forward_dynamics_vjp"),
     *("inverse_dynamics_parameter_derivatives", "forward_dynamics_parameter_derivatives"),
     *("forward_dynamics_jvp", "pfl", "implicit", "rollout", "mount_wrench"),
-    *("contact_points", "contact_dynamics"),
+    *("contact_points", "contact_dynamics", *AIRBORNE),
 )
 # of several chains of which some are prescribed
-OF_GIVEN = tuple(name for name in OF_TREES if name not in (*DERIVATIVES, "pfl"))
-AIRBORNE = in_group(PLANNING)
+OF_GIVEN = tuple(name for name in OF_TREES if name not in (*DERIVATIVES, *AIRBORNE, "pfl"))
 NEEDS = {name: signature.needs for name, signature in SIGNATURES.items() if signature.needs}
 # functions from which first, then second derivatives of a compiled function are computed
 EXACT_DERIVATIVES = {

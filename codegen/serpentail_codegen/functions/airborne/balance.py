@@ -115,7 +115,7 @@ def assemble_rates(draft: Draft, arrays: dict[str, Array]) -> Balance:
     bias = draft.array("bias", tail.nv)
     state = segments[0].state
     core_bias(draft, segments, bias, core_airspeed(draft, state))
-    add_passive_forces(draft, state, lambda i: tail.segment_v(bias, i))
+    add_passive_forces(draft, state, lambda i: draft.tail.segment_v(bias, i))
     axes = {"R": draft.fixed("identity", IDENTITY), "h": composite["h"]}
     factored = FactoredDynamics(draft, A, columns, bias, Vectors({**center, **axes}))
     factored.solve(minus(draft, bias, lambda k: arrays["tau"].part(k, 1)), v_dot)
