@@ -135,7 +135,7 @@ def test_a_flight_without_ground_has_phases_too():
 
 def test_a_posture_lands_when_a_fall_in_it_does():
     """A rat that falls in the goal's posture, and does not turn, touches down then."""
-    wanted, q, v = checked_goal(goal(), 2), np.zeros(9), np.zeros(8)
+    wanted, q, v = checked_goal(goal(), Layout(1)), np.zeros(9), np.zeros(8)
     q[2], q[3:7], q[7:] = 0.4, wanted.attitude, wanted.tail
     how = {"legs": st.Legs.fixed(*ANGLES), "stop_at": [("touch_down", "feet")]}
     for speed in (-1.0, 0.0, 2.0):

@@ -81,7 +81,9 @@ class Attempts:
             controls = asked.controls or min(CONTROL_INTERVALS, asked.intervals)
             return (uniform(asked.intervals, controls),)
         controls = asked.controls or CONTROL_INTERVALS
-        pieces = next(count for segments, count in PIECES if self.model.segments <= segments)
+        chains = (chain.segments for chain in self.model.layout.chains)
+        longest = max(segments.stop - segments.start for segments in chains)
+        pieces = next(count for segments, count in PIECES if longest <= segments)
         first, finer = (uniform(controls * each, controls) for each in (pieces, FINE))
         if first.intervals < finer.intervals <= asked.most_intervals:
             return first, finer

@@ -26,6 +26,11 @@ class Goal:
         Tail coordinates (rad); single numbers may be None. Default: free.
     tail_rate : array_like, shape (2m,), optional
         Their rates (rad/s); single numbers may be None. Default: free.
+    chains : mapping, optional
+        In place of ``tail``, coordinates (rad) by the names of chains, pairs and joints, such as
+        ``{"tail": [0, 0.2], "hind_knee": -0.5}``: one number, or one for each. Others are free.
+    chain_rates : mapping, optional
+        Likewise, in place of ``tail_rate`` (rad/s).
 
     Examples
     --------
@@ -38,6 +43,8 @@ class Goal:
     torso_rate: Any = (0.0, 0.0, 0.0)
     tail: Any = None
     tail_rate: Any = None
+    chains: Any = None
+    chain_rates: Any = None
 
 
 GOALS = {"upright": Goal()}  # by name
@@ -58,7 +65,9 @@ class Bounds:
     """Largest magnitudes along a plan (g_pc of Eq. 43); None sets no bound.
 
     Each is one number, or one for each of the 2m tail coordinates, in SI units or as text with a
-    unit, such as "20 mN m".
+    unit, such as "20 mN m". Of several chains it may be a mapping from names of chains, pairs and
+    joints, such as ``{"tail": "40 deg", "hind_knee": 1.2}``; later names win, and what has no name
+    has the default. One number does not bound angles and rates of passive coordinates.
 
     Parameters
     ----------

@@ -1,12 +1,11 @@
 """Duration and bounds of a plan, also with units; those that no flight needs give a warning."""
 
 import warnings
+from collections.abc import Mapping
 from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
-
-from serpentail_scene.layout import PER_SEGMENT
 
 from ..basics.checks import number, numbers, refusal, shown
 from ..basics.errors import PlanningError, UnusualSize
@@ -14,6 +13,7 @@ from ..basics.plausible_values import warn_of_unusual
 from ..model.model import Model
 from ..model.weight import fall, total_mass
 from .goal import HALF_TURN, LIMIT, MOTOR, Bounds
+from .named import numbers_by_name
 
 HUGE = 1e100  # beyond it squares overflow
 LONGEST = 5.0  # s: a fall from 120 m
@@ -57,28 +57,29 @@ def checked_bounds(model: Model, bounds: Any) -> Bounds:
     if not isinstance(bounds, Bounds):
         raise PlanningError(f"bounds: value {shown(bounds)}: needs a serpentail.Bounds")
     if isinstance(bounds.angle, str) and bounds.angle == HALF_TURN:
-        bounds = replace(bounds, angle=np.repeat(np.pi / model.joints_each, PER_SEGMENT))
+        bounds = replace(bounds, angle=_half_turns(model))
     bounds = _of_tendons(model, bounds)
+    usual = {n: model.parameters.get(f"motor_{n}", USUAL[n]) for n in USUAL}
     own = [n for n in USUAL if isinstance(x := getattr(bounds, n), str) and x == MOTOR]
-    usual = {n: model.parameters.get(f"motor_{n}", USUAL[n]) for n in own}
-    bounds = replace(bounds, **usual)
-    count = len(model.layout.tendons)
+    bounds = replace(bounds, **{n: usual[n] for n in own})
+    usual["angle"] = _half_turns(model)
     found = {
-        n: _bound(n, getattr(bounds, n), count if n == "tension" else model.layout.nt)
+        n: _bound(model, n, getattr(bounds, n), usual.get(n))
         for n in (entry.name for entry in fields(Bounds))
     }
     angle, torque = found["angle"], found["torque"]
     if found["speed"] is not None and torque is None:
         needs = "a bound of torque, too: that of a motor at rest"
         raise refusal("bounds.speed", bounds.speed, needs, PlanningError)
-    if angle is not None and angle.max() <= DEGREES:
-        warn_of_unusual("bounds.angle", float(angle.max()), "rad", FRAMES)
+    widest = 0.0 if angle is None else angle.max(where=np.isfinite(angle), initial=0.0)
+    if 0.0 < widest <= DEGREES:
+        warn_of_unusual("bounds.angle", float(widest), "rad", FRAMES)
     p = model.parameters
-    usual = STRONGEST * total_mass(p) * 9.81 * p["tail_length"]
-    if torque is not None and torque.max() > usual:
+    strongest = STRONGEST * total_mass(p) * 9.81 * p["tail_length"]
+    if torque is not None and torque.max() > strongest:
         most = f"{torque.max():.6g}"
         told = f"bounds.torque: value {most} N m: {STRONGEST:g} times this body's weight at the "
-        told += f"end of its tail is {usual:.2g} N m: did you mean "
+        told += f"end of its tail is {strongest:.2g} N m: did you mean "
         told += f'"{most} mN m"? None sets no bound'
         warnings.warn(told, UnusualSize, stacklevel=FRAMES)
     return Bounds(**found)
@@ -100,11 +101,35 @@ def _of_tendons(model: Model, bounds: Bounds) -> Bounds:
     return replace(bounds, torque=None, speed=None, power=None, tension=tension)
 
 
-def _bound(name: str, value: Any, tail: int) -> np.ndarray | None:
-    """Return a bound of every tail coordinate; None for no bound."""
+def _half_turns(model: Model) -> np.ndarray:
+    """Return the bound (nt,) of angles that bends each segment by half a turn."""
+    return np.repeat(np.pi / model.joints_each, model.layout.widths)
+
+
+def _bound(model: Model, name: str, value: Any, usual: Any) -> np.ndarray | None:
+    """Return a bound of every tail coordinate, or tendon; None for no bound.
+
+    usual: of coordinates without a name where the value names some; None: they have no bound.
+    """
+    layout, field = model.layout, f"bounds.{name}"
     if value is None:
         return None
-    magnitudes = numbers(f"bounds.{name}", value, tail, PlanningError, unit=UNITS[name], most=HUGE)
-    if not (magnitudes > 0).all():
-        raise PlanningError(f"bounds.{name}: value {shown(value)}: needs magnitudes above 0")
-    return magnitudes
+
+    def read(field: str, given: Any, size: int) -> np.ndarray:
+        found = numbers(field, given, size, PlanningError, unit=UNITS[name], most=HUGE)
+        if not (found > 0).all():
+            raise PlanningError(f"{field}: value {shown(given)}: needs magnitudes above 0")
+        return found
+
+    if name == "tension":
+        return read(field, value, len(layout.tendons))
+    if isinstance(value, Mapping):
+        others = np.full(layout.nt, np.inf if usual is None else usual)
+        found = numbers_by_name(field, layout, value, others, read)
+        if name == "torque_rate" and not np.isfinite(found).all():
+            raise refusal(field, value, "a number for each motor", PlanningError)
+        return found
+    found = read(field, value, layout.nt)
+    if name in ("angle", "rate") and np.ndim(value) == 0:  # a bound of what motors move
+        found[~np.array(layout.driven)] = np.inf
+    return found

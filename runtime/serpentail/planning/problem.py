@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from serpentail_scene.layout import QUATERNION, TAIL_Q
+from serpentail_scene.layout import QUATERNION, TAIL_Q, Layout
 
 from ..basics.checks import Refusals, number, numbers_in, one_of, refusal, refuse_not_finite, shown
 from ..basics.errors import PlanningError
@@ -20,6 +20,7 @@ from .design import Design, checked_design, with_totals
 from .free_start import Range, checked_free_start, moved_inside, within_bounds
 from .goal import GOALS, Bounds, Goal
 from .magnitudes import HUGE, checked_bounds, checked_duration
+from .named import numbers_by_name
 from .paths import PathConstraint, checked_clearance, checked_path, clear_of_ground, motor_rows
 
 OBJECTIVES = ("effort", "energy", "time")
@@ -66,7 +67,7 @@ def checked_problem(
     ``refused`` collects each field that is wrong, its value and the remedy.
     """
     # start, goal and bounds, and whether the bounds allow start and goal
-    attempt, tail, settings = refused.attempt, model.layout.nt, dict(settings)
+    attempt, settings = refused.attempt, dict(settings)
     free = settings.pop("free_start", None)
     design = attempt("design", checked_design, model, settings.pop("design", None))
     totals = settings.pop("design_totals", None)
@@ -76,7 +77,7 @@ def checked_problem(
     start = attempt("start", _start, model, task[0])
     if start is not None and free is not None:
         start = moved_inside(start, free)
-    goal = attempt("goal", checked_goal, task[1], tail)
+    goal = attempt("goal", checked_goal, task[1], model.layout)
     duration, bounds = (
         attempt("duration", checked_duration, model, task[2]),
         attempt("bounds", checked_bounds, model, task[3]),
@@ -138,7 +139,7 @@ def _start(model: Model, start: Any) -> tuple[np.ndarray, np.ndarray]:
     return q0, v0
 
 
-def checked_goal(goal: Any, tail: int) -> Goal:
+def checked_goal(goal: Any, layout: Layout) -> Goal:
     """Return a goal with arrays for 2m tail coordinates; None means upright and at rest."""
     if goal is None:
         goal = Goal()
@@ -154,9 +155,29 @@ def checked_goal(goal: Any, tail: int) -> Goal:
     return Goal(
         attitude,
         None if goal.torso_rate is None else _rates("goal.torso_rate", goal.torso_rate),
-        _partly_free("goal.tail", goal.tail, tail),
-        _partly_free("goal.tail_rate", goal.tail_rate, tail),
+        _of_coordinates("tail", goal.tail, "chains", goal.chains, layout),
+        _of_coordinates("tail_rate", goal.tail_rate, "chain_rates", goal.chain_rates, layout),
     )
+
+
+def _of_coordinates(
+    name: str, value: Any, by_name: str, named: Any, layout: Layout
+) -> np.ndarray | None:
+    """Return numbers (2m,) of a goal, nan for free ones; None if all are free.
+
+    value: of all coordinates; named: by the names of chains, in its place.
+    """
+    if named is None:
+        return None if value is None else _partly_free(f"goal.{name}", value, layout.nt)
+    if not isinstance(named, Mapping) or value is not None:
+        needs = f"a mapping from names of chains, and no goal.{name} beside it"
+        raise refusal(f"goal.{by_name}", named, needs, PlanningError)
+
+    def read(field: str, given: Any, size: int) -> np.ndarray:
+        return _partly_free(field, given if np.ndim(given) else [given] * size, size)
+
+    free = np.full(layout.nt, np.nan)
+    return numbers_by_name(f"goal.{by_name}", layout, named, free, read)
 
 
 def _rates(field: str, value: Any) -> np.ndarray:
@@ -174,10 +195,8 @@ def _rates(field: str, value: Any) -> np.ndarray:
     return limits
 
 
-def _partly_free(field: str, value: Any, size: int) -> np.ndarray | None:
-    """Return numbers (size,), nan for free ones; None if all are free."""
-    if value is None:
-        return None
+def _partly_free(field: str, value: Any, size: int) -> np.ndarray:
+    """Return numbers (size,), nan for free ones."""
     if np.ma.is_masked(value):
         raise PlanningError(f"{field}: has masked entries: give None where it is free")
     try:

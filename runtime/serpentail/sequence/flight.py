@@ -92,7 +92,7 @@ def _attempt(
     """Return a plan from a state, and the time of its landing (s) if that is needed."""
     landing = None
     if "duration" not in arguments or any(BEFORE in move for move in phase.moves):
-        goal = checked_goal(arguments.get("goal"), model.layout.nt)
+        goal = checked_goal(arguments.get("goal"), model.layout)
         landing = landing_time(model, state, goal, angles)
         arguments = {"duration": landing - phase.tracking.early, **arguments}
     return plan(model, start=state, **arguments), landing

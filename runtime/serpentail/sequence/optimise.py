@@ -134,7 +134,7 @@ def _freed(leap: Sequence) -> tuple[Sequence, Any]:
     plan can choose another: the push has to.
     """
     push, flight, land = leap.phases
-    goal = checked_goal(flight.plan[0].get("goal"), leap.model.layout.nt)
+    goal = checked_goal(flight.plan[0].get("goal"), leap.model.layout)
     plan = {**flight.plan[0], "goal": replace(goal, attitude=None)}
     return replace(leap, phases=(push, replace(flight, plan=plan), land)), goal.attitude
 

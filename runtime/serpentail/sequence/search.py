@@ -140,7 +140,7 @@ def push_measures(sequence: Sequence, start: PhaseStart, aim: Any) -> dict[str, 
         raise SimulationError("push: still on the ground")
 
     # the flight, to the landing
-    goal = checked_goal(flight.plan[0].get("goal"), model.layout.nt)
+    goal = checked_goal(flight.plan[0].get("goal"), model.layout)
     q, v = pushed.q[-1], pushed.v[-1]
     down = fall(model.parameters)
     height, speed = (-(part @ down) for part in com_at_start(model, (q, v)))

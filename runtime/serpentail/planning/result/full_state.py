@@ -9,6 +9,7 @@ import numpy as np
 from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, TORSO_NV, VELOCITY
 
 from ...basics.attitude import rotation_matrix
+from ...model.chains import bend_ranges
 from ...model.model import Model
 from ...model.weight import fall
 from ..air import in_air, world_velocity
@@ -41,12 +42,14 @@ def _within_range(model: Model, tail: np.ndarray) -> np.ndarray:
 
     A plan keeps its bounds at nodes, and may exceed them a little elsewhere.
     """
-    most = (1 - ROUNDING) * model.manifest["scene"].get("bend_range", np.inf)
-    pairs = tail.reshape(len(tail), -1, 2)
-    bends = np.linalg.norm(pairs, axis=2)
-    beyond = (np.array(model.kinds) == "continuum") & (bends > most)
-    scale = np.divide(most, bends, out=np.ones_like(bends), where=beyond)
-    return (pairs * scale[..., None]).reshape(tail.shape)
+    arcs = np.flatnonzero(np.array(model.kinds) == "continuum")
+    most = (1 - ROUNDING) * bend_ranges(model.manifest)[arcs]
+    pairs = np.array(model.layout.firsts)[arcs, None] + [0, 1]
+    bends = np.linalg.norm(tail[:, pairs], axis=2)
+    scale = np.divide(most, bends, out=np.ones_like(bends), where=bends > most)
+    found = tail.copy()
+    found[:, pairs] *= scale[..., None]
+    return found
 
 
 def _at_identity(tail: np.ndarray) -> np.ndarray:
