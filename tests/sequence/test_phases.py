@@ -13,6 +13,7 @@ import pytest
 import serpentail as st
 from serpentail.planning.problem import checked_goal
 from serpentail.sequence.flight import landing_time
+from serpentail_scene.layout import Layout
 from tests.support import zoo
 from tests.support.rows import row
 

@@ -121,7 +121,7 @@ class Attempts:
         """Passive flight; the tail is pushed a little for k = 0, or about at random."""
         settings, (least, most) = self.settings, problem.duration
         duration = least + (most - least) * DURATIONS[k % len(DURATIONS)]
-        size = float(torque_unit(problem).mean()) * (FIRST_PUSH if k == 0 else 1.0)
+        size = torque_unit(problem) * (FIRST_PUSH if k == 0 else 1.0)
         random = np.random.default_rng([settings.solver.seed, k])
         push = pushes(random, size, self.model)
         own = guessed(self.model, problem, random if k else None)

@@ -67,7 +67,7 @@ class Bounds:
     Each is one number, or one for each of the 2m tail coordinates, in SI units or as text with a
     unit, such as "20 mN m". Of several chains it may be a mapping from names of chains, pairs and
     joints, such as ``{"tail": "40 deg", "hind_knee": 1.2}``; later names win, and what has no name
-    has the default. One number does not bound angles and rates of passive coordinates.
+    has the default. One number is that of all coordinates with motors, not of passive ones.
 
     Parameters
     ----------

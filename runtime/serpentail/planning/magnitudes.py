@@ -61,7 +61,11 @@ def checked_bounds(model: Model, bounds: Any) -> Bounds:
     bounds = _of_tendons(model, bounds)
     usual = {n: model.parameters.get(f"motor_{n}", USUAL[n]) for n in USUAL}
     own = [n for n in USUAL if isinstance(x := getattr(bounds, n), str) and x == MOTOR]
-    bounds = replace(bounds, **{n: usual[n] for n in own})
+    if len(model.layout.chains) > 1:  # motors are those of the tail
+        named = {n: {"tail": x} for n, x in usual.items() if x != USUAL[n]}
+        bounds, usual = replace(bounds, **{n: named.get(n, USUAL[n]) for n in own}), dict(USUAL)
+    else:
+        bounds = replace(bounds, **{n: usual[n] for n in own})
     usual["angle"] = _half_turns(model)
     found = {
         n: _bound(model, n, getattr(bounds, n), usual.get(n))
@@ -130,6 +134,6 @@ def _bound(model: Model, name: str, value: Any, usual: Any) -> np.ndarray | None
             raise refusal(field, value, "a number for each motor", PlanningError)
         return found
     found = read(field, value, layout.nt)
-    if name in ("angle", "rate") and np.ndim(value) == 0:  # a bound of what motors move
+    if name not in ("torque", "torque_rate") and np.ndim(value) == 0:  # of what motors move
         found[~np.array(layout.driven)] = np.inf
     return found

@@ -40,6 +40,6 @@ def _places(layout: Layout) -> dict[str, list[list[int]]]:
         owner, own = chain.owner or chain.name, [*range(chain.tau.start, chain.tau.stop)]
         names = {chain.name: own} | {n: [k] for n, k in zip(chain.names, own, strict=True)}
         for name, coordinates in names.items():
-            for each in {name, owner + name.removeprefix(chain.name)}:
+            for each in {name, name.replace(chain.name, owner, 1)}:
                 found.setdefault(each, []).append(coordinates)
     return found

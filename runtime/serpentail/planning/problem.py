@@ -12,6 +12,7 @@ from serpentail_scene.layout import QUATERNION, TAIL_Q, Layout
 from ..basics.checks import Refusals, number, numbers_in, one_of, refusal, refuse_not_finite, shown
 from ..basics.errors import PlanningError
 from ..basics.short_repr import brief
+from ..model.chains import refuse_several
 from ..model.model import Model
 from ..model.passive import behind_stops
 from ..model.state import State
@@ -26,6 +27,7 @@ from .paths import PathConstraint, checked_clearance, checked_path, clear_of_gro
 OBJECTIVES = ("effort", "energy", "time")
 # N m s: the effort counts a tail's rates as torques, or a plan whirls a light tail at no cost
 SMOOTHING = 3e-4
+OF_ONE_TAIL = ("design", "design_totals", "free_start", "clearance", "legs")  # and of no trees
 START_SLACK = 1e-6  # rad, rad/s: how far a start may be beyond its bounds
 
 
@@ -68,6 +70,8 @@ def checked_problem(
     """
     # start, goal and bounds, and whether the bounds allow start and goal
     attempt, settings = refused.attempt, dict(settings)
+    for name in [n for n in OF_ONE_TAIL if settings.get(n) is not None]:
+        attempt(name, refuse_several, model, name, "leave it out", PlanningError)
     free = settings.pop("free_start", None)
     design = attempt("design", checked_design, model, settings.pop("design", None))
     totals = settings.pop("design_totals", None)
@@ -100,6 +104,7 @@ def checked_problem(
     checked: dict[str, Any] = {
         name: attempt(name, SETTINGS[name], value) for name, value in settings.items()
     }
+    attempt("drive", _refuse_on_passive, model, bounds, checked["damping"])
     if checked["clearance"] is not None and start is not None:
         known = None if design is None or design.size or free else start
         row = attempt("clearance", clear_of_ground, model, known, checked["clearance"])
@@ -248,6 +253,17 @@ def _goal_inside(name: str, values: np.ndarray | None, bound: np.ndarray | None)
         raise PlanningError(
             f"goal.{name}: entry {k} is {values[k]:.6g}, beyond its bound {bound[k]:.6g}: change "
             "one"
+        )
+
+
+def _refuse_on_passive(model: Model, bounds: Bounds | None, damping: float | None) -> None:
+    """PlanningError for what needs a motor at each coordinate."""
+    passive = [n for n, own in zip(model.names.tail, model.layout.driven, strict=True) if not own]
+    asked = {"damping": damping, "bounds.torque_rate": bounds and bounds.torque_rate}
+    for name in [name for name, value in asked.items() if passive and np.any(value)]:
+        raise PlanningError(
+            f"{name}: needs a motor at each coordinate, and {passive[0]} is passive: leave it out, "
+            'or set drive = "torque" in the scene'
         )
 
 

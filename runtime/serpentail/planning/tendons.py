@@ -1,4 +1,4 @@
-"""Plans of tails that tendons pull: tensions are unknowns in place of torques."""
+"""What drives a plan: torques of motors, or tensions of tendons; passive coordinates have none."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
@@ -24,7 +24,24 @@ Blocks = Mapping[str, np.ndarray]
 def input_of(model: Model) -> tuple[str, int]:
     """Return name and size of what drives the tail in plans of a model."""
     count = len(model.layout.tendons)
-    return (TENSION, count) if count else ("torque", model.layout.nt)
+    return (TENSION, count) if count else ("torque", sum(model.layout.driven))
+
+
+def is_direct(model: Model) -> bool:
+    """Tell if what drives a model is a torque of each coordinate."""
+    return input_of(model) == ("torque", model.layout.nt)
+
+
+def of_motors(model: Model, values: np.ndarray) -> np.ndarray:
+    """Return those of values (..., nt) that belong to coordinates with motors."""
+    return values[..., np.array(model.layout.driven)]
+
+
+def of_coordinates(model: Model, torques: np.ndarray) -> np.ndarray:
+    """Return torques (..., motors) of all coordinates (..., nt): 0 of passive ones."""
+    found = np.zeros((*torques.shape[:-1], model.layout.nt))
+    found[..., np.array(model.layout.driven)] = torques
+    return found
 
 
 def torques_of(model: Model | None, blocks: Blocks) -> np.ndarray:
@@ -51,14 +68,16 @@ def _upright(tail: np.ndarray) -> np.ndarray:
 
 
 def torque_expression(body: BodyFunctions, tail: "ca.SX", tension: "ca.SX") -> "ca.SX":
-    """Return the torques (2m,) of tensions (CasADi)."""
+    """Return the torques (2m,) of tensions, or of motors (CasADi)."""
     import casadi as ca
 
+    if not body.model.layout.tendons:
+        return ca.DM(of_coordinates(body.model, np.eye(tension.numel()))).T @ tension
     return body.call("tendon_torques", ca.vertcat(ca.DM(IDENTITY_POSE), tail), tension)
 
 
 def pull_terms(model: Model, states: int) -> Terms:
-    """Return (x, torques) as terms of a node's states x and tensions."""
+    """Return (x, torques) as terms of a node's states x and tensions, or torques of motors."""
 
     def made() -> Terms:
         import casadi as ca

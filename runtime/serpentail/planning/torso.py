@@ -52,8 +52,13 @@ def _outside(model: Model) -> "Callable[[Any], ca.SX]":
     q = np.zeros(model.nq)
     q[QUATERNION.start] = 1.0
     straight = _divided(model, q, axes)
-    mount = float(np.linalg.norm(straight[0]))
-    nearest = np.where(np.linalg.norm(straight, axis=1) > 1, 1.0, min(mount, 1.0)) - KEPT
+    distance, nearest = np.linalg.norm(straight, axis=1), np.ones(len(straight))
+    ends = []
+    for chain in model.layout.chains:
+        ends += range(chain.points.start + 1, chain.points.stop)
+        inside = distance[chain.points] <= 1
+        nearest[chain.points][inside] = min(distance[chain.points.start], 1.0)
+    nearest = np.maximum(nearest - KEPT, 0)
 
     def outside(point: Any) -> "ca.SX":
         import casadi as ca
@@ -61,7 +66,7 @@ def _outside(model: Model) -> "Callable[[Any], ca.SX]":
         points = point.tail_from_torso
         own = [points[k, :].T / axes for k in range(points.size1())]
         rows = []
-        for k in range(1, len(own)):
+        for k in ends:
             for part in BETWEEN:
                 # the point may be as near as the nearer end of its line
                 least = min(nearest[k - 1], nearest[k])

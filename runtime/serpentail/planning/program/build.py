@@ -13,7 +13,7 @@ from ..air import drift_of_states, in_air
 from ..design import refuse_unused
 from ..problem import PlanningProblem
 from ..result.full_state import com_at_start
-from ..tendons import TENSION
+from ..tendons import TENSION, of_motors
 from .cache import memoised
 from .end import end_rows, given_entries
 from .nodes import (
@@ -102,6 +102,9 @@ def plan_program(
     constants = np.zeros(node.constants)
     constants[-1] = most
     controls = "torque_rate" if variables.torque_is_state else variables.input
+    strongest = getattr(problem.bounds, controls)
+    if controls == "torque" and strongest is not None:
+        strongest = of_motors(model, strongest)
     optimal = OptimalProblem(
         node=node,
         mesh=mesh,
@@ -110,7 +113,7 @@ def plan_program(
         start=_start(model, problem) / variables.scale(variables.states) if known else None,
         constants=constants,
         duration_is_free=least < most,
-        control_limits=_limits(getattr(problem.bounds, controls), variables.units[controls])
+        control_limits=_limits(strongest, variables.units[controls])
         * np.array([[controls != TENSION], [1]]),
         bounded=bounded,
         state_limits=limits,
@@ -236,13 +239,13 @@ def _bounded(
     ):
         if bound is None or name not in places:
             continue
-        place = places[name]
-        chosen.append(np.arange(place.start, place.stop))
-        limits.append(_limits(bound, variables.units[name]))
+        place, finite = places[name], np.isfinite(bound)
+        chosen.append(np.arange(place.start, place.stop)[finite])
+        limits.append(_limits(bound, variables.units[name])[:, finite])
         own = np.zeros(len(bound), bool)
         if name != "torque":
             own[given_entries(problem.goal, name)] = True
-        fixed.append(own)
+        fixed.append(own[finite])
     return np.concatenate(chosen), np.concatenate(limits, axis=1), np.concatenate(fixed)
 
 

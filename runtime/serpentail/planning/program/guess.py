@@ -17,7 +17,7 @@ from ...simulation.controllers.controller import TorqueTable
 from ..air import drift_of_states, in_air
 from ..flight import State, flight
 from ..problem import PlanningProblem
-from ..tendons import TENSION, tensions_near
+from ..tendons import TENSION, of_motors, tensions_near
 from .build import PlanProgram, conserved_at
 
 ROUGH = 1e-4  # rtol of a guess, whose damping can be stiff
@@ -47,7 +47,8 @@ def passive(
     push (n, 2m): torques, N m.  A flight that leaves the model's range serves until there.
     """
     times = np.linspace(0, duration, len(push))
-    law = TorqueTable(times, push, max(damping, problem.damping))
+    driven = np.array(model.layout.driven)
+    law = TorqueTable(times, push * driven, max(damping, problem.damping) * driven)
     try:
         motion = flight(model, (problem.q0, problem.v0), law, duration, rtol=ROUGH)
     except SimulationError as error:
@@ -57,8 +58,8 @@ def passive(
     return of_trajectory(model, motion, problem.damping)
 
 
-def pushes(random: np.random.Generator, size: float, model: Model) -> np.ndarray:
-    """Return torques (33, 2m) of a few slow waves, of about a size (N m)."""
+def pushes(random: np.random.Generator, size: np.ndarray, model: Model) -> np.ndarray:
+    """Return torques (33, 2m) of a few slow waves, of about a size (2m,), N m."""
     tail = model.layout.nt
     s = np.linspace(0, 1, PUSH_SAMPLES)[:, None, None]
     phases = random.uniform(0, 2 * np.pi, (PUSH_WAVES, tail))
@@ -103,6 +104,8 @@ def samples_of(motion: GuessMotion, program: PlanProgram) -> MeshSamples:
         controls = np.diff(blocks["torque"], axis=0) / apart
     else:
         controls = blocks[variables.input][1:]
+        if variables.input == "torque":
+            controls = of_motors(program.model, controls)
     shape = (mesh.intervals, len(rule.nodes), -1)
     conserved = conserved_at(motion.model, motion.start)
     conserved["design"] = variables.design.of(motion.model.parameters)

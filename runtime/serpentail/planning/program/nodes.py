@@ -13,7 +13,7 @@ from ...optimal.problem import OcpNode
 from ...optimal.terms import Terms, terms_of
 from ..air import DRIFT, in_air
 from ..problem import PlanningProblem
-from ..tendons import TENSION, pull_terms, torque_expression
+from ..tendons import is_direct, pull_terms, torque_expression
 from .body import BodyFunctions
 from .coordinates import IDENTITY_POSE, rotated
 from .point import PathPoint, point_of
@@ -72,8 +72,9 @@ def symbols_of(
     blocks = numbers | blocks  # what is conserved may be a constant of the program
     body = BodyFunctions(model, variables.design, blocks.get("design"))
     blocks |= {"quaternion": blocks["attitude"], "time": fraction * blocks["duration"]}
-    if TENSION in blocks:
-        blocks["torque"] = torque_expression(body, blocks["tail"], blocks[TENSION])
+    if not is_direct(model):
+        own = blocks[variables.input]
+        blocks["torque"] = torque_expression(body, blocks["tail"], own)
     if not compiled:
         blocks["torso_rate"] = carried_turn(body, blocks)
     return NodeSymbols(e, ca.vertcat(fraction, *numbers.values()), blocks, body)
@@ -183,10 +184,10 @@ class FlightDynamics:
                 "damping": float(self.problem.damping),
                 "work": max(model.manifest["work"][name] for name in FUNCTIONS.values()),
             }
-            if variables.input == TENSION:
+            if not is_direct(model):
                 pull = pull_terms(model, variables.size(variables.states)).functions.values()
                 airborne |= zip(("pull", "pull_slopes", "pull_twice"), pull, strict=True)
-                airborne["tendons"] = len(variables.units[TENSION])
+                airborne["tendons"] = len(variables.units[variables.input])
             arrays = {"parameters": model.parameter_vector, "momentum": self.conserved[:3]}
         parts = (*variables.states, *variables.controls, *variables.constants)
         return OcpNode(

@@ -28,7 +28,7 @@ class PathPoint(SimpleNamespace):
     torque (2m,), time and duration (s), and parameters (numbers by name).
 
     Further blocks are made when they are used, in world axes (m): center_of_mass (3,); position
-    (3,) of B and its height; tail_points (K, 3) and the last of them, tip (3,); with contacts,
+    (3,) of B and its height; tail_points (K, 3) of all chains, and the tip (3,) of the tail; with contacts,
     contact_points (K, 3), which need the plan's legs if the model has feet, and body_points (K, 3),
     those of tail and torso alone.
     """
@@ -134,7 +134,8 @@ def point_of(
         "height": lambda point: point.position[2],
     }
     if "tail_points" in model.generated:
-        makers |= {"tail_points": tail_points, "tip": lambda point: point.tail_points[-1, :].T}
+        tip = model.layout.chains[0].points.stop - 1
+        makers |= {"tail_points": tail_points, "tip": lambda point: point.tail_points[tip, :].T}
     if model.contacts:
         makers |= {"contact_points": contact_points, "body_points": body_points}
     return PathPoint(makers=makers, parameters=dict(body.parameters), **blocks)

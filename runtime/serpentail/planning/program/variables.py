@@ -11,7 +11,7 @@ from ...model.model import Model
 from ..air import DRIFT, in_air
 from ..design import Design
 from ..problem import PlanningProblem
-from ..tendons import TENSION, input_of
+from ..tendons import TENSION, input_of, of_motors
 
 Blocks = tuple[tuple[str, int], ...]  # (name, size) of blocks
 UNIT_OF_BOUND = 0.05  # of a torque's bound: plans of least effort are far inside
@@ -68,7 +68,7 @@ class PlanVariables:
 
 def variables_of(model: Model, problem: PlanningProblem, falls: bool) -> PlanVariables:
     """Return the variables of a problem; falls: whether anything depends on the COM's flight."""
-    tail, unit = model.layout.nt, torque_unit(problem)
+    tail, unit = model.layout.nt, of_motors(model, torque_unit(problem))
     states: Blocks = (("attitude", 4), ("tail", tail), ("tail_rate", tail))
     units = {name: np.full(size, UNITS[name]) for name, size in states}
     units |= {"torque": unit, "torso_rate": np.full(3, UNITS["torso_rate"]), "duration": np.ones(1)}

@@ -12,6 +12,7 @@ from ...optimal.rules import CollocationRule
 from ...optimal.samples import MeshSamples
 from ..air import in_air, world_velocity
 from ..program.build import PlanProgram
+from ..tendons import of_coordinates
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +91,8 @@ def curve(program: PlanProgram, samples: MeshSamples) -> Curve:
     torque = blocks.pop("torque")[:, 1:] if variables.torque_is_state else None
     if torque is None:
         torque = samples.controls * variables.units[variables.input]
+        if variables.input == "torque":
+            torque = of_coordinates(program.model, torque)
     starts = {name: values[:, 0] for name, values in blocks.items()}
     increments = {name: np.einsum("ij,kjx->kix", rule.states, x) for name, x in blocks.items()}
     ends = mesh.ends * samples.duration

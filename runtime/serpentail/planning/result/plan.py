@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from ...basics.errors import PlanningError, SimulationError
 from ...basics.near_names import NearNames
+from ...model.chains import refuse_several
 from ...model.model import Model
 from ...motion.archive import origin
 from ...motion.text import SI, framed
@@ -231,6 +232,7 @@ def refuse_unfit(name: str, model: Model, plan: Plan, functions: Iterable[str]) 
     model.refuse_fixed(name)
     refuse_air(model, name)
     refuse_tendons(model, name)
+    refuse_several(model, name, "fly the plan by its controller", PlanningError)
     if "airspeed" in plan.curve.starts:
         raise PlanningError(f"{name}: the plan was made in air: give one of a model without air")
     model.need(*functions)

@@ -15,7 +15,7 @@ from ..flight import flight
 from ..free_variables import chosen, start_found
 from ..problem import PlanningProblem
 from ..program.objective import objective_unit
-from ..tendons import TENSION
+from ..tendons import is_direct
 from .curve import Curve
 from .excess import largest
 from .truth import attitude_errors, work
@@ -80,8 +80,12 @@ def truth(search: "Search", best: "Round", planned: Trajectory) -> dict[str, Any
         "dyn_err": None,
     }
     needed = TRACKING_COST * float(planned.t[-1])
-    pulled = TENSION in best.curve.nodes  # PFL would give torques that tendons cannot
-    if pulled or not search.settings.solver.track or search.leaves_no_time(needed):
+    # PFL would give torques that tendons cannot, and passive coordinates need none
+    if (
+        not is_direct(best.model)
+        or not search.settings.solver.track
+        or search.leaves_no_time(needed)
+    ):
         return errors
     try:
         motion = tracked(best.model, problem, planned)
