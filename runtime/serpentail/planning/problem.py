@@ -27,7 +27,7 @@ from .paths import PathConstraint, checked_clearance, checked_path, clear_of_gro
 OBJECTIVES = ("effort", "energy", "time")
 # N m s: the effort counts a tail's rates as torques, or a plan whirls a light tail at no cost
 SMOOTHING = 3e-4
-OF_ONE_TAIL = ("design", "design_totals", "free_start", "clearance", "legs")  # and of no trees
+OF_ONE_TAIL = ("design", "design_totals", "free_start", "clearance", "legs")
 START_SLACK = 1e-6  # rad, rad/s: how far a start may be beyond its bounds
 
 
@@ -70,8 +70,7 @@ def checked_problem(
     """
     # start, goal and bounds, and whether the bounds allow start and goal
     attempt, settings = refused.attempt, dict(settings)
-    for name in [n for n in OF_ONE_TAIL if settings.get(n) is not None]:
-        attempt(name, refuse_several, model, name, "leave it out", PlanningError)
+    _refuse_of_several(model, settings, refused)
     free = settings.pop("free_start", None)
     design = attempt("design", checked_design, model, settings.pop("design", None))
     totals = settings.pop("design_totals", None)
@@ -256,11 +255,19 @@ def _goal_inside(name: str, values: np.ndarray | None, bound: np.ndarray | None)
         )
 
 
+def _refuse_of_several(model: Model, settings: Mapping[str, Any], refused: Refusals) -> None:
+    """Refuse settings that plans of several chains do not have."""
+    for name in [n for n in OF_ONE_TAIL if settings[n] is not None]:
+        refused.attempt(name, refuse_several, model, name, "leave it out", PlanningError)
+
+
 def _refuse_on_passive(model: Model, bounds: Bounds | None, damping: float | None) -> None:
     """PlanningError for what needs a motor at each coordinate."""
     passive = [n for n, own in zip(model.names.tail, model.layout.driven, strict=True) if not own]
-    asked = {"damping": damping, "bounds.torque_rate": bounds and bounds.torque_rate}
-    for name in [name for name, value in asked.items() if passive and np.any(value)]:
+    asked = {"damping": bool(damping), "bounds.torque_rate": False}
+    if bounds is not None:
+        asked["bounds.torque_rate"] = bounds.torque_rate is not None
+    for name in [name for name, here in asked.items() if passive and here]:
         raise PlanningError(
             f"{name}: needs a motor at each coordinate, and {passive[0]} is passive: leave it out, "
             'or set drive = "torque" in the scene'

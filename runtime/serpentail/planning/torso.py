@@ -53,7 +53,7 @@ def _outside(model: Model) -> "Callable[[Any], ca.SX]":
     q[QUATERNION.start] = 1.0
     straight = _divided(model, q, axes)
     distance, nearest = np.linalg.norm(straight, axis=1), np.ones(len(straight))
-    ends = []
+    ends: list[int] = []
     for chain in model.layout.chains:
         ends += range(chain.points.start + 1, chain.points.stop)
         inside = distance[chain.points] <= 1

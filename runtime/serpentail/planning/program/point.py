@@ -28,9 +28,9 @@ class PathPoint(SimpleNamespace):
     torque (2m,), time and duration (s), and parameters (numbers by name).
 
     Further blocks are made when they are used, in world axes (m): center_of_mass (3,); position
-    (3,) of B and its height; tail_points (K, 3) of all chains, and the tip (3,) of the tail; with contacts,
-    contact_points (K, 3), which need the plan's legs if the model has feet, and body_points (K, 3),
-    those of tail and torso alone.
+    (3,) of B and its height; tail_points (K, 3) of all chains, and the tip (3,) of the tail; with
+    contacts, contact_points (K, 3), which need the plan's legs if the model has feet, and
+    body_points (K, 3), those without feet.
     """
 
     def __getattr__(self, name: str) -> Any:
