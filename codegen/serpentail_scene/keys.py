@@ -190,8 +190,8 @@ class Key:
     stand in place of one number. usual: whether to warn of values that no animal has.
 
     keys: of a table, with those that it needs. kinds: keys by the table's ``kind``. each: keys of
-    the tables in an array. words: texts that are allowed instead. form: JSON Schema of any other
-    form.
+    the tables in an array. named: of each value in a table whose names are those of chains and
+    joints. words: texts that are allowed instead. form: JSON Schema of any other form.
     """
 
     unit: str | Sequence[str] = ""
@@ -204,6 +204,7 @@ class Key:
     needs: tuple[str, ...] = ()
     kinds: Mapping[str, "Key"] = field(default_factory=dict)
     each: "Key | None" = None
+    named: "Key | None" = None
     words: tuple[str, ...] = ()
     form: Mapping[str, Any] = field(default_factory=dict)
 

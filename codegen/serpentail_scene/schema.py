@@ -84,6 +84,8 @@ def key_schema(key: Key) -> Schema:
         forms.append(_table({n: key_schema(each) for n, each in entry.keys.items()}, entry.needs))
     if key.each is not None:
         forms.append({"type": "array", "items": key_schema(key.each)})
+    if key.named is not None:
+        forms.append({"type": "object", "additionalProperties": key_schema(key.named)})
     return _any_of(forms)
 
 

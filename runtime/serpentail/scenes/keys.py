@@ -58,6 +58,8 @@ def _read(value: Any, key: Key, where: str, part: Part) -> Any:
         return value
     if key.each and isinstance(value, list):
         return [_read(x, key.each, f"{where}[{k}]", part) for k, x in enumerate(value)]
+    if key.named and isinstance(value, Mapping):
+        return {n: _read(x, key.named, f"{where}.{n}", part) for n, x in value.items()}
     if isinstance(value, Mapping) and not key.form:
         return _read_table(value, key, where, part)
     if key.is_table and key.each is None:
@@ -99,6 +101,8 @@ def sized(value: Any, key: Key, size: Mapping[str, float]) -> Any:
     """
     if not size:
         return value
+    if key.named and isinstance(value, Mapping):
+        return {n: sized(x, key.named, size) for n, x in value.items()}
     if isinstance(value, Mapping):
         key = key.kinds.get(value.get("kind", ""), key)
         return {k: sized(x, key.keys[k], size) if k in key.keys else x for k, x in value.items()}

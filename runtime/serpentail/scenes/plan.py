@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from serpentail_scene.keys import Key, one_word
@@ -37,9 +38,10 @@ def _or_free(unit: str) -> Key:
     return Key(unit, depth=1, words=(FREE,))
 
 
-def _bound(unit: str) -> Key:
-    """Return the key of a bound: it may be as wide as it likes."""
-    return Key(unit, depth=1, usual=False)
+def _bound(unit: str, *words: str) -> Key:
+    """Return the key of a bound, also by names: it may be as wide as it likes."""
+    one = Key(unit, depth=1, usual=False)
+    return replace(one, named=one, words=words)
 
 
 GOAL = {
@@ -47,9 +49,11 @@ GOAL = {
     "torso_rate": Key("rad/s", depth=2, words=(FREE,)),
     "tail": _or_free("rad"),
     "tail_rate": _or_free("rad/s"),
+    "chains": Key(named=_or_free("rad")),
+    "chain_rates": Key(named=_or_free("rad/s")),
 }
 BOUNDS = {
-    "angle": Key("rad", depth=1, words=(HALF_TURN, FREE), usual=False),
+    "angle": _bound("rad", HALF_TURN, FREE),
     "rate": _bound("rad/s"),
     "torque": _bound("N m"),
     "torque_rate": _bound("N m/s"),
@@ -220,5 +224,7 @@ def _unless_free(value: Any) -> Any:
 
 
 def _free_parts(value: Any) -> Any:
-    """Return a part of a goal, None in place of "free" in arrays, too."""
+    """Return a part of a goal, None in place of "free" in arrays and tables, too."""
+    if isinstance(value, Mapping):
+        return {name: _free_parts(part) for name, part in value.items()}
     return tuple(map(_unless_free, value)) if isinstance(value, list) else _unless_free(value)

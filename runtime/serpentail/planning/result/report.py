@@ -81,11 +81,8 @@ def truth(search: "Search", best: "Round", planned: Trajectory) -> dict[str, Any
     }
     needed = TRACKING_COST * float(planned.t[-1])
     # PFL would give torques that tendons cannot, and passive coordinates need none
-    if (
-        not is_direct(best.model)
-        or not search.settings.solver.track
-        or search.leaves_no_time(needed)
-    ):
+    tracks = is_direct(best.model) and search.settings.solver.track
+    if not tracks or search.leaves_no_time(needed):
         return errors
     try:
         motion = tracked(best.model, problem, planned)
