@@ -22,7 +22,7 @@ def records(has: SimulationFeatures) -> dict[str, list[Field]]:
     found = {
         "piecewise": PIECEWISE,
         "controller": [*CONTROLLER[:2], *TENSIONS[: has.tendons], *PFL * has.pfl, *CONTROLLER[2:]],
-        "drive": DRIVE + LEGS * legs + GIVEN * has.given,
+        "drive": DRIVE + LEGS * legs + GIVEN * bool(has.given),
         "run": [*START, *BRISTLES[:1] * ground, *SETTINGS, *touched, *KEPT]
         + CONTACT_KEPT * ground
         + LANDED * legs,
