@@ -104,6 +104,11 @@ class Layout(Sizes):
         """Whether each tail coordinate has an actuator."""
         return tuple(chain.from_iterable(c.driven for c in self.chains)) or (True,) * self.nt
 
+    @property
+    def owners(self) -> list[str]:
+        """What the names of the parameters of each tail coordinate begin with; see ``chains``."""
+        return [c.owner for c in self.chains for _ in c.names]
+
     def __getitem__(self, name: str) -> ChainLayout:
         found = {own.name: own for own in self.chains}
         if name not in found:

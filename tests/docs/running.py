@@ -82,7 +82,7 @@ def stand_in(tree: Path) -> None:
     programs.mkdir(parents=True)
     for name, command in (
         ("python", sys.executable),
-        ("serpentail", f"{sys.executable} -m serpentail.cli.cli"),
+        ("serpentail", f"{sys.executable} -m serpentail"),
     ):
         (programs / name).write_text(PROGRAM.format(command))
         (programs / name).chmod(0o755)

@@ -127,7 +127,7 @@ def test_a_plan_is_told_before_it_is_saved(scene, capsys, monkeypatch):
 
 
 def test_a_reader_that_stops_is_no_error(scene, tmp_path):
-    command = f"{sys.executable} -m serpentail.cli.cli simulate {scene()}"
+    command = f"{sys.executable} -m serpentail simulate {scene()}"
     command += f" --folder {zoo.folder('feet_tail')} --save a.npz | true; echo end"
     done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
     assert (done.stdout, done.stderr) == ("end\n", "") and (tmp_path / "a.npz").is_file()

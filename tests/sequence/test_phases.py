@@ -95,6 +95,26 @@ def test_phases_are_the_motion_that_one_run_makes():
     np.testing.assert_array_equal(replace(motion).energy, motion.energy)
 
 
+def test_legs_of_mass_push_and_rest():
+    """Two phases are one run by the same controllers; a warning names the stop of the legs."""
+    scene, free = st.scenario("rat_kick"), st.Damping(1e-4)
+    start, more = (scene.q0, scene.v0), {"rtol": 1e-9, "output_step": 5e-4}
+    bristles = scene.settings["bristles0"]
+    phases = [st.Phase("push", 0.18, controller=scene.controller)]
+    phases += [st.Phase("rest", "0.1 s", controller=free)]
+    run = st.Sequence(scene.model, phases, settings=more).simulate(*start, bristles)
+    law, motion = st.Phases([(0.0, scene.controller), (0.18, free)]), run.trajectory
+    more |= {"bristles0": bristles, "controller": law, "t_span": 0.28}
+    one = st.simulate(scene.model, *start, **more)
+    assert run.complete and [phase.end for phase in run.phases] == [0.18, 0.28]
+    np.testing.assert_allclose(motion.t, one.t, rtol=1e-15)
+    np.testing.assert_allclose(motion.q, one.q, atol=1e-9)
+    np.testing.assert_allclose(motion.contact.forces, one.contact.forces, atol=1e-9)
+    assert [e["group"] for e in motion.events] == [e["group"] for e in one.events]
+    assert 10 < run.phases[0].peak / st.summary(scene.model, one)["body_weight_N"] < 20
+    assert any("behind hind_stop_upper" in words for words in motion.warnings)
+
+
 def test_airborne_is_where_nothing_touches_and_all_is_high():
     run = sequence(kick()).simulate(*settled())
     contact, end = run.trajectory.contact, run.phases[0].end

@@ -82,7 +82,3 @@ def finished(arguments: argparse.Namespace, outcome: VerbOutcome) -> int:
         print("serpentail: interrupted; this is the result until then", file=sys.stderr)
         return INTERRUPTED
     return 0 if outcome.good and all(written) else 1
-
-
-if __name__ == "__main__":
-    sys.exit(main())

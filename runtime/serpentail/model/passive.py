@@ -5,15 +5,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from serpentail_scene.parameters import OUT_OF_REACH
+from serpentail_scene.parameters import OUT_OF_REACH, name_in
 
 if TYPE_CHECKING:
     from .model import Model
 
 ENDS = (("tail_stop_lower", -1), ("tail_stop_upper", 1))
-BEHIND = (
-    "{name} is {angle:.6g} rad, behind {stop} {at:.6g} by more than tail_stop_width {width:.6g}"
-)
+BEHIND = "{name} is {angle:.6g} rad, behind {stop} {at:.6g} by more than {wide} {width:.6g}"
 
 
 def passive_force(values: Mapping[str, Any], angles: Any, rates: Any) -> Any:
@@ -58,7 +56,9 @@ def behind_stops(model: "Model", angles: Any) -> str:
                 for each in (name, "tail_stop_width")
             )
             numbers = {"angle": angles[run, coordinate], "at": at, "width": width}
-            return BEHIND.format(name=model.names.tail[coordinate], stop=name, **numbers)
+            owner = model.layout.owners[coordinate]
+            words = {"stop": name_in(owner, name), "wide": name_in(owner, "tail_stop_width")}
+            return BEHIND.format(name=model.names.tail[coordinate], **words, **numbers)
     return ""
 
 
