@@ -45,6 +45,10 @@ def tracking(model, kp=900, kd=60):
 # a motion, and what is changed
 TUMBLE = {"height": 1.0, "pitch": 2.5, "spin": [3, 1, 2], "bend": [[1.0, 0.3]]}
 TABLE = st.TorqueTable([0.0, 0.1, 0.3], [[0.0, 0.0], [4e-4, -2e-4], [0.0, 0.0]])
+CURLED = {"height": 1.0, "spin": [3, 1, 2], "bend": 0.2}
+OTHERS = {"third_mass": 2e-3, "third_link_radius": 4e-3, "third_length": 0.05}
+OTHERS |= {"bend third_alpha_1": 80.0, "bend leg_left_beta_1": -30.0, "third_damping": 1e-4}
+HEAVY = {"height": 0.07, "mu": 0.3, "bend arm_lift": 20.0, "leg_link_masses": 0.05}
 BODY = {"tail_mass": 0.005, "tail_length": 0.25, "link_radius": 0.004, "gravity": 3.7}
 TURNED = {"pitch": 100.0, "yaw": -20.0, "spin x": 5.0, "bend 1 yaw": 20.0}
 FALL = {"height": 0.3, "pitch": 0.4, "bend": [[0.4, 0.1]]}
@@ -52,6 +56,8 @@ CASES = {
     "flight": (lambda: flown("m1_n3", st.Damping(1e-4), **TUMBLE), BODY | TURNED),
     "stops": (lambda: flown("elastic", height=1, bend=0.5), {"bend 2 pitch": 150.0, "spin z": 9.0}),
     "arc": (lambda: flown("arcs1", TABLE, **TUMBLE), {"torso_mass": 0.2, "roll": 30.0}),
+    "tree": (lambda: flown("tree", st.Damping(1e-4), **CURLED), OTHERS | {"pitch": 100.0}),
+    "stand": (lambda: flown("tree_ground", st.Damping(1e-3), 0.1, height=0.08), HEAVY),
     "polar": (lambda: flown("polar"), {"gravity": 1.0, "spin y": 4.0}),
     "fixed": (
         lambda: flown("fixed", tracking(zoo.model("fixed")), bend=0.2),
@@ -67,7 +73,8 @@ CASES = {
 
 def again(motion, values, faster=0):
     """The run of the same start, model, controller and settings with other values, by Python."""
-    made, left, start = vars(motion)[AGAIN], dict(values), {}
+    made, start = vars(motion)[AGAIN], {}
+    left = {name: [x] if name.endswith("_masses") else x for name, x in values.items()}
     q, v, model = made.start.q0[0].copy(), made.start.v0[0].copy(), motion.model
     angles = None if model.fixed else np.degrees(st.pitch_roll_yaw(q[None], unwrap=True)[0])
     for k, name in enumerate(("pitch", "roll", "yaw")):
@@ -79,9 +86,11 @@ def again(motion, values, faster=0):
     for k, name in enumerate(("spin x", "spin y", "spin z")):
         if name in left:
             v[3 + k] = left.pop(name)
-    for k, joints in enumerate(np.repeat(model.joints_each, 2)):
+    alone = len(model.layout.chains) == 1
+    for k, joints in enumerate(np.repeat(model.joints_each, model.layout.widths)):
         place = len(q) - model.nu + k
-        name = f"bend {k // 2 + 1} {('pitch', 'yaw')[k % 2]}"
+        which = f"{k // 2 + 1} {('pitch', 'yaw')[k % 2]}" if alone else model.names.tail[k]
+        name = f"bend {which}"
         q[place] = np.radians(left.pop(name)) / joints if name in left else q[place]
     gains = {name: left.pop(name) for name in ("damping", "kp", "kd") if name in left}
     law, model = made.controller, model.with_parameters(**left)
@@ -214,7 +223,6 @@ def test_what_cannot_be_computed_is_replayed_with_the_reason(tmp_path):
         (flown("single", height=1), 'real = "double"'),
         (flown("baked", height=1), "baked = false"),
         (many, "longer output_step"),
-        (flown("limbs", height=1), "chains besides the tail"),
     ):
         data = data_of(motion.view(tmp_path / "live.html", live=True))
         assert "live" not in data and any(words in note for note in data["notes"])

@@ -1,4 +1,5 @@
 // What a computed run did: its samples, events, forces, books. All numbers are SI.
+import { massOf, nameIn } from "./chains.js";
 
 export const norm = Math.hypot;
 export const sum = (list) => list.reduce((all, x) => all + x, 0);
@@ -35,7 +36,7 @@ export class Facts {
     this.points = array("contact_points.positions");
     this.forces = array("contact_rates.forces");
     this.groups = Object.keys(live.groups);
-    this.mass = (this.number("torso_mass") ?? 0) + this.number("tail_mass");
+    this.mass = massOf(engine);
     this.weight = this.mass * this.number("gravity");
     this.axes = this.semiAxes();
     this.events = this.points ? this.eventsOf() : [];
@@ -70,6 +71,12 @@ export class Facts {
   tilt(k) {
     const [w, x, y, z] = [3, 4, 5, 6].map((i) => of(this.q, k, i));
     return (360 / Math.PI) * Math.atan2(norm(x, y), norm(w, z));
+  }
+
+  // What a parameter of the tail is at a coordinate, in the chain that has this coordinate.
+  passive(name, i) {
+    const { owner, first } = this.live.chains.find(({ stop }) => i < stop);
+    return this.engine.parameter(nameIn(owner, name))?.[i - first];
   }
 
   // A coordinate of the tail.
@@ -164,7 +171,7 @@ export class Facts {
   // The energy that springs and stops of the tail store.
   stored(k) {
     const energies = range(this.live.nt).map((i) => {
-      const p = (name) => this.engine.parameter(name)?.[i];
+      const p = (name) => this.passive(name, i);
       const spring = ((p("tail_stiffness") ?? 0) * (this.angle(k, i) - p("tail_rest")) ** 2) / 2;
       const stops = this.ways(k, i).map((way) => {
         const [s, beyond] = [Math.min(Math.max(way, 0), 1), Math.max(way - 1, 0)];
@@ -178,7 +185,7 @@ export class Facts {
 
   // How far a coordinate is in both stops, in widths.
   ways(k, i) {
-    const p = (name) => this.engine.parameter(name)?.[i];
+    const p = (name) => this.passive(name, i);
     if (p("tail_stop_lower") === undefined) return [];
     const [angle, width] = [this.angle(k, i), p("tail_stop_width")];
     return [(p("tail_stop_lower") - angle) / width, (angle - p("tail_stop_upper")) / width];

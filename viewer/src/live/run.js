@@ -1,4 +1,5 @@
 // A run that is computed again with other numbers, and drawn in place of the one that was given.
+import { massOf, shapeLinks } from "./chains.js";
 import { Engine } from "./engine.js";
 import { Facts, largest, norm } from "./facts.js";
 import { numbersOf, rowsOf } from "./numbers.js";
@@ -76,7 +77,7 @@ export class LiveRun {
   }
 
   get mass() {
-    return this.number("torso_mass") + this.number("tail_mass");
+    return massOf(this.engine);
   }
 
   apply(values) {
@@ -87,15 +88,7 @@ export class LiveRun {
     const angles = live.knobs.filter((knob) => knob.angle !== undefined);
     if (angles.some((knob) => values.has(knob)))
       engine.reals(engine.member("q"), 7).set(quaternionOf(angles.map(of)), 3);
-    // equal links are ellipsoids: their inertia follows from mass, length and radius
-    const radius = live.knobs.find((knob) => knob.name === "link_radius");
-    if (!radius || ![...values.keys()].some(({ group }) => group === "body")) return;
-    const [m, length] = ["tail_mass", "tail_length"].map((name) => {
-      return engine.parameter(name)[0] / live.pieces;
-    });
-    const r = of(radius);
-    const across = (m / 5) * ((length * length) / 4 + r * r);
-    engine.parameter("link_inertia").set([across, (m / 5) * (2 * r * r), across]);
+    if ([...values.keys()].some(({ group }) => group === "body")) shapeLinks(engine, of);
   }
 
   // Refuses a start with a point deeper than a static force could press it.
@@ -146,7 +139,7 @@ export class LiveRun {
 }
 
 // Pitch and yaw of a segment: the sum of its joints' angles, or those of an arc (phi, theta).
-const jointed = (facts, k, i) => facts.live.joints[i >> 1] * facts.angle(k, i);
+const jointed = (facts, k, i) => facts.live.joints[i] * facts.angle(k, i);
 function polar(facts, k, i) {
   const [phi, theta] = [facts.angle(k, i & ~1), facts.angle(k, i | 1)];
   return theta * (i % 2 ? Math.sin(phi) : Math.cos(phi));

@@ -1,8 +1,10 @@
 // Doubts about a computed run, in the words of Python: its books, touches, stops, and what no
 // animal can do.
+import { nameIn } from "./chains.js";
 import { largest, norm, of, range, sum, three } from "./facts.js";
 import { filled } from "./words.js";
 
+const WIDE = "tail_stop_width";
 const TINY = 2.2250738585072014e-308;
 const [LEG, KNEES] = [6, 3]; // joints; hip, D and knee come first, and are no contacts
 
@@ -63,15 +65,17 @@ function touched(facts) {
 
 // The first stop that a coordinate of the tail is behind by more than its width.
 function stopped(facts) {
-  const { live, rows, engine } = facts;
+  const { live, rows } = facts;
   for (const [end, stop] of ["tail_stop_lower", "tail_stop_upper"].entries()) {
     const [most, j] = largest(rows * live.nt, (each) => {
       return facts.ways(Math.floor(each / live.nt), each % live.nt)[end];
     });
     if (!(most > 1)) continue;
     const [k, i] = [Math.floor(j / live.nt), j % live.nt];
-    const [at, width] = [stop, "tail_stop_width"].map((name) => engine.parameter(name)[i]);
-    const words = { name: live.names[i], angle: facts.angle(k, i), stop, at, width };
+    const [at, width] = [stop, WIDE].map((name) => facts.passive(name, i));
+    const { owner } = live.chains.find((chain) => i < chain.stop);
+    const own = { stop: nameIn(owner, stop), wide: nameIn(owner, WIDE) };
+    const words = { name: live.names[i], angle: facts.angle(k, i), at, width, ...own };
     return [filled(live.words.ease_stops, { behind: filled(live.words.behind, words) })];
   }
   return [];
@@ -102,17 +106,19 @@ function sunk(facts) {
   const { axes, live, rows, t } = facts;
   if (!axes.every((axis) => axis > 0)) return [];
   const allowed = live.limits.SUNK;
-  const [depth, k] = largest(rows, (row) => depthInTorso(facts, row));
+  const [depth, k] = largest(rows, (row) => {
+    return Math.max(...live.chains.map(({ points }) => depthInTorso(facts, row, points)));
+  });
   return depth > allowed ? [filled(live.words.sunk, { time: t[k], depth, allowed })] : [];
 }
 
-// How far the tail goes into the torso, as the unit ball: 0 not at all, 1 to its centre. Until it
+// How far a chain goes into the torso, as the unit ball: 0 not at all, 1 to its centre. Until it
 // has left the ball once, it may be as near to the centre as its mount.
-function depthInTorso(facts, k) {
+function depthInTorso(facts, k, [start, stop]) {
   const { axes, tail } = facts;
   const [columns, base] = [facts.columns(k), facts.place(k)];
-  const own = range(tail.width / 3).map((i) => {
-    const from = three(tail, k, 3 * i).map((x, axis) => x - base[axis]);
+  const own = range(stop - start).map((i) => {
+    const from = three(tail, k, 3 * (start + i)).map((x, axis) => x - base[axis]);
     return columns.map((column, j) => sum(column.map((x, axis) => x * from[axis])) / axes[j]);
   });
   let [deepest, allowed] = [0, norm(...own[0])];
@@ -142,8 +148,10 @@ function bent(facts) {
   const { MOST_BEND: most, DEGREES } = live.limits;
   return live.kinds.flatMap((kind, m) => {
     const [bend, k] = largest(rows, (row) => {
-      const [first, second] = [2 * m, 2 * m + 1].map((i) => Math.abs(facts.angle(row, i)));
-      if (kind === "articulated") return live.joints[m] * Math.max(first, second);
+      if (kind === "hinge") return 0; // it may turn on and on
+      const i = live.firsts[m];
+      const [first, second] = [i, i + 1].map((each) => Math.abs(facts.angle(row, each)));
+      if (kind === "articulated") return live.joints[i] * Math.max(first, second);
       return live.polar ? second : norm(first, second);
     });
     const remedy = live.words[bend > DEGREES ? "degrees" : "damp"];

@@ -59,7 +59,6 @@ def computed_again(model: Model, motion: Trajectory, most: int) -> dict[str, Any
     unfit = model.manifest["real"] != "double" or model.manifest["scene"]["baked"]
     reasons = {
         'the model needs real = "double" and baked = false': unfit,
-        "it has chains besides the tail": len(model.layout.chains) > 1,
         f"{method} is a method of Python: take one in C, such as tsit5": method in SCIPY,
         "gravity_vector: pages know gravity along -z alone": "gravity_vector" in model.parameters,
         "it ends at an event: leave out stop_at": again.ground.stop_at,
@@ -104,9 +103,18 @@ def _data(model: Model, again: RunAgain, run: CompiledRun) -> dict[str, Any]:
         "nt": model.nu,
         "fixed": model.fixed,
         "groups": model.contacts,
-        "joints": model.joints_each.tolist(),
+        "joints": np.repeat(model.joints_each, model.layout.widths).tolist(),
         "kinds": model.kinds,
-        "pieces": model.manifest["dimensions"]["total"],
+        "firsts": model.layout.firsts,
+        "chains": [
+            {
+                "owner": c.owner,
+                "first": c.tau.start,
+                "stop": c.tau.stop,
+                "points": [c.points.start, c.points.stop],
+            }
+            for c in model.layout.chains
+        ],
         "polar": model.manifest["scene"]["coordinates"] == "polar",
         "names": model.names.tail,
         "eps": eps,

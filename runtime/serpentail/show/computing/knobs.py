@@ -23,7 +23,7 @@ REAL = 8  # bytes
 TURN = (-180.0, 180.0)  # degrees
 SPIN = 30.0  # rad/s: the least range of a slider
 TIDY = 9  # decimals of degrees: what follows them is rounding
-ORDERED = ("tail_stop_lower", "tail_stop_upper")  # which exclude each other
+ORDERED = ("stop_lower", "stop_upper")  # ends of names of parameters that exclude each other
 Knob = dict[str, Any]
 
 
@@ -73,10 +73,13 @@ def _start(run: CompiledRun, image: Image) -> Iterator[Knob]:
             words = ("start", f"spin {'xyz'[k]}", "rad/s")
             yield _knob(words, spin, [place], turns, slider=(-most, most))
     polar = model.manifest["scene"]["coordinates"] == "polar"
-    for k, joints in enumerate([] if polar else np.repeat(model.joints_each, 2)):
+    alone, names = len(model.layout.chains) == 1, model.names.tail
+    joints_of = np.repeat(model.joints_each, model.layout.widths)
+    for k, joints in enumerate([] if polar else joints_of):
         at = model.layout.tail_q.start + k
         bend = model.state, {"bend": wrong[k, : model.nu].tolist()}
-        words = ("start", f"bend {k // 2 + 1} {('pitch', 'yaw')[k % 2]}", "deg")
+        which = f"{k // 2 + 1} {('pitch', 'yaw')[k % 2]}" if alone else names[k]
+        words = ("start", f"bend {which}", "deg")
         value, places = np.degrees(joints * q0[at]).round(TIDY), [q + REAL * at]
         yield _knob(words, value, places, bend, scale=np.radians(1) / joints, slider=TURN)
 
@@ -86,8 +89,8 @@ def _parameters(run: CompiledRun, parameters: dict[str, tuple[int, int]]) -> Ite
     for p in run.model.manifest["parameters"]:
         name = p["name"]
         values = np.unique(run.model.parameters.get(name, [0, 0]))
-        mine = p["in_struct"] or name == "link_radius"
-        if not mine or len(values) > 1 or (p["size"] > 1 and "per" not in p) or name in ORDERED:
+        mine = (p["in_struct"] or name.endswith("link_radius")) and not name.endswith(ORDERED)
+        if not mine or len(values) > 1 or (p["size"] > 1 and "per" not in p):
             continue
         first, size = parameters.get(name, (0, 0))
         places = [first + REAL * k for k in range(size)]
