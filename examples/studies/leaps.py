@@ -19,8 +19,10 @@ LENGTHS, MASSES = np.linspace(0.1, 0.25, 5), np.linspace(2e-3, 10e-3, 6)  # m, k
 TAIL = {"tail": "articulated", "segments": 1, "links": 3}
 LIMITS = {"push": 25.0, "landing": 25.0, "tilt": radians(60), "spin": 4e-4}
 TIME = 1200.0  # s, for a machine with other work: the CPU time is counted
-# first guesses by hand: a push that grows to its end, legs that yield to rest
-PUSH = {"at": 0.02, "gamma": radians(255), "delta": radians(-55), "duration": 0.032}
+# first guesses by hand: a crouch that puts the body over its feet, or beside them, so that the push
+# stays in the cone of friction; a push that grows to its end; legs that yield to rest
+CROUCH = {"at": 0.02, "gamma": radians(180), "delta": radians(-35), "duration": 0.07}
+PUSH = {"at": 0.16, "gamma": radians(280), "delta": radians(-80), "duration": 0.042}
 STRETCH = {"before_landing": 0.12, "gamma": radians(225), "delta": radians(-65), "duration": 0.08}
 YIELD = {"at": "touch_down", "gamma": radians(225), "delta": radians(-20), "duration": 0.024}
 
@@ -35,8 +37,9 @@ def leap(model: st.Model, pitch: float = 5.0, torque: float = 0.02) -> st.Sequen
     bounds = st.Bounds(angle=(pi / 3, 1e-3), torque=torque)
     plan = {"goal": goal, "bounds": bounds, "solver": st.Solver(track=False, time_limit=20.0)}
     clear = {"until": "airborne", "clearance": 0.01, "controller": st.Damping(1e-3)}
+    pushes = [CROUCH | {"shape": "quintic"}, PUSH | {"shape": "accelerate"}]
     phases = [
-        st.Phase("push", 1.0, moves=[PUSH | {"shape": "accelerate"}], **clear),
+        st.Phase("push", 1.0, moves=pushes, **clear),
         st.Phase("flight", 1.5, until="landing", plan=plan, moves=[STRETCH]),
         st.Phase("land", 1.0, controller=st.Damping(5e-3), moves=[YIELD | {"shape": "decelerate"}]),
     ]

@@ -28,6 +28,7 @@ from .wanted import ENOUGH, Wanted, wanted_of
 LIMITS = MappingProxyType({"push": 25.0, "landing": 25.0, "tilt": radians(60)})
 GOAL: Mapping[str, Any] = MappingProxyType({"standing": True})
 SHARE, TURNS = 1 / 3, 5  # of the time, for one search; searches of push or landing
+PUSHED = ("push", "rise", "spin")  # what the push alone decides
 LESS = 0.6  # of the spin and tilt of a jump for whose flight no plan is true
 GRID = 25  # angles of a leg, for its reach
 
@@ -116,7 +117,8 @@ def optimise(
         if late or (kept[-1].success and (best is None or turn > 0)):
             break
         flies = _flies(run, wanted, measures)
-        if not flies:
+        shares = wanted.shares(measures)
+        if not flies and all(shares.get(name, 0.0) <= 1 for name in PUSHED):
             less = {k: LESS * asked.limits[k] for k in ("spin", "tilt") if k in asked.limits}
             asked = replace(asked, limits={**asked.limits, **less})
 
@@ -145,7 +147,7 @@ def _flies(run: SequenceRun, wanted: Wanted, measures: Mapping[str, Any]) -> boo
         return False
     tilts = tilt(run.trajectory)[run.trajectory.t <= run.phases[2].begin]
     shares = wanted.shares({**measures, "tilt": tilts.max()})
-    return all(shares.get(name, 0.0) <= 1 for name in ("push", "rise", "spin", "tilt"))
+    return all(shares.get(name, 0.0) <= 1 for name in (*PUSHED, "tilt"))
 
 
 def _check(leap: Any) -> None:
