@@ -144,7 +144,7 @@ ONLY = {
     "articulated": Only(
         ("links",),
         ("links",),
-        ("link_radius", "link_inertia", *OF_LINKS, *OF_GUIDES),
+        ("link_radius", "link_inertia", "joint_ratios", *OF_LINKS, *OF_GUIDES),
         ("joint",),
     ),
     "continuum": Only(("samples", "bend_range"), (), OF_ARCS, ("bend", "polar")),
@@ -232,7 +232,8 @@ INERTIAS = {
     "link_inertias": Key("kg m^2", NOT_NEGATIVE, 3, each_link=True),
     "radii": Key("m", POSITIVE, 2),
 }
-SEGMENT = {**LENGTHS, **MASSES, **INERTIAS, "link_centers": Key("m", each_link=True)}
+RATIOS = {"ratios": Key("1", each_link=True)}
+SEGMENT = {**LENGTHS, **MASSES, **INERTIAS, "link_centers": Key("m", each_link=True), **RATIOS}
 # of the tables in `joints` of a limb
 JOINT = {
     "length": Key("m", POSITIVE),

@@ -19,9 +19,10 @@ class Parameter:
     ``needs`` is a group of contact points, "contacts" for any of them, a part of the passive tail,
     or "air"; empty: every scene has the parameter.  ``tail`` says which tails have it: "equal",
     tails of equal pieces; "link" or "arc", tails whose pieces have their own values, ``size``
-    numbers each; "geared", limbs with rotors; "tendon", tails with tendons; "guided", those whose
-    guides differ; "tilted", tails on turned axes; "free", tails of a torso that moves; "weight",
-    all but weightless ones and those of "sloped" scenes; empty: all.
+    numbers each; "ratio", those whose joints turn unequally; "geared", limbs with rotors; "tendon",
+    tails with tendons; "guided", those whose guides differ; "tilted", tails on turned axes; "free",
+    tails of a torso that moves; "weight", all but weightless ones and those of "sloped" scenes;
+    empty: all.
     """
 
     name: str
@@ -36,7 +37,7 @@ class Parameter:
     @property
     def of_pieces(self) -> bool:
         """Tell if each link, arc or tendon has its own values."""
-        return self.tail in ("link", "arc", "geared", *OF_TENDONS)
+        return self.tail in ("link", "arc", "ratio", "geared", *OF_TENDONS)
 
     @property
     def of_chain(self) -> bool:
@@ -121,6 +122,11 @@ PARAMETERS = (
         ("link_tips", 3, None, "m", FINITE, "place of the next joint, from each joint"),
         ("link_offsets", 3, None, "m", FINITE, "place of each link's COM, from its joint"),
         tail="link",
+    ),
+    *_rows(
+        ("joint_ratios", 1, None, "1", FINITE,
+         "by how many times its segment's angles each joint turns"),
+        tail="ratio",
     ),
     *_rows(
         ("rotors", 1, None, "kg m^2", NOT_NEGATIVE,

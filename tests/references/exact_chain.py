@@ -17,6 +17,8 @@ class ExactChain(ManyDigits):
         self.link_mass = self.tail_mass / (segments * links)
         self.link_length = self.tail_length / (segments * links)
         self.link_inertia = self._link_inertia(parameters)
+        ratios = np.resize(parameters.get("joint_ratios", 1.0), segments * links)
+        self.ratios = self._exact(ratios)
 
     def _link_inertia(self, parameters):
         """One link's principal inertia: the given one, or that of an ellipsoid (r, L/2, r)."""
@@ -34,11 +36,13 @@ class ExactChain(ManyDigits):
         J, W, a, turn = unit[:3], R @ unit[3:6], v_dot[:3], R @ v_dot[3:6]  # omega x omega = 0
         place, arm, omega = q[:3], R @ self.mount, R @ v[3:6]
         found = [(self.torso_mass, place, J, a, R * self.torso_inertia @ R.T, W, turn)]
-        for k in np.repeat(np.arange(self.segments) * 2 + 6, self.links):
+        places = np.repeat(np.arange(self.segments) * 2 + 6, self.links)
+        for k, ratio in zip(places, self.ratios, strict=True):
             place, J, a = _carried((place, J, a), arm, (W, omega, turn))
-            turning = self._joint_rotation(*q[k + 1 : k + 3])
+            turning = self._joint_rotation(*(ratio * q[k + 1 : k + 3]))
             W = W.copy()
-            for own, axis in ((k, R[:, 0]), (k + 1, (R @ turning)[:, 2])):
+            for own, way in ((k, R[:, 0]), (k + 1, (R @ turning)[:, 2])):
+                axis = ratio * way
                 turn = turn + v_dot[own] * axis + v[own] * np.cross(omega, axis)  # A9
                 omega, W[:, own] = omega + v[own] * axis, W[:, own] + axis  # A1, A5
             R = R @ turning  # Eq. 12

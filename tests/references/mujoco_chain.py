@@ -20,7 +20,10 @@ class MujocoChain:
         self.data = mujoco.MjData(self.model)
         self.torso = self.model.body("torso").id
         self.G = np.eye(self.model.nv, self.nv)
-        self.G[6:, 6:] = np.kron(np.kron(np.eye(segments), np.ones((links, 1))), np.eye(2))
+        ratios = np.resize(
+            np.repeat(parameters.get("joint_ratios", 1), 2), (2 * segments * links, 1)
+        )
+        self.G[6:, 6:] = ratios * np.kron(np.kron(np.eye(segments), np.ones((links, 1))), np.eye(2))
 
     def mass_matrix(self, q):
         """H = G^T M G."""

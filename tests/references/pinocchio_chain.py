@@ -11,10 +11,12 @@ class PinocchioChain:
     """A free-flyer with 2 m n revolute joints (RX, RZ alternating), reduced to nv = 6 + 2m by G."""
 
     def __init__(self, parameters, segments, links):
-        """Build the full chain and the matrix G that repeats (alpha_i, beta_i) over segment i."""
+        """Build the full chain and the matrix G: k_j (alpha_i, beta_i) for joint j of segment i."""
         self.segments, self.links = segments, links
         self.nq, self.nv = 7 + 2 * segments, 6 + 2 * segments
         self.repeat = np.kron(np.kron(np.eye(segments), np.ones((links, 1))), np.eye(2))
+        ratios = np.repeat(parameters.get("joint_ratios", 1), 2)
+        self.repeat *= np.resize(ratios, (len(self.repeat), 1))
         self.model, self.points = _build(parameters, segments * links)
         self.data = self.model.createData()
 

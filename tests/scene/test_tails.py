@@ -152,7 +152,7 @@ def test_a_continuum_scene(refuse_rows, read):
 
 def test_segments_that_cannot_be_are_refused(refuse_rows):
     two, odd, first = {"links": 2}, CONE | {"radii": [1, 1]}, "segments[0]"
-    own = {"links": 2, "length": 0.1}
+    own, shared = {"links": 2, "length": 0.1}, {"links": 2, "ratios": [1, 0.5]}
     rows = [
         ([], {}, "segments", ""),
         ([3], {}, first, ""),
@@ -194,6 +194,16 @@ def test_segments_that_cannot_be_are_refused(refuse_rows):
         ([two], {"parameters": {"arc_masses": [1]}}, "parameters.arc_masses", "remove"),
         ([two], {"parameters": {"mount_angles": [1]}}, "parameters.mount_angles", "3 fin"),
         ([{"links": 9000}, {"links": 1001}], {}, "segments", "10000 links"),
+        ([{"links": 2, "ratios": [1]}], {}, "segments[0].ratios", "2 finite"),
+        ([shared, {"links": 2, "ratios": [1, -1]}], {}, "segments[1].ratios", "sum 0"),
+        ([shared], {"parameters": {"joint_ratios": [1, 1]}}, "parameters.joint_ratios", "remove"),
+        ([shared], {"contacts": ["tail"]}, "contacts", "remove tail"),
+        (
+            [shared],
+            {"tendon": {"a": {"offset": [1, 0], "tension": 1}}},
+            "parameters.joint_ratios",
+            "tendons",
+        ),
     ]
     refuse_rows(((table(of, **more), field, words) for of, more, field, words in rows), alone=False)
 
@@ -218,6 +228,7 @@ def test_mixed_tails_that_cannot_be_are_refused(refuse_rows):
         ({"kind": "articulated", "segments": BOTH}, "segments[1].kind", '"mixed"'),
         ({"kind": "continuum", "segments": [links]}, "segments[0].kind", '"continuum"'),
         ({"kind": "continuum", "segments": [arc | {"links": 2}]}, "segments[0].links", "arc"),
+        ({"segments": [links | {"ratios": [1, 1, 2]}, arc]}, "segments", "remove them"),
     ]
     own = {"kind": "continuum", "segments": [arc | {"link_masses": [1]}]}
     rows += [(own, "segments[0].link_masses", "arc")]

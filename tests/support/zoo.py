@@ -93,6 +93,8 @@ ZOO: dict[str, dict[str, Any]] = {
     "loops": _links(2, 2, emission="loops"),
     "lanes": _links(2, 2, emission="lanes"),
     "segments": _links(2, 2, emission="segments"),
+    # whose joints turn by unequal shares
+    "ratios": _links(2, 2, parameters={"joint_ratios": [1.0, 0.6, -0.5, 1.3]}),
     # tails of arcs
     "arcs1": _arcs(1),
     "arcs2": _arcs(2),

@@ -21,7 +21,7 @@ from tests.support.faults import TAKING_MORE, broken, failed, not_a_number
 from tests.support.rows import row
 from tests.verification import verify_model
 
-SOUND = ("m1_n1", "arcs1", "elastic", "single_ground", "baked")
+SOUND = ("m1_n1", "ratios", "arcs1", "elastic", "single_ground", "baked")
 OTHERS = [name for name in zoo.ZOO if name not in (*SOUND, "polar")]  # polar ones have no states
 KINDS = ("double", "articulated", "contact", "passive", "air", "tendons")
 REASONS = {f"only for {kind} models" for kind in KINDS}

@@ -74,8 +74,9 @@ def assemble(function: Function, tail: Tail, dynamics: str = "composite") -> Pro
     ``dynamics`` chooses another algorithm for long tails where vectors hold several numbers;
     functions that it does not apply to stay the same.
     """
-    # only a free tail alone has other forms, without rotors
-    others = tail.fixed or tail.polar or tail.branches or "rotor" in tail.passive
+    # only a free tail alone has other forms, without rotors, whose joints turn alike
+    odd = tail.shape.ratios or "rotor" in tail.passive
+    others = odd or tail.fixed or tail.polar or tail.branches
     if dynamics == "segments" and tail.widths:  # they know no air
         dynamics = "lanes"
     if others or (dynamics == "lanes" and tail.kind != "articulated"):

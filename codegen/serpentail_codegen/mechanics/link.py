@@ -134,29 +134,29 @@ def with_link(let, mass, link, h, I) -> tuple[Matrix, Matrix]:
 
 
 def gather_links(
-    let, joint: V4, twice: V10, link: V6, mass: V1, h: V3, I: V6, pitch: V6, yaw: V6
+    let, joint: V4, twice: V10, link: V6, mass: V1, h: V3, I: V6, pitch: V6, yaw: V6, ratio=1
 ) -> dict:
     """One link of the tip-to-base sweep of Eq. 16: composite inertia and the momentum columns of
     the segment.
 
     ``pitch`` and ``yaw`` are momenta, at this frame's origin, of everything beyond per unit
     alpha_dot and beta_dot of the segment's joints passed so far; ``H_pp, H_py, H_yy`` are what this
-    joint adds to the segment's own block.
+    joint, which turns by ``ratio`` times these angles, adds to the segment's own block.
     """
     # J_com (A6) is not formed: momentum columns sum m J_com over all links beyond
     turn_x, turn_z = joint_turns(joint)
     h, I = with_link(let, mass, link, h, I)
     pitch, yaw = along_link(let, link[1], pitch), along_link(let, link[1], yaw)
-    H_yy, H_py = 2 * yaw[5] + I[2], pitch[5]
-    yaw = let("yaw_here", yaw + Matrix([Z.cross(h), symmetric(I) * Z]))
+    H_yy, H_py = ratio * (2 * yaw[5] + ratio * I[2]), ratio * pitch[5]
+    yaw = let("yaw_here", yaw + ratio * Matrix([Z.cross(h), symmetric(I) * Z]))
 
     h, I = (
         let("h_mid", turn_z * h),
         let("I_mid", turned_inertia(let, (0, 1, 2), turn_z, twice[5:10], I)),
     )
     pitch, yaw = turned(let, "pitch_mid", turn_z, pitch), turned(let, "yaw_mid", turn_z, yaw)
-    H_pp, H_py = 2 * pitch[3] + I[0], H_py + yaw[3]
-    pitch = let("pitch_here", pitch + Matrix([X.cross(h), symmetric(I) * X]))
+    H_pp, H_py = ratio * (2 * pitch[3] + ratio * I[0]), H_py + ratio * yaw[3]
+    pitch = let("pitch_here", pitch + ratio * Matrix([X.cross(h), symmetric(I) * X]))
 
     return {
         "mass": mass + Matrix([link[0]]),

@@ -9,7 +9,7 @@ from serpentail_scene.keys import CHAIN, NAME, OF_LIMB
 from serpentail_scene.parameters import AIR_NAMES, NAMED, NAMES, key_in_chain, name_in
 from serpentail_scene.signatures.table import ALL, OF_GIVEN, OF_TREES
 
-from .checks import MOST_SEGMENTS, MOST_STRAIGHT, segments_in
+from .checks import MOST_SEGMENTS, MOST_STRAIGHT, plain, segments_in
 from .limbs import limb
 from .problems import Problem, SceneError, suggest
 from .scene import Chain, Parameters, Scene
@@ -119,6 +119,10 @@ def _chain(name: str, table: Mapping[str, Any], own: Mapping[str, Any], parse: P
     values |= {OF_CHAINS[n.removeprefix(f"{name}_")].name: value for n, value in own.items()}
     inner = {**keys, "functions": ["mass_matrix"], "parameters": values}
     scene = parse(inner, name)
+    if scene.shape.ratios:
+        ratios = plain(scene.parameters["joint_ratios"])
+        remedy = "only joints of the tail have ratios: remove them"
+        raise SceneError([Problem("parameters.joint_ratios", ratios, remedy)])
     needed = [p for p in FOUND if p.name in REQUIRED and p.name in scene.parameters]
     missing = [
         Problem(f"parameters.{p.name}", None, f"has no default: give it in {p.unit}")

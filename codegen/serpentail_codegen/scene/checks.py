@@ -162,6 +162,11 @@ def contact_problems(
         remedy = f'nothing touches the ground by it; add "{group}" to `contacts`, or remove it'
         problems.append(Problem(f"parameters.{name}", parameters[name], remedy))
 
+    # where a point may be within a step is bounded for joints that turn alike
+    if values["shape"].ratios and "tail" in contacts:
+        remedy = "a tail whose joints have ratios does not touch the ground: remove tail"
+        problems.append(Problem("contacts", list(contacts), remedy))
+
     # a flight has no friction and no functions of the ground; some need one group of points
     remedy = 'needs points that touch the ground: add contacts = ["feet"]'
     if "friction" in table and not contacts:

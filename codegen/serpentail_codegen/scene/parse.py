@@ -140,7 +140,9 @@ def _computed(scene: Scene) -> set[str]:
     tables = json.loads(scene.tables or "{}")
     computed = {"link_inertia"} if "link_radius" in scene.parameters else set()
     if tables and have_values(tables):
-        computed |= {p.name for p in PARAMETERS if p.of_pieces}
+        computed |= {p.name for p in PARAMETERS if p.of_pieces and p.tail != "ratio"}
+    if any("ratios" in table for table in tables.get("segments", ())):
+        computed.add("joint_ratios")
     return computed
 
 

@@ -1,7 +1,7 @@
 """Gives each parameter of a model its value, from those that the scene names."""
 
 import math
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -25,7 +25,7 @@ from .problems import Problem, SceneError
 from .scene import Parameters
 from .segment_tables import flattened
 from .segments import RADIUS
-from .variant import EQUAL, Shape, stretches_of
+from .variant import EQUAL, Shape, Stretch, stretches_of
 
 HAS_NOT = {  # why a tail or a base has no such parameters
     "equal": "each piece of this tail has a value of its own",
@@ -113,6 +113,8 @@ def resolve_parameters(
         if not fits(p, numbers[p.name]):
             problems.append(number_problem(p, named[p.name]))
     problems += [] if problems else piece_problems(numbers, shape, foreign_to(kind)[1])
+    stretches = stretches_of(segments, tail_links // segments, kind, shape)
+    problems += [] if problems else ratio_problems(numbers, stretches)
     problems += missing_widths(named, kind, shape) if widths and not problems else []
     if not problems and "stops" in passive:
         problems += stop_problems(numbers)
@@ -252,3 +254,13 @@ def stop_problems(numbers: Mapping[str, Any]) -> list[Problem]:
         for k, (lower, upper) in enumerate(pairs)
         if not lower < upper
     ]
+
+
+def ratio_problems(numbers: Mapping[str, Any], stretches: Iterable[Stretch]) -> list[Problem]:
+    """Return a problem for each segment that the ratios of its joints would not let bend."""
+    ratios, problems = [*flattened(numbers.get("joint_ratios", ()))], []
+    remedy = "sum 0 (joint_ratios): the angles of this segment would not bend it"
+    for i, s in [(i, s) for s in stretches for i in range(s.first, s.stop) if ratios]:
+        own = ratios[s.pieces_before(i) : s.pieces_before(i + 1)]
+        problems += [Problem(f"segments[{i}].ratios", own, remedy)] if sum(own) == 0 else []
+    return problems

@@ -14,7 +14,11 @@ Numbers = Mapping[str, tuple[float, ...]]  # the numbers of a table by key, in S
 PIECES = {"articulated": "links", "continuum": "samples"}
 
 
-OF_LINKS = {"links", *(name for name in SEGMENT if name.startswith("link_"))}  # arcs have none
+OF_LINKS = {
+    "links",
+    "ratios",
+    *(name for name in SEGMENT if name.startswith("link_")),
+}  # arcs have none
 
 
 def table_of(place: str, table: Any, kind: str, problems: list[Problem]) -> dict[str, Any]:

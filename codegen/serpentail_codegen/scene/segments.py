@@ -6,7 +6,16 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from serpentail_scene.keys import INERTIAS, LENGTHS, MASSES, OF_ARCS, OF_LINKS, SEGMENT, TAPER
+from serpentail_scene.keys import (
+    INERTIAS,
+    LENGTHS,
+    MASSES,
+    OF_ARCS,
+    OF_LINKS,
+    RATIOS,
+    SEGMENT,
+    TAPER,
+)
 
 from .checks import MOST_LINKS
 from .cone import LinkValues, links_of_cone, single_links, volume
@@ -38,7 +47,7 @@ def have_values(keys: Mapping[str, Any]) -> bool:
     segments: Any = keys.get("segments")
     if "taper" in keys or not are_tables(segments):
         return "taper" in keys
-    return not all(set(table) <= {"kind", "links"} for table in segments)
+    return not all(set(table) <= {"kind", "links", "ratios"} for table in segments)
 
 
 def describe_segments(
@@ -64,13 +73,14 @@ def describe_segments(
         remedy = f'all segments are of one kind: set kind = "{kinds[0]}" above the tables'
         problems.append(Problem("kind", kind, remedy))
     cone = None if taper is None else numbers_of("taper", taper, TAPER, 1, problems)
+    ratios = _ratios(rows, written, counts, kind, problems)
     if problems:
         return SegmentsDescription(counts, kinds, problems=tuple(problems))
 
     # pieces are equal unless a key describes them; those of a mixed tail never are
     equal = kind != "mixed" or {*OF_LINKS, *OF_ARCS} & set(named)
     if cone is None and not any(written) and equal:
-        return SegmentsDescription(counts, kinds)
+        return SegmentsDescription(counts, kinds, ratios)
     sizes = [n if k == "articulated" else 1 for n, k in zip(counts, kinds, strict=True)]
     places = [place for place, _ in rows]
     values = [
@@ -89,11 +99,30 @@ def describe_segments(
         if not problems:
             links = _all_links(values, sizes, cone)
             owners = [its_kind for its_kind, n in zip(kinds, sizes, strict=True) for _ in range(n)]
-            return SegmentsDescription(counts, kinds, _parameters(links, owners))
+            return SegmentsDescription(counts, kinds, {**_parameters(links, owners), **ratios})
     except (ZeroDivisionError, OverflowError):
         remedy = "gives no finite masses and inertias: use kg and m"
         problems.append(Problem("segments" if cone is None else "taper", segments, remedy))
     return SegmentsDescription(counts, kinds, problems=tuple(problems))
+
+
+def _ratios(
+    rows: list[tuple[str, Any]],
+    written: list[dict[str, Any]],
+    counts: tuple[int, ...],
+    kind: str,
+    problems: list[Problem],
+) -> Numbers:
+    """Take the ratios out of what is written; return those of all joints, 1 where none are, or
+    nothing if there are none at all.
+    """
+    taken = [{"ratios": own.pop("ratios")} if "ratios" in own else {} for own in written]
+    found: list[float] = []
+    if any(taken) and kind == "mixed":
+        problems.append(Problem("segments", kind, "a mixed tail has no ratios: remove them"))
+    for (place, _), own, n in zip(rows, taken, counts, strict=True):
+        found += numbers_of(place, own, RATIOS, n, problems).get("ratios", (1.0,) * n)
+    return {"joint_ratios": tuple(found)} if any(taken) else {}
 
 
 def _all_links(values: list[Numbers], pieces: list[int], cone: Numbers | None) -> LinkValues:

@@ -78,6 +78,7 @@ def _shape(
         kinds=tail.kinds if mixed else (),
         links=links if mixed or "link" in pieces else 0,
         arcs=arcs if mixed or "arc" in pieces else 0,
+        ratios=links if "ratio" in pieces else 0,
         tilted="mount_angles" in parameters,
         sloped="gravity_vector" in parameters and not shape.weightless,
     )

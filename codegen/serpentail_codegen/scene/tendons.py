@@ -99,6 +99,6 @@ def _refused(values: Mapping[str, Any], kind: str) -> list[Problem]:
     wrong |= {"coordinates": "polar"} if values["coordinates"] == "polar" else {}
     wrong |= {"chain": None} if values["chain"] else {}
     named = parameters_in(values)
-    wrong |= {f"parameters.{n}": named[n] for n in named if n.startswith("motor_")}
+    wrong |= {f"parameters.{n}": named[n] for n in named if n.startswith(("motor_", "joint_"))}
     remedy = "does not go with tendons: remove one of the two"
     return [Problem(name, value, remedy) for name, value in wrong.items()]

@@ -11,6 +11,7 @@ class Shape:
     counts: links, or samples, of each segment if they are not equally many.
     kinds: of each segment, in a mixed tail; it has counts, too.
     links, arcs: how many have a mass, a length and an inertia of their own; 0: all are equal.
+    ratios: joints of links, if they turn by unequal shares of their segment's angles.
     rotors: hinges of a limb, if some of them have a rotor.
     tilted: the tail begins in axes of its own, not in those of the torso.
     fixed: the torso never moves.
@@ -24,6 +25,7 @@ class Shape:
     kinds: tuple[str, ...] = ()
     links: int = 0
     arcs: int = 0
+    ratios: int = 0
     rotors: int = 0
     tilted: bool = False
     fixed: bool = False
@@ -42,7 +44,7 @@ class Shape:
         at all.
         """
         present = {"equal": not self.own, "link": self.links, "arc": self.arcs}
-        present |= {"": 1, "tilted": self.tilted, "geared": self.rotors}
+        present |= {"": 1, "tilted": self.tilted, "geared": self.rotors, "ratio": self.ratios}
         present |= {"tendon": len(self.tendons), "guided": len(self.tendons) * self.guided}
         weight = not (self.weightless or self.sloped)
         present |= {"free": not self.fixed, "weight": weight, "sloped": self.sloped}

@@ -151,13 +151,16 @@ def _shapes(name: str, scene: Mapping[str, Any], own: Mapping[str, Any]) -> bool
         if name.startswith(f"{chain}_") and name not in NAMES and isinstance(table, Mapping):
             full = {name_in(chain, n): n for n in NAMES}.get(name, name)
             return _shapes(full, table, {f"tail_{key}": key for key in table} | dict(table))
-    if name in ("mount_angles", "gravity_vector") or name in (*PASSIVE_NAMES, *AIR_NAMES):
+    if name in ("mount_angles", "gravity_vector", "joint_ratios") or name in (
+        *PASSIVE_NAMES,
+        *AIR_NAMES,
+    ):
         return name not in own
     if name not in PIECES or name in own:
         return False
     segments = scene.get("segments")
     tables = segments if isinstance(segments, list | tuple) else []
-    return "taper" not in scene and all(set(table) <= {"kind", "links"} for table in tables)
+    return "taper" not in scene and all(set(t) <= {"kind", "links", "ratios"} for t in tables)
 
 
 def _chains(scene: Mapping[str, Any]) -> Mapping[str, Any]:

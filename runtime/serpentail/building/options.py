@@ -28,6 +28,7 @@ class ParameterOptions(TypedDict, total=False):
     link_lengths: Quantities
     link_centers: Quantities
     link_inertias: Quantities
+    joint_ratios: Quantities
     arc_masses: Quantities
     arc_lengths: Quantities
     K_n: Quantity

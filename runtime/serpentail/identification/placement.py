@@ -92,6 +92,9 @@ def placements(model: Model, markers: Any) -> Placements:
     if not isinstance(markers, Mapping) or not markers:
         needs = 'a Marker for each name, such as {"head": Marker(torso=(0, 0.03, 0.02))}'
         raise refusal("markers", markers, needs, IdentificationError)
+    if "joint_ratios" in model.parameters:
+        remedy = f"{model.name} has joint_ratios: identify a model whose joints turn alike"
+        raise IdentificationError(f"markers: {remedy}")
     count = np.atleast_1d(model.joints_each)
     arc = np.repeat([kind == "continuum" for kind in model.kinds], count)
     points = np.where(arc, model.samples or 1, 1)

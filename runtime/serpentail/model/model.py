@@ -75,6 +75,8 @@ class Model(ModelMethods, ModelStates, NearNames):
         Number of sample points of a continuum tail; None for an articulated one.
     joints_each : ndarray, shape (m,)
         How many joints share the coordinates of each segment; 1 for an arc.
+    turns_each : ndarray, shape (m,)
+        By how many times its coordinates each segment turns: the sum of its joints' ratios.
     fixed : bool
         Whether the base is fixed, so that only the tail moves.
     nq, nv, nu : int
@@ -166,6 +168,9 @@ class Model(ModelMethods, ModelStates, NearNames):
         # how many joints turn by the coordinates of each segment (m,); 1 of an arc
         links = np.broadcast_to(0 if self.links is None else self.links, self.segments)
         self.joints_each = np.maximum(links, 1)
+        ratios, first = parameters.get("joint_ratios"), np.cumsum(self.joints_each)[:-1]
+        shares = [] if ratios is None else np.split(np.ravel(ratios), first)
+        self.turns_each = np.array([sum(x) for x in shares]) if shares else self.joints_each
         self.layout = layout_of(manifest, self.kinds)
         self.fixed: bool = self.layout.fixed
         self.nq, self.nv = self.layout.nq, self.layout.nv

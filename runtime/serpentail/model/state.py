@@ -194,7 +194,7 @@ def _numbers(model: Model, field: str, word: str, value: Any, error: type[Except
             needs = f"pitch and yaw of each segment, {each}{nt} numbers; {m} pitches; or one pitch"
             raise refusal(field, value, needs, error)
         if hinges and array.shape == (nt,):
-            return array / np.repeat(model.joints_each, model.layout.widths)
+            return array / np.repeat(model.turns_each, model.layout.widths)
         array = np.broadcast_to(array, m) if array.ndim == 0 else array
         return shared_among_links(model, array.reshape(1, m, -1))[0]
     if array.shape != (3,):
@@ -208,4 +208,4 @@ def shared_among_links(model: Model, bends: Array) -> Array:
     """
     both, widths = np.zeros((*bends.shape[:2], 2)), np.array(model.layout.widths)
     both[..., : bends.shape[2]] = bends
-    return both[:, np.arange(2) < widths[:, None]] / np.repeat(model.joints_each, widths)
+    return both[:, np.arange(2) < widths[:, None]] / np.repeat(model.turns_each, widths)

@@ -200,7 +200,7 @@ def _bend(model: Model, tail: Array) -> Array:
     firsts, widths = np.array(model.layout.firsts), np.array(model.layout.widths)
     free = np.pad(tail, ((0, 0), (0, 1)))  # prescribed segments have no numbers
     first, second = free[:, firsts], free[:, firsts + widths - 1]
-    joints = model.joints_each * (widths > 1)
+    joints = model.turns_each * (widths > 1)
     if model.manifest["scene"]["coordinates"] == "polar":
         return np.abs(second)
     jointed = np.array(model.kinds) != "continuum"

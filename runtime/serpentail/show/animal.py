@@ -188,7 +188,7 @@ def bends(model: Model, tail: Array) -> Array:
     The bend of an articulated segment is the sum of its links' angles, that of a hinge its angle.
     """
     if model.links is not None:
-        return np.repeat(model.joints_each, np.array(model.layout.widths, int)) * tail
+        return np.repeat(model.turns_each, np.array(model.layout.widths, int)) * tail
     if model.manifest["scene"]["coordinates"] != "polar":
         return tail
     pitch, yaw, *_ = polar_to_bend(tail[:, 0::2], tail[:, 1::2])

@@ -94,6 +94,7 @@ def slope(f: Callable[[float], np.ndarray], rate: float) -> tuple[np.ndarray, np
 
 def fastest(model: Model, v: np.ndarray) -> float:
     """Return a bound on the angular velocity of every link (rad/s)."""
-    turning = np.repeat(model.joints_each, model.layout.widths) * abs(v[model.layout.tail_v])
+    joints = model.joints_each * np.max(np.abs(model.parameters.get("joint_ratios", 1.0)))
+    turning = np.repeat(joints, model.layout.widths) * abs(v[model.layout.tail_v])
     of_torso = 0.0 if model.fixed else np.linalg.norm(v[OMEGA])
     return float(of_torso + np.sum(turning))

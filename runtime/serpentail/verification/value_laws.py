@@ -132,7 +132,8 @@ def a_planar_tail_turns_the_torso_as_bodies_at_pins(model: Model, s: Case) -> Er
         return {}
     n = int(np.sum(counts))
     pitch = np.arange(0, model.layout.nt, 2)
-    angles, rates = (np.cumsum(np.repeat(x[-model.layout.nt :][pitch], counts)) for x in (s.q, s.v))
+    joints = (np.repeat(x[-model.layout.nt :][pitch], counts) for x in (s.q, s.v))
+    angles, rates = (np.cumsum(x * np.ravel(p.get("joint_ratios", 1.0))) for x in joints)
 
     # y + i z of each link's ends and COM, and its rate
     lengths = np.array(p.get("link_lengths", np.full(n, p["tail_length"] / n)))

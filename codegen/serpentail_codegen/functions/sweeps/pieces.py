@@ -15,7 +15,7 @@ from ...mechanics import mount, rotations, torso
 from ...scene.variant import Stretch
 from ..draft import Draft
 from ..scope import Pose, State
-from ..tails.articulated import ARTICULATED
+from ..tails.articulated import ARTICULATED, WITH_RATIOS
 from ..tails.continuum import CONTINUUM
 from ..tails.limb import limb
 from ..tails.mechanism import Mechanism
@@ -38,6 +38,8 @@ def mechanism(draft: Draft) -> Mechanism:
         return MIXED[kind]
     if draft.tail.kind in LIMBS:
         return limb(draft.tail.kind, draft.tail.shape.rotors > 0, kind)
+    if draft.tail.shape.ratios:
+        return WITH_RATIOS
     return {"articulated": ARTICULATED, "continuum": CONTINUUM}[draft.tail.kind]
 
 

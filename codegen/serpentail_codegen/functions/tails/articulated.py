@@ -1,17 +1,24 @@
 """The articulated tail: link by link, in the frames of the links."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from fractions import Fraction
 
 from ...ir.program import Array, Ref
 from ...mechanics import air, link
+from ...mechanics.ratio import WITH_RATIO
 from ...scene.variant import SegmentRun
 from ..draft import Draft
 from ..scope import Instead, Motion, State, Vectors
-from .mechanism import Mechanism, Place, Segments, in_turn, simplified, widths
+from .mechanism import Mechanism, Place, Segments, StepFunction, in_turn, simplified, widths
 
 JOINT = {"joint": 4, "twice": 10}
 SIZES = {"link_inertias": 3}  # parameters with more than one number for each link
+
+
+def of_joint(draft: Draft, function: StepFunction) -> StepFunction:
+    """Return a step of mechanics for joints that turn by the segment's angles, or by a share."""
+    return WITH_RATIO[function] if draft.tail.shape.ratios else function
 
 
 def own_links(draft: Draft) -> Array:
@@ -44,7 +51,7 @@ def link_properties(draft: Draft, state: State) -> Segments:
 def describe_joint(draft: Draft, piece: Vectors) -> None:
     """Store the trigonometry of a segment's joint, and that of twice its angles if wanted."""
     joint = piece.only("joint")
-    draft.step(link.joint_trigonometry, piece, **joint)
+    draft.step(of_joint(draft, link.joint_trigonometry), piece, **joint)
     if "twice" in piece.named:
         draft.step(link.double_angles, joint, **piece.only("twice"))
 
@@ -53,7 +60,25 @@ def prepare_links(draft: Draft, state: State, doubled: bool = False) -> Segments
     """Link properties, and the trigonometry of every segment's joint."""
     sizes = JOINT if doubled else {"joint": JOINT["joint"]}
     own = link_properties(draft, state)
+    if draft.tail.shape.ratios:
+        return prepare_each_joint(draft, own, sizes)
     return in_turn(draft, "articulated", own, sizes, describe_joint)
+
+
+def prepare_each_joint(draft: Draft, own: Segments, sizes: Mapping[str, int]) -> Segments:
+    """Return the data of links whose joints have ratios: each has trigonometry of its own."""
+    count = draft.tail.pieces
+    each = {name: draft.array(name, size, count) for name, size in sizes.items()}
+    ratios = draft.parameters["joint_ratios"].array  # number by number
+    each["ratio"] = replace(ratios, size=1, count=count)
+    segments = replace(own, each={**own.each, **each})
+    for stretch in draft.tail.stretches:
+        n = stretch.pieces
+        with draft.loop("i", stretch.stop, start=stretch.first) as i, draft.loop("j", n) as j:
+            describe_joint(
+                draft, segments.at(i, n * i + j + (stretch.first_piece - n * stretch.first))
+            )
+    return segments
 
 
 def prepare_link_samples(draft: Draft, state: State, segments: Segments | None) -> Segments:
@@ -79,7 +104,7 @@ def move_link(
     joint = draft.scratch(a_joint=3, swing=3)
     piece = segments.at(*place)
     draft.step(
-        simplified(link.link_motion, segments.state, v_dot is not None),
+        simplified(of_joint(draft, link.link_motion), segments.state, v_dot is not None),
         piece,
         segments.motion(place[0], v_dot),
         motion,
@@ -107,7 +132,7 @@ def link_drag_power(
     """Carry ``u`` over one link and add the power of minus the wrench of the air."""
     reads = segments.at(*place), segments.motion(place[0]), {"virtual_rates": virtual_rates}
     own = widths(draft, place[1])
-    draft.step(air.link_drag_power, *reads, flow, own, power_=power, u=flow["u"])
+    draft.step(of_joint(draft, air.link_drag_power), *reads, flow, own, power_=power, u=flow["u"])
 
 
 def link_momentum(
@@ -116,7 +141,8 @@ def link_momentum(
     """Carry ``w, u`` over one link and give its momentum or kinetic energy."""
     piece, rates = segments.at(*place), segments.motion(place[0])
     joint = draft.scratch(u_joint=3)
-    draft.step(link.link_angular_velocity, piece, rates, velocity, w=velocity["w"])
+    turn = of_joint(draft, link.link_angular_velocity)
+    draft.step(turn, piece, rates, velocity, w=velocity["w"])
     draft.step(link.link_linear_velocity, piece, velocity, u=velocity["u"], **joint)
     draft.step(link.link_momentum, piece, velocity, joint, **writes)
 
@@ -137,4 +163,11 @@ ARTICULATED = Mechanism(
     gather_wrench=link.gather_wrench,
     gather_moment=link.gather_moment,
     power=link.link_power,
+)
+WITH_RATIOS = replace(
+    ARTICULATED,
+    twist=WITH_RATIO[link.joint_twist],
+    gather=WITH_RATIO[link.gather_links],
+    gather_wrench=WITH_RATIO[link.gather_wrench],
+    power=WITH_RATIO[link.link_power],
 )

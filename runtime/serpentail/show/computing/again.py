@@ -103,7 +103,7 @@ def _data(model: Model, again: RunAgain, run: CompiledRun) -> dict[str, Any]:
         "nt": model.nu,
         "fixed": model.fixed,
         "groups": model.contacts,
-        "joints": np.repeat(model.joints_each, model.layout.widths).tolist(),
+        "joints": np.repeat(model.turns_each, model.layout.widths).tolist(),
         "kinds": model.kinds,
         "firsts": model.layout.firsts,
         "chains": [

@@ -74,7 +74,7 @@ def _start(run: CompiledRun, image: Image) -> Iterator[Knob]:
             yield _knob(words, spin, [place], turns, slider=(-most, most))
     polar = model.manifest["scene"]["coordinates"] == "polar"
     alone, names = len(model.layout.chains) == 1, model.names.tail
-    joints_of = np.repeat(model.joints_each, model.layout.widths)
+    joints_of = np.repeat(model.turns_each, model.layout.widths)
     for k, joints in enumerate([] if polar else joints_of):
         at = model.layout.tail_q.start + k
         bend = model.state, {"bend": wrong[k, : model.nu].tolist()}
