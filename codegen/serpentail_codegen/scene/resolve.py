@@ -260,7 +260,8 @@ def ratio_problems(numbers: Mapping[str, Any], stretches: Iterable[Stretch]) -> 
     """Return a problem for each segment that the ratios of its joints would not let bend."""
     ratios, problems = [*flattened(numbers.get("joint_ratios", ()))], []
     remedy = "sum 0 (joint_ratios): the angles of this segment would not bend it"
-    for i, s in [(i, s) for s in stretches for i in range(s.first, s.stop) if ratios]:
-        own = ratios[s.pieces_before(i) : s.pieces_before(i + 1)]
+    each = [(i, run) for run in stretches for i in range(run.first, run.stop) if ratios]
+    for i, run in each:
+        own = ratios[run.pieces_before(i) : run.pieces_before(i + 1)]
         problems += [Problem(f"segments[{i}].ratios", own, remedy)] if sum(own) == 0 else []
     return problems
