@@ -212,7 +212,8 @@ AIR = (
 # The passive tail: a scene has a part of it if it names one of the part's parameters; those without
 # a default are then required. Size 0: one number for each tail coordinate.
 PARTS = ("spring", "damping", "stops")
-EACH = (*PARTS, "rotor", "motor", "power")  # parts with numbers for each tail coordinate
+# parts with numbers for each tail coordinate
+EACH = (*PARTS, "stop damping", "rotor", "motor", "power")
 PASSIVE = (
     *_rows(
         ("tail_stiffness", 0, None, "N m/rad", NOT_NEGATIVE,
@@ -232,6 +233,11 @@ PASSIVE = (
         ("tail_stop_width", 0, 0.1, "rad", POSITIVE,
          "angle beyond a stop over which its stiffness grows from zero to tail_stop_stiffness"),
         needs="stops",
+    ),
+    *_rows(
+        ("tail_stop_damping", 0, None, "N m s", NOT_NEGATIVE,
+         "damping of the stops beyond tail_stop_width; it grows from zero as their stiffness does"),
+        needs="stop damping",
     ),
     *_rows(
         ("tail_rotor", 0, None, "kg m^2", NOT_NEGATIVE,

@@ -17,7 +17,8 @@ from tests.references.passive import PassiveTail
 from tests.support import zoo
 from tests.support.rows import row
 
-PAIRS = {"elastic": "m2_n2", "elastic_arcs": "arcs2"}  # passive tails, and the same without
+# passive tails, and the same without
+PAIRS = {"elastic": "m2_n2", "damped_stops": "m2_n2", "elastic_arcs": "arcs2"}
 PARTS = ("spring", "damping", "stops")
 TAIL = slice(6, None)
 
@@ -27,8 +28,9 @@ class Pair:
 
     def __init__(self, name):
         self.plain = zoo.model(PAIRS[name])
-        self.parameters = unequal(self.plain.segments)
-        self.elastic = zoo.model(name).with_parameters(**self.parameters)
+        elastic, numbers = zoo.model(name), unequal(self.plain.segments).items()
+        self.parameters = {n: x for n, x in numbers if n in elastic.parameters}
+        self.elastic = elastic.with_parameters(**self.parameters)
         self.reference = PassiveTail(self.parameters, 2 * self.plain.segments)
 
     def states(self, count=6):
@@ -46,7 +48,7 @@ def unequal(segments):
     ranges = {"tail_stiffness": (0.001, 0.01), "tail_rest": (-0.3, 0.3)}
     ranges |= {"tail_damping": (1e-5, 1e-3), "tail_stop_lower": (-0.9, -0.2)}
     ranges |= {"tail_stop_upper": (0.2, 0.9), "tail_stop_stiffness": (0.01, 0.1)}
-    ranges["tail_stop_width"] = 0.02, 0.2
+    ranges |= {"tail_stop_width": (0.02, 0.2), "tail_stop_damping": (1e-4, 1e-3)}
     return {name: rng.uniform(*ends, size) for name, ends in ranges.items()}
 
 
@@ -116,7 +118,7 @@ def test_implicit_systems_have_stiffness_and_damping(pair, gains):
     given = np.linspace(1e-4, 1e-3, nv - 6)
     for q, v, _, _ in pair.states():
         stiffness = own * np.diag(pair.reference.stiffness(q[7:]))
-        damping = own * np.diag(pair.parameters["tail_damping"])
+        damping = own * np.diag(pair.reference.damping(q[7:]))
         H, J = pair.plain.mass_matrix(q), np.zeros((2 * nv, 2 * nv))
         by_q, by_v = np.zeros((2, nv, nv))
         by_q[TAIL, TAIL] = -stiffness - gains[0] * H[TAIL, TAIL]

@@ -18,7 +18,7 @@ class PassiveTail:
     def __init__(self, parameters, coordinates):
         """Take one number for all coordinates, or one for each."""
         given = {name: np.zeros(coordinates) for name in ("tail_stiffness", "tail_rest")}
-        given["tail_damping"] = np.zeros(coordinates)
+        given |= {name: np.zeros(coordinates) for name in ("tail_damping", "tail_stop_damping")}
         given["tail_stop_width"] = np.full(coordinates, 0.1)
         for name, value in parameters.items():
             if name.startswith("tail_") and name not in ("tail_mass", "tail_length", "tail_mount"):
@@ -28,7 +28,7 @@ class PassiveTail:
     def force(self, angles, rates):
         """What springs, damping and stops ask of the torques."""
         g = self.given
-        force = g["tail_stiffness"] * (angles - g["tail_rest"]) + g["tail_damping"] * rates
+        force = g["tail_stiffness"] * (angles - g["tail_rest"]) + self.damping(angles) * rates
         if self.stops:
             under, over = self._ways(angles)
             force = force + g["tail_stop_stiffness"] * (self._push(over) - self._push(under))
@@ -47,10 +47,17 @@ class PassiveTail:
         """How the forces follow the coordinates, each its own."""
         g = self.given
         stiffness = g["tail_stiffness"] + 0 * angles
-        if self.stops:
-            steps = sum(smooth_step(way / g["tail_stop_width"]) for way in self._ways(angles))
-            stiffness = stiffness + g["tail_stop_stiffness"] * steps
-        return stiffness
+        return (
+            stiffness + g["tail_stop_stiffness"] * self._steps(angles) if self.stops else stiffness
+        )
+
+    def damping(self, angles):
+        """How the forces follow the rates: that of stops grows as their stiffness does."""
+        stops = self.given["tail_stop_damping"] * self._steps(angles) if self.stops else 0.0
+        return self.given["tail_damping"] + stops
+
+    def _steps(self, angles):
+        return sum(smooth_step(way / self.given["tail_stop_width"]) for way in self._ways(angles))
 
     def _ways(self, angles):
         return self.given["tail_stop_lower"] - angles, angles - self.given["tail_stop_upper"]

@@ -107,6 +107,7 @@ ZOO: dict[str, dict[str, Any]] = {
     "mixed": _own("mixed", MIXED),
     # springs, damping and stops
     "elastic": _links(2, 2, parameters=ELASTIC),
+    "damped_stops": _links(2, 2, parameters=ELASTIC | {"tail_stop_damping": [2e-3, 0, 1e-3, 3e-3]}),
     "elastic_arcs": _arcs(2, parameters=ELASTIC),
     "elastic_ground": _links(2, 2, parameters=ELASTIC, functions=LANDING, **GROUND),
     # motors that a run meets the limits of

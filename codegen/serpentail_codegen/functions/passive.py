@@ -10,7 +10,7 @@ from functools import partial
 
 from ..ir.program import Array, Index, Ref
 from ..mechanics import passive
-from ..mechanics.lower import declared_shapes
+from ..mechanics.lower import derive
 from .draft import Draft
 from .scope import Instead, State, Vectors
 from .sweeps.chains import each_chain
@@ -21,6 +21,7 @@ FORCES: dict[str, StepFunction] = {
     "spring": passive.spring_force,
     "damping": passive.damping_force,
     "stops": passive.stop_force,
+    "stop damping": passive.stop_damping_force,
     "rotor": passive.rotor_torque,
 }
 ENERGIES: dict[str, StepFunction] = {"spring": passive.spring_energy, "stops": passive.stop_energy}
@@ -29,7 +30,7 @@ SLOPES: dict[str, StepFunction] = {"spring": passive.spring_slope, "stops": pass
 
 def passive_parameters(draft: Draft, step: StepFunction, part: Callable[[Array], Ref]) -> Instead:
     """Return the parameters that a step reads, for some coordinates only."""
-    names = [name for name in draft.parameters if name in declared_shapes(step)]
+    names = [name for name in draft.parameters if name in dict(derive(step).inputs)]
     return Instead({name: part(draft.parameters[name].array) for name in names})
 
 

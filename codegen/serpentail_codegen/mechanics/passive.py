@@ -68,6 +68,13 @@ def stop_force(let, stops: Stops, angles: V2) -> dict:
     return {"passive": Matrix(forces)}
 
 
+def stop_damping_force(let, tail_stop_damping: V2, stops: Stops, angles: V2, rates: V2) -> dict:
+    """d S q_dot: it grows with the stiffness S of the stops, and has none between them."""
+    each = enumerate(angles)
+    damping = [tail_stop_damping[k] * stiffness_into(let, stops, k, x) for k, x in each]
+    return {"passive": Matrix(damping).multiply_elementwise(rates)}
+
+
 def ways_into(let, stops: Stops | StopsOfCoordinate, k: int, angle) -> list[tuple]:
     """Depth of coordinate k in its lower and in its upper stop, in widths: the part up to one
     width, and the rest.
@@ -78,6 +85,11 @@ def ways_into(let, stops: Stops | StopsOfCoordinate, k: int, angle) -> list[tupl
         beyond = let("beyond", Piecewise((x - 1, x > 1), (0, True)))
         ways.append((let("within", Piecewise((x - beyond, x > 0), (0, True))), beyond))
     return ways
+
+
+def stiffness_into(let, stops: Stops | StopsOfCoordinate, k: int, angle):
+    """Stiffness of both stops of coordinate k, over that beyond their width."""
+    return sum(s * s * (3 - 2 * s) for s, _ in ways_into(let, stops, k, angle))
 
 
 def spring_energy(let, tail_stiffness: V2, tail_rest: V2, angles: V2) -> dict:
@@ -117,13 +129,20 @@ def spring_slope(let, tail_stiffness: V1) -> dict:
 
 def stop_slope(let, stops: StopsOfCoordinate, angle: V1) -> dict:
     """Stiffness of the stops at a coordinate."""
-    shares = [s * s * (3 - 2 * s) for s, _ in ways_into(let, stops, 0, angle[0])]
-    return {"slope": [stops.tail_stop_stiffness[0] * sum(shares)]}
+    return {"slope": [stops.tail_stop_stiffness[0] * stiffness_into(let, stops, 0, angle[0])]}
 
 
 def damped_coordinate(let, tail_damping: V1, weight: V1, gain_v: V1) -> dict:
     """w times the tail's own damping, which tracking cancels."""
     return {"damped": [untracked(gain_v, weight[0] * tail_damping[0])]}
+
+
+def damped_in_stops(
+    let, tail_stop_damping: V1, stops: StopsOfCoordinate, angle: V1, weight: V1, gain_v: V1
+) -> dict:
+    """w times the damping of the stops."""
+    damping = tail_stop_damping[0] * stiffness_into(let, stops, 0, angle[0])
+    return {"damped": [untracked(gain_v, weight[0] * damping)]}
 
 
 def sprung_coordinate(let, weight: V1, gain_v: V1, slope: V1) -> dict:

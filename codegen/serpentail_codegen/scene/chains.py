@@ -193,7 +193,7 @@ def tree_problems(values: Mapping[str, Any], chains: Collection[Chain]) -> list[
     named = values["parameters"] if isinstance(values["parameters"], Mapping) else {}
     problems += [
         Problem(f"parameters.{name}", named[name], f"{this}remove it")
-        for name in AIR_NAMES
+        for name in (*AIR_NAMES, "tail_stop_damping")
         if name in named
     ]
     segments = values["segments"]

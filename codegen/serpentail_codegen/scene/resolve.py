@@ -234,8 +234,10 @@ def missing(named: Mapping[str, Any], parts: Collection[str]) -> list[Problem]:
     problems = []
     for p in (*AIR, *PASSIVE):
         others = [q.name for q in (*AIR, *PASSIVE) if q.needs == p.needs and q.name in named]
-        needed = p.needs in parts and p.default is None and p.name != WIDTHS
-        if needed and others and p.name not in named:
+        if p.needs == "stops" and "stop damping" in parts:
+            others.append("tail_stop_damping")
+        needed = bool(others) and p.default is None and p.name != WIDTHS
+        if needed and p.name not in named:
             first = others[0]
             remedy = f"has no default, and {first} needs it: give it in {p.unit}, or remove {first}"
             problems.append(Problem(f"parameters.{p.name}", None, remedy))

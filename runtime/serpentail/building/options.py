@@ -64,6 +64,7 @@ class ParameterOptions(TypedDict, total=False):
     tail_stop_upper: Quantities
     tail_stop_stiffness: Quantities
     tail_stop_width: Quantities
+    tail_stop_damping: Quantities
     tail_rotor: Quantities
     motor_torque: Quantities
     motor_speed: Quantities

@@ -25,7 +25,15 @@ def passive_force(values: Mapping[str, Any], angles: Any, rates: Any) -> Any:
         s, beyond = np.clip(way, 0, 1), np.maximum(way - 1, 0)
         push = _of(values, "tail_stop_stiffness") * _of(values, "tail_stop_width")
         force = force + sign * push * (s**3 * (1 - s / 2) + beyond)
-    return force
+    return force + stop_damping(values, angles) * rates
+
+
+def stop_damping(values: Mapping[str, Any], angles: Any) -> Any:
+    """Return the damping (..., 2m), N m s, of the stops at coordinates."""
+    if "tail_stop_damping" not in values:
+        return np.zeros(np.shape(angles))
+    depths = [np.clip(way, 0, 1) for way, _ in _ways(values, angles)]
+    return _of(values, "tail_stop_damping") * sum(s * s * (3 - 2 * s) for s in depths)
 
 
 def stored_energy(values: Mapping[str, Any], angles: Any) -> Any:

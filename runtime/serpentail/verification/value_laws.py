@@ -15,6 +15,7 @@ from serpentail_scene.layout import (
 
 from ..basics.attitude import rotation_matrix
 from ..model.model import Model
+from ..model.passive import stop_damping
 from ..model.weight import fall, total_mass
 from ..motion.trajectory import Trajectory
 from ..simulation.controllers.schedules import Legs
@@ -206,6 +207,7 @@ def energy_changes_by_the_power_of_the_torques(model: Model, s: Case) -> Errors:
     power, largest = slope(energy, rate)
     rates = s.v[model.layout.tail_v]
     damped = np.asarray(model.passive_values.get("tail_damping", 0.0)) * rates
+    damped = damped + stop_damping(model.passive_values, s.q[model.layout.tail_q]) * rates
     return relative(power.sum(), rates @ (s.tau - damped), rate * largest.sum())
 
 

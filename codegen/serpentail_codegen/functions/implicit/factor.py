@@ -76,6 +76,10 @@ def add_passive_stiffness(
     if "damping" in draft.tail.passive:
         parameters = passive_parameters(draft, passive.damped_coordinate, own)
         draft.step(passive.damped_coordinate, weights, parameters, damped_=f("damped", k))
+    if "stop damping" in draft.tail.passive:
+        parameters = passive_parameters(draft, passive.damped_in_stops, own)
+        angle = {"angle": state.q.part(draft.tail.torso_nq + k, 1)}
+        draft.step(passive.damped_in_stops, weights, angle, parameters, damped_=f("damped", k))
     if draft.tail.elastic:
         slope = draft.vector("slope", 1)
         draft.fill(slope, 0)

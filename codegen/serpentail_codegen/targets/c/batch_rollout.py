@@ -68,11 +68,13 @@ def batch_rollout(
 ) -> BatchRollout | None:
     """Return what advances runs in lanes, of a scene with rollout and a free torso.
 
-    With contacts it needs implicit methods. Models in air or with prescribed joints have none, and
-    trees with damping: theirs is not one array.
+    With contacts it needs implicit methods. Models in air, with prescribed joints or with stops that
+    damp have none, and trees with damping: theirs is not one array.
     """
     names = {f.function.name for f in printed}
     if "rollout" not in scene.functions or tail.fixed or tail.widths or tail.given:
+        return None
+    if "stop damping" in tail.passive:
         return None
     if tail.branches and "damping" in tail.passive:
         return None

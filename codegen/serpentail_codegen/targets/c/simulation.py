@@ -93,6 +93,7 @@ def simulation_context(
         "ledger": ledger,
         "damped": own_damping(scene, tail),
         "damped_chains": damped_chains(tail),
+        "stopped": ["lower", "upper", "width", "damping"] * ("stop damping" in tail.passive),
         "motors": motors(scene),
         "driven": tail.nt,
         "looks": LOOKS,

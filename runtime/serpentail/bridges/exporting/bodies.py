@@ -205,6 +205,8 @@ def _refuse_other(model: Model, kind: str) -> None:
     elif kind == "urdf" and any(np.any(p[n]) for n in p if n.endswith("_rotors")):
         needs = "limbs without rotors, which URDF lacks"
         remedy = 'export an "mjcf", or load the model with 0 for them'
+    elif "tail_stop_damping" in p:
+        needs, remedy = "stops without damping", 'leave out tail_stop_damping, or export an "fmu"'
     elif "joint_ratios" in p:
         needs, remedy = "joints that turn alike", 'leave out joint_ratios, or export an "fmu"'
     elif "air_density" in p:
