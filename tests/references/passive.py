@@ -47,9 +47,7 @@ class PassiveTail:
         """How the forces follow the coordinates, each its own."""
         g = self.given
         stiffness = g["tail_stiffness"] + 0 * angles
-        return (
-            stiffness + g["tail_stop_stiffness"] * self._steps(angles) if self.stops else stiffness
-        )
+        return stiffness + (g["tail_stop_stiffness"] * self._steps(angles) if self.stops else 0.0)
 
     def damping(self, angles):
         """How the forces follow the rates: that of stops grows as their stiffness does."""

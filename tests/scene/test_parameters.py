@@ -23,6 +23,8 @@ NEEDED = {
     "spring": "tail_stiffness = 0.01\n",
     "damping": "tail_damping = 1e-4\n",
     "stops": "tail_stop_lower = -1\ntail_stop_upper = 1\ntail_stop_stiffness = 0.1\n",
+    "stop damping": "tail_stop_damping = 1e-3\ntail_stop_lower = -1\ntail_stop_upper = 1\n"
+    "tail_stop_stiffness = 0.1\n",
     "motor": "motor_torque = 0.02\nmotor_speed = 80\n",
     "power": "motor_power = 1\n",
     "rotor": "tail_rotor = 1e-6\n",
@@ -135,8 +137,9 @@ def test_a_parameter_brings_its_part_of_a_passive_tail_alone(read):
     for part, lines in ({"": ""} | NEEDED).items():
         with row(part):
             scene = read(given(lines))
-            assert scene.passive == ((part,) if part else ()) == tail_of(scene).passive
-            own = {p.name for p in PASSIVE if p.needs == part}
+            parts = ("stops", part) if part == "stop damping" else (part,) * bool(part)
+            assert scene.passive == parts == tail_of(scene).passive
+            own = {p.name for p in PASSIVE if p.needs in parts}
             assert set(scene.parameters) & set(PASSIVE_NAMES) == own
 
 
@@ -166,9 +169,10 @@ def test_passive_values_that_cannot_be_are_refused(refuse_rows):
 
 def test_what_a_passive_tail_lacks_or_excludes_is_told(refuse, refuse_rows):
     refuse_rows([(given("tail_rest = 0.1"), "parameters.tail_stiffness", "tail_rest")])
-    problems = refuse(given("tail_stop_lower = -1"))
-    names = ("tail_stop_upper", "tail_stop_stiffness")
-    assert set(problems) == {f"parameters.{name}" for name in names}
+    names = ["tail_stop_upper", "tail_stop_stiffness"]
+    for given_one, lacks in (("lower", names), ("damping", [*names, "tail_stop_lower"])):
+        problems = refuse(given(f"tail_stop_{given_one} = 0.1"))
+        assert set(problems) == {f"parameters.{name}" for name in lacks}
     stops = "tail_stop_lower = [-1, 1, 0.5, -1]", "tail_stop_upper = [1, 1, 0.4, 1]"
     problems = refuse(given(*stops, "tail_stop_stiffness = 0.1"))
     assert set(problems) == {f"parameters.tail_stop_lower[{k}]" for k in (1, 2)}

@@ -78,7 +78,7 @@ def test_every_unit_is_tested():
     known = {(w, u) for u, (_, units) in MEASURES.items() for w in units}
     assert known == tested
     assert {p.name for p in PARAMETERS if plain(p.unit) not in MEASURES} == {
-        *("mu", "tendon_guides")
+        *("mu", "tendon_guides", "joint_ratios")
     }
 
 
