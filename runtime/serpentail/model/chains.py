@@ -10,6 +10,8 @@ from serpentail_scene.keys import names_of_tendons
 from serpentail_scene.layout import ChainLayout, Layout
 from serpentail_scene.parameters import NAMES, OUT_OF_REACH, PASSIVE, name_in
 
+from ..basics.errors import ModelError
+
 if TYPE_CHECKING:
     from .model import Model
 
@@ -103,6 +105,14 @@ def refuse_several(model: "Model", field: str, remedy: str, error: type[Exceptio
     names = ", ".join(chain.name for chain in model.layout.chains[1:])
     if names:
         raise error(f"{field}: needs a tail alone, and {model.name} has {names}: {remedy}")
+
+
+def refuse_given(model: "Model", what: str) -> None:
+    """Raise ModelError about what prescribed joints cannot do yet, if the model has any."""
+    names = ", ".join(chain.name for chain in model.layout.chains if chain.given)
+    if names:
+        remedy = 'simulate single runs, or set drive = "torque" in the scene'
+        raise ModelError(f"{what}: {model.name} has prescribed joints, in {names}: {remedy}")
 
 
 def refuse_driven(model: "Model", field: str, torques: Any, error: type[Exception]) -> None:

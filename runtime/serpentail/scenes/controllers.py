@@ -10,8 +10,11 @@ from ..model.model import Model
 from ..motion.trajectory import Trajectory
 from ..simulation.controllers.controller import Controller, Damping, Phases, TorqueTable
 from ..simulation.controllers.pfl import KD, KP, Pfl
+from ..simulation.controllers.prescribed import Prescribed
 from ..simulation.controllers.schedules import Legs, Reference
 from .simulate_keys import LAWS
+
+NODES = ("moves", "times", "blend")  # of a table [simulate.prescribed]: not the names of chains
 
 
 def legs_of(table: Mapping) -> Legs:
@@ -26,6 +29,19 @@ def legs_of(table: Mapping) -> Legs:
         number(f"simulate.legs.{name}", table[name], SimulationError) for name in ("gamma", "delta")
     )
     return Legs.moves(gamma, delta, table.get("moves", []))
+
+
+def prescribed_of(table: Mapping) -> Prescribed:
+    """Return the schedule of a table [simulate.prescribed]: angles by chain, moves or times."""
+    angles = {name: value for name, value in table.items() if name not in NODES}
+    if "times" not in table:
+        if "blend" in table:
+            raise refusal("simulate.prescribed.blend", table["blend"], "times", SimulationError)
+        return Prescribed.moves(angles, table.get("moves", []))
+    if "moves" in table:
+        needs = "moves or times, not both"
+        raise refusal("simulate.prescribed", dict(table), needs, SimulationError)
+    return Prescribed(table["times"], angles, table.get("blend", "quintic"))
 
 
 def reference_of(where: str, model: Model, table: Mapping, parent: Path) -> Reference | Trajectory:

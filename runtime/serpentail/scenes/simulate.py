@@ -1,6 +1,7 @@
 """``scenario``: reads the motion of a scene's tables [simulate] and [[phase]]."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from ..model.state import State, state_of
 from ..simulation.controllers.schedules import Reference
 from ..simulation.methods import SETTINGS
 from ..simulation.settle import check_settling, refuse_moving, settle
-from .controllers import controller_of, legs_of, reference_of
+from .controllers import controller_of, legs_of, prescribed_of, reference_of
 from .file import model_of, read_scene, size_of, subtable, values_of
 from .overrides import changed, split_changes
 from .phases import phases_of, refuse_beside_phases
@@ -89,6 +90,11 @@ def scenario_of(model: Model, table: Mapping, parent: Path, phases: Any = ()) ->
 
     # actuation; a straight tail replaces a refused reference, so that further errors are found
     legs = refused.attempt("legs", legs_of, table["legs"]) if "legs" in table else None
+    if "prescribed" in table:
+        schedule = refused.attempt("prescribed", prescribed_of, table["prescribed"])
+        if schedule is not None:
+            size = size_of(model).get("s", 1.0)
+            settings["prescribed"] = replace(schedule, times=schedule.times * size)
     reference = None
     if "reference" in table:
         straight = Reference([0.0, 1.0], np.zeros((2, model.layout.nt)))

@@ -61,6 +61,7 @@ SIMULATE = Key(
         **SETTING,
         "start": Key(keys=START),
         "legs": Key(keys=LEGS, needs=("gamma", "delta")),
+        "prescribed": Key(form={"type": "object"}),  # its other keys are names of chains
         "reference": Key(keys=REFERENCE),
         "controller": Key(kinds=LAWS_OF_ONE, each=Key(kinds=_controllers({"begin": SECONDS}))),
     },

@@ -15,6 +15,7 @@ from ..basics.attitude import Array
 from ..basics.checks import needed
 from ..basics.errors import UnusualSize
 from ..basics.near_names import NearNames
+from ..model.chains import refuse_given
 from ..model.model import Model
 from ..model.parameters import independent
 from ..model.weight import total_mass
@@ -108,6 +109,7 @@ def momentum_shares(model: Model, motion: Any) -> MomentumShares:
     In flight "outside" is zero but for the errors of the motion.
     """
     model.refuse_fixed("momentum_shares")
+    refuse_given(model, "momentum_shares")
     motion = getattr(motion, "trajectory", motion)
     if not isinstance(motion, Trajectory):
         raise ValueError(needed("motion", motion, "a Trajectory, a Plan or JointTorques"))

@@ -159,7 +159,10 @@ def fastest_decay(actuations: RunActuations, start: Start, parameters: RunParame
     tau = np.tile(np.eye(columns, nt, -1, kernel.dtype), (runs, 1, 1))
     q, v, v_dot = (np.zeros((runs, columns, n), kernel.dtype) for n in (model.nq, *2 * [model.nv]))
     q[...] = start.q0[:, None]
-    evaluate = RunKernel(kernel, parameters.vectors, (q, v, tau), (v_dot,))
+    inputs = [q, v, tau]
+    if model.layout.given:  # straight, which is near enough
+        inputs.append(np.zeros((runs, columns, 3, model.layout.given), kernel.dtype))
+    evaluate = RunKernel(kernel, parameters.vectors, inputs, (v_dot,))
     sound = []
     for k in range(runs):
         with suppress(StateError):

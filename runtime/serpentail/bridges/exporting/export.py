@@ -8,7 +8,7 @@ from typing import Any
 from ...basics.checks import one_of, shown
 from ...basics.errors import ExportError
 from ...basics.files import refuse_unwritable, replacing
-from ...model.chains import refuse_several
+from ...model.chains import refuse_given, refuse_several
 from ...model.checked import checked_model
 from ...model.model import Model
 from .bundle import name_of
@@ -56,7 +56,7 @@ def export(model: Model, kind: str, path: str | os.PathLike[str] | None = None) 
     >>> st.export(model, "mjcf", "rat.xml")  # doctest: +SKIP
     """
     one_of("kind", kind, SUFFIXES, ExportError)
-    checked_model(model, ExportError)
+    refuse_given(checked_model(model, ExportError), "export")
     if kind == "fmu":
         remedy = 'export an "mjcf" or a "bundle", or a scene without tables [chain.NAME]'
         refuse_several(model, f"kind: value {kind!r}", remedy, ExportError)

@@ -7,6 +7,7 @@ import numpy as np
 from ...basics.checks import one_of, whole_number
 from ...basics.errors import ModelError, SimulationError
 from ...basics.extras import needed
+from ...model.chains import refuse_given
 from ...model.checked import checked_model
 from ...model.model import Model
 from .tasks import TASKS
@@ -122,6 +123,7 @@ def _worlds(model: Model, task: str, count: int, settings: dict[str, Any]) -> Wo
     checked_model(model, ModelError)
     chosen = TASKS[one_of("task", task, list(TASKS), SimulationError)]
     model.refuse_fixed(chosen.name)
+    refuse_given(model, chosen.name)
     checked = chosen.checked(model, settings)
     worlds = Worlds(model, chosen, count, checked)
     worlds.act(

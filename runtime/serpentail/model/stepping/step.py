@@ -21,7 +21,7 @@ from ...basics.checks import (
 )
 from ...basics.errors import SimulationError, StateError
 from ...compiling.threads import MIN_STATES_PER_THREAD, checked_threads, shared
-from ..chains import refuse_driven
+from ..chains import refuse_driven, refuse_given
 from ..library import WHY
 from ..memory import writeable
 from ..parameters import RunParameters
@@ -140,6 +140,7 @@ def step(
 def _method(model: Model, asked: object) -> str:
     """Return the method; ModelError names what it would need of the scene."""
     model.refuse_fixed("step")
+    refuse_given(model, "step")
     name = "implicit_euler" if model.contacts else "rk4"
     if asked is not None:
         name = one_of("step: method", asked, METHODS, SimulationError)

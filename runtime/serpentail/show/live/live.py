@@ -16,6 +16,7 @@ from ...basics.attitude import Array, rotation_matrix
 from ...basics.checks import refusal
 from ...basics.errors import ViewError
 from ...basics.extras import needed
+from ...model.chains import refuse_given
 from ...model.model import Model
 from ...motion.trajectory import Trajectory
 from ..animal import BELLY, Animal, Poses, animal_of, poses_of
@@ -112,6 +113,7 @@ def live(model: Model, *, host: str = "127.0.0.1", port: int = 8080) -> "Live":
     ...     st.simulate(model, q0, v0, watch=page)
     """
     model.kernel("tail_points")
+    refuse_given(model, "live")
     viser = needed("viser", "live")
     with redirect_stdout(io.StringIO()):  # it prints a box, whatever `verbose` says
         server = viser.ViserServer(host=host, port=port, label=model.name, verbose=False)

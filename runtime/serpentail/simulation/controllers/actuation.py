@@ -108,10 +108,12 @@ class Actuation:
 
     def _refuse_passive(self, parts: Parts) -> None:
         """SimulationError if a torque would act on a passive coordinate."""
-        if parts.pfl is not None and not all(self.model.layout.driven):
+        layout = self.model.layout
+        if parts.pfl is not None and (layout.given or not all(layout.driven)):
+            others = "prescribed" if layout.given else "passive"
             raise SimulationError(
-                f"Pfl: needs a torque for each coordinate, and {self.model.name} has passive ones: "
-                "use another controller"
+                f"Pfl: needs a torque for each coordinate, and {self.model.name} has {others} "
+                "ones: use another controller"
             )
         if parts.damping is not None:
             refuse_driven(self.model, "controller", parts.damping, SimulationError)
