@@ -55,8 +55,8 @@ class ChainLayout:
     tail points.
 
     owner: the beginning of the names of its parameters; a mirrored chain is their mirror image.
-    names: of its coordinates; driven: whether each has an actuator; given: names of coordinates that
-    are prescribed, which are in none of q, v and tau.
+    names: of its coordinates; driven: whether each has an actuator; given: names of prescribed
+    coordinates, which are in none of q, v and tau.
     """
 
     name: str

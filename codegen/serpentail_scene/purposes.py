@@ -5,7 +5,16 @@ from typing import Any
 
 from .drives import drives_of
 from .parameters import AIR_NAMES, PARTS, parts_of
-from .signatures.table import AIRBORNE, ALL, DERIVATIVES, EXACT_DERIVATIVES, FIXED, NEEDS, OF_GIVEN, OF_TREES
+from .signatures.table import (
+    AIRBORNE,
+    ALL,
+    DERIVATIVES,
+    EXACT_DERIVATIVES,
+    FIXED,
+    NEEDS,
+    OF_GIVEN,
+    OF_TREES,
+)
 
 MOTION = ("forward_dynamics", "energy", "momentum", "tail_points", "center_of_mass")
 TENDONS = ("tendon_lengths", "tendon_torques")

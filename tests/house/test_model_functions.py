@@ -47,7 +47,7 @@ class ModelFunctions:
     """The functions of a scene, for one state or with a leading batch axis.
 
     ``Model`` says what q and v are, and what a derivative with respect to q is. ``given``, only of
-    models with prescribed joints, and in place of ``legs``: all their angles (rad), then rates, then
+    models with prescribed joints, also in place of ``legs``: their angles (rad), then rates, then
     accelerations, (3, n), in the order of the chains. ``inverse_dynamics`` then returns (force, the
     torques of these joints).
 

@@ -16,6 +16,7 @@ GECKO = tables_of(SCENES / "gecko_legs.toml")
 LEG = GECKO["chain"]["hind"]
 PLAIN = {"kind": "articulated", "segments": 1, "links": 1, "mount": [0, 0, 0]}
 PLAIN |= {"mass": "1 g", "length": "2 cm"}
+GIVEN = {"drive": "prescribed"}
 BONE = {"name": "knee", "length": "4 cm", "mass": "3 g", "radius": "4 mm"}
 
 
@@ -38,7 +39,10 @@ def test_wrong_chains_are_refused():
         ("chain.a.kind", "limbs", {"a": PLAIN | {"kind": "limbs"}}),
         ("chain.a.segments", 1, {"a": PLAIN | {"kind": "limb"}}),
         ("chain.a.joints", [BONE], {"a": PLAIN | {"joints": [BONE]}}),
-        ("chain.a.drive", "prescribed", {"a": PLAIN | {"drive": "prescribed"}}),
+        ("chain.a.drive", "prescribe", {"a": PLAIN | {"drive": "prescribe"}}),
+        ("chain.a.drive", "prescribed", {"a": limb(BONE | GIVEN, BONE | {"name": "b"})}),
+        ("chain.a.drive", "prescribed", {"a": limb(BONE | {"damping": 1}) | GIVEN}),
+        ("functions", "pfl", {"a": PLAIN | GIVEN}),
         ("chain.a.damping", -1, {"a": PLAIN | {"damping": -1}}),
         ("chain.tail", "tail", {"tail": PLAIN}),
         ("chain.torso", "torso", {"torso": PLAIN}),

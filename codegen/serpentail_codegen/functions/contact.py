@@ -215,16 +215,17 @@ def contact_load(
     if "powers" in arrays:
         balance_powers(draft, state.torso(R), points, arrays)
     torques = copied_torques(draft, net_torques(draft, state, arrays["tau"]))
-    held = draft.array("held", draft.tail.given) if state.given and "powers" in arrays else None
-    if held:
-        draft.fill(held[0], 0)
+    if not state.given or "powers" not in arrays:
+        return gather_contact_loads(draft, R, points, arrays["forces"], torques), torques
+
+    # the drives of prescribed joints resist the ground, too
+    count, held = draft.tail.given, draft.array("held", draft.tail.given)
+    draft.fill(held[0], 0)
     load = gather_contact_loads(draft, R, points, arrays["forces"], torques, held)
-    if held and state.given:  # the ground's part of the power of the drives
-        with draft.loop("k", draft.tail.given) as k:
-            rate = state.given.part(k + draft.tail.given, 1)
-            reads = {"torque": held.part(k, 1), "rate": rate}
-            power = derive(contact.taken_power, one_coordinate=True)
-            draft.step(power, reads, power_=arrays["powers"].part(1, 1))
+    power = derive(contact.taken_power, one_coordinate=True)
+    with draft.loop("k", count) as k:
+        reads = {"torque": held.part(k, 1), "rate": state.given.part(k + count, 1)}
+        draft.step(power, reads, power_=arrays["powers"].part(1, 1))
     return load, torques
 
 

@@ -20,7 +20,6 @@ from .sweeps.pieces import (
     torso_pose,
 )
 
-
 MOMENTUM = Function(
     "all_momentum", "momentum of the animal", (Q, V), (LINEAR, ANGULAR), assemble_momentum
 )

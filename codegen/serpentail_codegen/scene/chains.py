@@ -100,10 +100,6 @@ def _key_problems(place: str, table: Mapping[str, Any]) -> list[Problem]:
         problems.append(Problem(f"{place}.on", table["on"], remedy))
     if not DRIVE.holds(table.get("drive", DRIVES[0])):
         problems.append(Problem(f"{place}.drive", table["drive"], f"needs {DRIVE.text}"))
-    drives = drives_of(table)
-    if "prescribed" in drives and any(drive != "prescribed" for drive in drives):
-        remedy = 'all joints of a chain or none: set drive = "prescribed" beside `joints`'
-        problems.append(Problem(f"{place}.drive", "prescribed", remedy))
     if not isinstance(table.get("pair", False), bool):
         problems.append(Problem(f"{place}.pair", table["pair"], "needs true or false"))
     return problems
@@ -135,13 +131,17 @@ def _chain(name: str, table: Mapping[str, Any], own: Mapping[str, Any], parse: P
 
 
 def _driven(chain: Chain, drives: list[str]) -> Chain:
-    """Return a chain with its drives; SceneError if forces act on angles that are given."""
-    if any(drive != "prescribed" for drive in drives):
+    """Return a chain with its drives; SceneError if only some angles are given, or forces act on
+    them.
+    """
+    if "prescribed" not in drives:
         return chain
-    if chain.scene.passive:
-        remedy = f"{', '.join(chain.scene.passive)}: does nothing to angles that are given: remove it"
-        raise SceneError([Problem("drive", "prescribed", remedy)])
-    return replace(chain, prescribed=True)
+    remedy = f"these do nothing to angles that are given: remove {', '.join(chain.scene.passive)}"
+    if any(drive != "prescribed" for drive in drives):
+        remedy = "needs to be the drive of all joints of a chain: set it beside `joints`"
+    elif not chain.scene.passive:
+        return replace(chain, prescribed=True)
+    raise SceneError([Problem("drive", "prescribed", remedy)])
 
 
 def _clashes(chains: Collection[Chain], tables: Mapping[str, Any]) -> list[Problem]:
@@ -175,20 +175,18 @@ def tree_problems(values: Mapping[str, Any], chains: Collection[Chain]) -> list[
         if has(values[key])
     ]
     listed = values["functions"] if isinstance(values["functions"], list | tuple) else ()
-    driven = {
-        drive: n
-        for n, t in values["chain"].items()
-        for drive in (drives_of(t) if isinstance(t, Mapping) else ())
-        if isinstance(drive, str)
-    }
-    known = OF_GIVEN if "prescribed" in driven else OF_TREES
+    known = OF_GIVEN if any(chain.prescribed for chain in chains) else OF_TREES
     others = [name for name in listed if name in ALL and name not in known]
+    this = this if known is OF_TREES else "joints of the model are prescribed: "
     remedy = f"{this}leave it out; there are {', '.join(known)}"
-    if "prescribed" in driven:
-        remedy = f"chain.{driven['prescribed']} is prescribed: {remedy}"
     problems += [Problem("functions", name, remedy) for name in others]
-    if "passive" in driven and "pfl" in listed:
-        remedy = f"needs a torque for each coordinate, and chain.{driven['passive']} has passive ones"
+    passive = [
+        n
+        for n, t in values["chain"].items()
+        if isinstance(t, Mapping) and "passive" in drives_of(t)
+    ]
+    if passive and "pfl" in listed:
+        remedy = f"needs a torque for each coordinate, and chain.{passive[0]} has passive ones"
         problems.append(Problem("functions", "pfl", f"{remedy}: leave it out"))
     named = values["parameters"] if isinstance(values["parameters"], Mapping) else {}
     problems += [

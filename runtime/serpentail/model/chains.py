@@ -1,6 +1,7 @@
 """The chains of a model: where the numbers of each lie, and what their parameters add up to."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -54,11 +55,9 @@ def bend_ranges(manifest: Mapping[str, Any]) -> np.ndarray:
 def layout_of(manifest: Mapping[str, Any], kinds: tuple[str, ...]) -> Layout:
     """Return the layout of a model whose segments are of these kinds."""
     fixed = manifest["scene"].get("base") == "fixed"
-    given = 0
-    for entry in entries(manifest):
-        if owner_of(entry) and "prescribed" in drives_of(manifest["scene"]["chain"][owner_of(entry)]):
-            given += sum(1 if kind == HINGE else 2 for kind in kinds[slice(*entry["segments"])])
-    layout = Layout(len(kinds), fixed, (), kinds.count(HINGE), given=given)
+    layout = Layout(len(kinds), fixed, (), kinds.count(HINGE))
+    given = layout.nt - manifest["dimensions"]["nt"]
+    layout = replace(layout, given=given)
     polar = manifest["scene"]["coordinates"] == "polar"
     chains, first = [], 0
     for entry in entries(manifest):
@@ -71,8 +70,7 @@ def layout_of(manifest: Mapping[str, Any], kinds: tuple[str, ...]) -> Layout:
             pairs = [COORDINATES["polar" if polar else kind] for kind in own]
             names = [f"{name}_{i + 1}" for i, pair in enumerate(pairs) for name in pair]
         names, drives = [f"{start}{name}" for name in names], drives_of(table)
-        moved = tuple(names) if "prescribed" in drives else ()
-        names = [] if moved else names
+        names, moved = ([], names) if "prescribed" in drives else (names, [])
         stop = first + len(names)
         chains.append(
             ChainLayout(
@@ -86,7 +84,7 @@ def layout_of(manifest: Mapping[str, Any], kinds: tuple[str, ...]) -> Layout:
                 points=slice(*entry["points"]),
                 names=tuple(names),
                 driven=tuple(drives[k % len(drives)] != "passive" for k in range(len(names))),
-                given=moved,
+                given=tuple(moved),
             )
         )
         first = stop

@@ -93,8 +93,8 @@ def scenario_of(model: Model, table: Mapping, parent: Path, phases: Any = ()) ->
     if "prescribed" in table:
         schedule = refused.attempt("prescribed", prescribed_of, table["prescribed"])
         if schedule is not None:
-            size = size_of(model).get("s", 1.0)
-            settings["prescribed"] = replace(schedule, times=schedule.times * size)
+            times = np.asarray(schedule.times) * size_of(model).get("s", 1.0)
+            settings["prescribed"] = replace(schedule, times=times)
     reference = None
     if "reference" in table:
         straight = Reference([0.0, 1.0], np.zeros((2, model.layout.nt)))

@@ -70,6 +70,11 @@ class GroundSettings:
         return ground
 
     @property
+    def schedule(self) -> Legs | Piecewise | None:
+        """How legs, or prescribed joints, move."""
+        return self.legs or self.given
+
+    @property
     def points(self) -> int:
         """Number of points that can touch the ground."""
         return sum(self.groups.values())

@@ -27,8 +27,7 @@ def gather_inertia(
     momentum columns at B and its own block of H.
     """
     composite, tail = draft.vectors(mass=1, h=3, I=6), draft.tail
-    names = ("column",) if tail.width == 1 else ("pitch", "yaw")
-    names = () if tail.prescribed else names
+    names = () if tail.prescribed else ("column",) if tail.width == 1 else ("pitch", "yaw")
     to_torso = hinge.hinge_at_torso if tail.width == 1 else torso.column_at_torso
     momenta = draft.vectors(**dict.fromkeys(names, 6))
     for ref in composite.named.values():

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 from serpentail_scene.layout import OMEGA, VELOCITY
 
@@ -81,16 +82,15 @@ def inertial_forces(
     """Compute the generalised forces of a motion of the torso and ``v_dot`` of the chains, in torso
     axes; ``segments`` are those of each chain. ``drives`` receives those on prescribed joints.
     """
-
-    def torque(i: Index) -> Ref:
-        tail = draft.tail
-        return tail.segment_tau(drives, i) if drives and tail.prescribed else tail.segment_v(force, i)
-
     sums = Vectors({"force": block(force, VELOCITY), "moment": block(force, OMEGA)})
     for own in on_each(draft, segments):
         wrenches = forward_wrenches(draft, own, seen(draft, motion), v_dot)
-        wanted = drives or not draft.tail.prescribed
-        total = gather_wrenches(draft, own, wrenches, torque if wanted else None)
+        tail, torque = draft.tail, None
+        if not tail.prescribed:
+            torque = partial(tail.segment_v, force)
+        elif drives:
+            torque = partial(tail.segment_tau, drives)
+        total = gather_wrenches(draft, own, wrenches, torque)
         if draft.tail.name:
             add(draft, branch.chain_wrench, total, sums)
         elif not draft.tail.fixed:

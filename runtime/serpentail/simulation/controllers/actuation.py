@@ -17,6 +17,7 @@ from .parts import NativeTorque, Parts, TorqueFunction
 from .piecewise import Piecewise
 from .schedules import Legs
 
+Schedule = Legs | Piecewise | None  # of legs, or of prescribed joints
 ROUNDING = 1e-6  # of a tension's limit, by which those of a solver may go beyond it
 
 
@@ -30,7 +31,7 @@ class Actuation:
         records: Records,
         controller: Controller,
         span: tuple[float, float],
-        legs: Legs | Piecewise | None = None,
+        legs: Schedule = None,
     ):
         self.records = records
         self.error: BaseException | None = None
@@ -246,7 +247,11 @@ class RunActuations:
     """
 
     def __init__(
-        self, records: Records, controller: object, start: Start, legs: Legs | Piecewise | None = None
+        self,
+        records: Records,
+        controller: object,
+        start: Start,
+        legs: Schedule = None,
     ):
         self.records = records
         self.span = start.start, start.end
@@ -271,7 +276,7 @@ class RunActuations:
         """The model whose tails are driven."""
         return self.records.model
 
-    def _of(self, controller: Controller, legs: Legs | Piecewise | None, k: int | None) -> Actuation:
+    def _of(self, controller: Controller, legs: Schedule, k: int | None) -> Actuation:
         """Return the actuation of run k, or of all; SimulationError if it is impossible."""
         try:
             return Actuation(self.records, controller, self.span, legs)

@@ -8,31 +8,28 @@ from typing import Any, Self
 
 import numpy as np
 
-from ...basics.checks import finite_array, needed, number, one_of, refusal
+from ...basics.checks import finite_array, number, one_of, refusal, shown
 from ...basics.errors import SimulationError
 from ...basics.short_repr import brief
 from ...model.model import Model
 from ...model.state import Quantities
-from .piecewise import Piecewise, checked_nodes, constant, shaped, spline
+from .piecewise import Piecewise, checked_nodes, shaped, spline
 
 BLENDS = ("quintic", "spline")
-SUDDEN = ("rate", "shape")  # of moves of legs without mass
-AT_ONCE = "joints with mass cannot change their rate at once: "
+AT_ONCE = "joints with mass cannot change their rate at once: remove it, and give duration"
 
 
 @dataclass(frozen=True, eq=False)
 class Prescribed:
-    """Angles over time of the joints that the scene prescribes.
-
-    Rates never jump, because that would need an impulse.
+    """Angles over time of the joints that a scene prescribes; their rates never jump.
 
     Parameters
     ----------
     times : array_like, shape (K,)
         Increasing times (s); before the first and after the last, angles are held.
     angles : mapping of str to array_like
-        Angles (rad) by the name of a chain, (K, n) for its n coordinates; (n,) for one time. The
-        name of a pair stands for both sides, which then mirror each other.
+        Angles (rad) of a chain's n coordinates by its name, (K, n), or (n,) for one time. The name
+        of a pair stands for both sides, which mirror each other.
     blend : {"quintic", "spline"}, default "quintic"
         "quintic": from rest to rest between the times; "spline": a cubic spline through all angles,
         at rest at both ends.
@@ -41,10 +38,6 @@ class Prescribed:
     ------
     SimulationError
         Times, angles or blend are wrong.
-
-    See Also
-    --------
-    Prescribed.moves
 
     Examples
     --------
@@ -61,21 +54,17 @@ class Prescribed:
 
     def __post_init__(self) -> None:
         """Check the nodes."""
-        given = {"blend": self.blend, "angles": self.angles}
-        if not isinstance(self.angles, Mapping) or not self.angles:
-            raise refusal("Prescribed: angles", given["angles"], "a table by chain", SimulationError)
-        if self.blend == "linear":
-            remedy = needed("Prescribed: blend", self.blend, '"quintic" or "spline"')
-            raise SimulationError(f"{remedy}: {AT_ONCE}give another blend")
         one_of("Prescribed: blend", self.blend, BLENDS, SimulationError)
+        if not isinstance(self.angles, Mapping) or not self.angles:
+            needs = "a table of angles by chain"
+            raise refusal("Prescribed: angles", self.angles, needs, SimulationError)
         times = np.atleast_1d(finite_array("Prescribed: times", self.times, SimulationError, "s"))
         checked = {}
         for name, value in self.angles.items():
             field = f"angles of {name}"
             rows = finite_array(f"Prescribed: {field}", value, SimulationError, "rad")
             rows = np.atleast_2d(rows) if len(times) == 1 else rows
-            width = rows.shape[1] if rows.ndim == 2 else 0
-            checked[name] = checked_nodes("Prescribed", field, (times, rows), width)[1]
+            checked[name] = checked_nodes("Prescribed", field, (times, rows), rows.shape[-1])[1]
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "angles", checked)
 
@@ -101,100 +90,69 @@ class Prescribed:
         SimulationError
             A move is incomplete, or begins before the last one ends.
         """
-        start = cls([0.0], angles)
-        here, times, rows = {name: each[0] for name, each in start.angles.items()}, [0.0], []
+        here = {name: rows[0] for name, rows in cls([0.0], angles).angles.items()}
+        nodes: list[tuple[float, dict[str, np.ndarray]]] = []
         for k, move in enumerate(moves):
-            field = f"moves[{k}]"
-            goals = _goals(field, move, here)
-            begin, duration = (
-                number(f"{field}.{key}", move[key], SimulationError, unit="s", above=least)
-                for key, least in (("at", -np.inf), ("duration", 0))
-            )
-            if rows and begin < times[-1]:
-                remedy = f"a time after {times[-1]:.6g} s, where the move before it ends"
-                raise refusal(f"{field}.at", move["at"], remedy, SimulationError)
-            times = times if rows else [begin]
-            rows = rows or [here]
-            if begin > times[-1]:
-                times, rows = [*times, begin], [*rows, here]
+            begin, end, goals = _checked_move(f"moves[{k}]", move, here)
+            if nodes and begin < nodes[-1][0]:
+                needs = f"{nodes[-1][0]:.6g} s, where the move before it ends, or later"
+                raise refusal(f"moves[{k}].at", move["at"], needs, SimulationError)
+            if not nodes or begin > nodes[-1][0]:
+                nodes.append((begin, here))
             here = here | goals
-            times, rows = [*times, begin + duration], [*rows, here]
-        rows = rows or [here]
+            nodes.append((end, here))
+        times, rows = zip(*(nodes or [(0.0, here)]), strict=True)
         return cls(times, {name: np.array([row[name] for row in rows]) for name in here})
 
-    def curve(self, model: Model) -> Piecewise:
-        """Return the angles of all prescribed coordinates of a model.
 
-        Parameters
-        ----------
-        model : Model
-            A model with prescribed joints.
-
-        Returns
-        -------
-        Piecewise
-            Angles (rad) over time (s), in the order of ``given``.
-
-        Raises
-        ------
-        SimulationError
-            A chain is missing or unknown, or has another number of coordinates.
-        """
-        parts, known = [], {}
-        for chain in [each for each in model.layout.chains if each.given]:
-            names = [name for name in (chain.name, chain.owner) if name in self.angles]
-            known |= dict.fromkeys((chain.owner, chain.name), chain)
-            count = len(chain.given)
-            if not names:
-                needs = f"{count} angles of {chain.name}: {', '.join(chain.given)}"
-                raise refusal("prescribed", [*self.angles], needs, SimulationError)
-            found = self.angles[names[0]]
-            if found.shape[1] != count:
-                needs = f"{count} angles: {', '.join(chain.given)}"
-                raise refusal(f"prescribed: {names[0]}", found[0].tolist(), needs, SimulationError)
-            parts.append(found)
-        for name in self.angles:
-            one_of("prescribed: chain", name, known, SimulationError)
-        angles, times = np.concatenate(parts, axis=1), np.asarray(self.times)
-        if len(times) == 1:
-            return constant(times[0], angles[0])
-        return spline(times, angles, "clamped") if self.blend == "spline" else shaped(times, angles, "quintic")
-
-
-def _goals(field: str, move: object, known: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Return the last angles of a move by chain."""
-    if not isinstance(move, Mapping):
-        raise refusal(field, move, "a table of at, duration and chains", SimulationError)
-    for key in SUDDEN:
-        if key in move:
-            raise refusal(f"{field}.{key}", move[key], f"no {key}: {AT_ONCE}give duration", SimulationError)
+def _checked_move(
+    field: str, move: Any, known: Mapping[str, np.ndarray]
+) -> tuple[float, float, dict[str, np.ndarray]]:
+    """Return begin and end (s) of a move, and its last angles (rad) by chain."""
+    if not isinstance(move, Mapping) or not {"at", "duration"} < move.keys():
+        raise refusal(field, move, "at, duration, and angles of a chain", SimulationError)
     for key in move:
+        if key in ("rate", "shape"):  # of legs without mass
+            raise SimulationError(f"{field}.{key}: value {shown(move[key])}: {AT_ONCE}")
         one_of(f"{field}: key", key, ("at", "duration", *known), SimulationError)
-    if not {"at", "duration"} < move.keys():
-        raise refusal(field, dict(move), "at, duration, and angles of a chain", SimulationError)
+    begin = number(f"{field}.at", move["at"], SimulationError, unit="s")
+    length = number(f"{field}.duration", move["duration"], SimulationError, unit="s", above=0)
     goals = {}
     for name in [name for name in known if name in move]:
-        goal = finite_array(f"{field}.{name}", move[name], SimulationError, "rad")
-        if goal.shape != known[name].shape:
+        goals[name] = finite_array(f"{field}.{name}", move[name], SimulationError, "rad")
+        if goals[name].shape != known[name].shape:
             needs = f"{len(known[name])} angles"
             raise refusal(f"{field}.{name}", move[name], needs, SimulationError)
-        goals[name] = goal
-    return goals
+    return begin, begin + length, goals
 
 
-def curve_of(model: Model, many: bool, prescribed: object) -> Piecewise | None:
-    """Return how the prescribed joints of a model move; SimulationError if they do not match, or
-    there are many runs.
+def curve_of(model: Model, many: bool, prescribed: Any) -> Piecewise | None:
+    """Return how the prescribed joints of a model move, in the order of ``given``; SimulationError
+    if they do not match, or there are many runs.
     """
-    if not model.layout.given:
+    chains = [chain for chain in model.layout.chains if chain.given]
+    if not chains:
         if prescribed is not None:
-            remedy = f"{model.name} has no such joints: leave it out"
-            raise SimulationError(needed("prescribed", prescribed, "nothing") + f": {remedy}")
+            needs = f"nothing: {model.name} has no prescribed joints"
+            raise refusal("prescribed", prescribed, needs, SimulationError)
         return None
     if not isinstance(prescribed, Prescribed):
-        names = ", ".join(chain.name for chain in model.layout.chains if chain.given)
-        needs = f"st.Prescribed with the angles of {names}"
+        needs = f"st.Prescribed with the angles of {', '.join(chain.name for chain in chains)}"
         raise refusal("prescribed", prescribed, needs, SimulationError)
     if many:
-        raise refusal("q0", "many starts", "one start, as joints are prescribed", SimulationError)
-    return prescribed.curve(model)
+        raise refusal("q0", "many starts", "one, as joints are prescribed", SimulationError)
+    known = [name for chain in chains for name in (chain.name, chain.owner)]
+    for name in prescribed.angles:
+        one_of("prescribed: chain", name, known, SimulationError)
+    parts = []
+    for chain in chains:
+        rows = prescribed.angles.get(chain.name, prescribed.angles.get(chain.owner))
+        if rows is None or rows.shape[1] != len(chain.given):
+            needs = f"{len(chain.given)} angles: {', '.join(chain.given)}"
+            value = None if rows is None else rows[0].tolist()
+            raise refusal(f"prescribed: {chain.name}", value, needs, SimulationError)
+        parts.append(rows)
+    times, angles = np.asarray(prescribed.times), np.concatenate(parts, axis=1)
+    if prescribed.blend == "spline" and len(times) > 1:
+        return spline(times, angles, "clamped")
+    return shaped(times, angles, "quintic")
