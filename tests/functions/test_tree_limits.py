@@ -2,12 +2,15 @@
 conservation say; how far a gecko swings its tail to roll over.
 """
 
+import re
+
 import numpy as np
 import pytest
 
 import serpentail as st
-from serpentail.model.weight import weight_of
+from serpentail.model.weight import total_mass, weight_of
 from serpentail_codegen.scene.parse import parse_scene
+from serpentail_scene.source import tables_of
 from tests.functions.test_trees import FORWARD
 from tests.references.metrics import (
     block_error,
@@ -18,6 +21,7 @@ from tests.references.metrics import (
 from tests.support import own_tails, zoo
 from tests.support.models import folder_of
 from tests.support.rows import row
+from tests.support.scenes import SCENES
 
 FEW = ["mass_matrix", "bias_force", "forward_dynamics"]
 RUNS = ["forward_dynamics", "energy", "momentum", "tail_points", "rollout"]
@@ -181,6 +185,43 @@ def test_a_limb_without_mass_changes_nothing():
     tau[2:] = 0
     v_dot = alone.forward_dynamics(q[:9], v[:8], tau[:2])
     assert block_error(tree.forward_dynamics(q, v, tau)[:8], v_dot) < 1e-9
+
+
+def test_a_flight_with_prescribed_legs_keeps_its_books(tmp_path):
+    """Energy, momentum, the velocity of the COM; wrong schedules, and what does not follow yet."""
+    leg = tables_of(SCENES / "rat_legs.toml")["chain"]["hind"] | {"drive": "prescribed"}
+    rat = st.build("rat_legs", chain={"hind": leg}, targets=["c"])
+    start = rat.state(height=1, bend=[0.1, -0.2], spin=[0.5, -1, 2], bend_rate=[1, 2])
+    move = {"at": "50 ms", "duration": "80 ms", "hind": [-0.6, 0.9, -0.4]}
+    legs = st.Prescribed.moves({"hind": [0.3, -0.5, 0.2]}, [move])
+    run = st.simulate(rat, start, t_span=0.2, prescribed=legs, rtol=1e-10)
+    assert run.info["imbalance"]["relative"] < 1e-8
+    assert max(abs(each) for each in run.info["work_J"].values()) > 1e-5
+    assert np.ptp(run.angular_momentum, axis=0).max() < 1e-7 * np.abs(run.angular_momentum).max()
+    velocity = rat.center_of_mass(run.q, run.v, *run.given)[1]
+    np.testing.assert_allclose(
+        run.linear_momentum, total_mass(rat.parameters) * velocity, atol=1e-14
+    )
+    assert (st.Trajectory.load(run.save(tmp_path / "run")).given[0] == run.given[0]).all()
+    table, moves = {"hind": [0, 0, 0]}, st.Prescribed.moves
+    both = np.array([start.q] * 2), np.array([start.v] * 2), 0.1
+    wrong = {
+        "blend": lambda: st.Prescribed([0, 1], {"hind": np.eye(3)[:2]}, "linear"),
+        "moves[0].rate": lambda: moves(table, [move | {"rate": 3}]),
+        "moves[0].hind": lambda: moves(table, [move | {"hind": [1]}]),
+        "moves[1].at": lambda: moves(table, [move, move]),
+        "moves[0]: value": lambda: moves(table, [{"at": 0}]),
+        "fore": lambda: st.simulate(rat, start, prescribed=moves(table | {"fore": [0]})),
+        "hind_right": lambda: st.simulate(rat, start, prescribed=moves({"hind": [0]})),
+        "prescribed: value None": lambda: st.simulate(rat, start),
+        "q0": lambda: st.simulate(rat, *both, prescribed=legs),
+        "step": lambda: rat.step(start.q, start.v, [0, 0], 1e-3),
+        "export": lambda: st.export(rat, "mjcf", tmp_path / "rat.xml"),
+        "Pfl": lambda: st.simulate(rat, start, prescribed=legs, controller=st.Pfl(rat, run)),
+    }
+    for field, call in wrong.items():
+        with row(field), pytest.raises(st.SerpentailError, match=re.escape(field)):
+            call()
 
 
 # ---- the gecko -----------------------------------------------------------------------------------

@@ -41,8 +41,11 @@ def test_wrong_chains_are_refused():
         ("chain.a.joints", [BONE], {"a": PLAIN | {"joints": [BONE]}}),
         ("chain.a.drive", "prescribe", {"a": PLAIN | {"drive": "prescribe"}}),
         ("chain.a.drive", "prescribed", {"a": limb(BONE | GIVEN, BONE | {"name": "b"})}),
-        ("chain.a.drive", "prescribed", {"a": limb(BONE | {"damping": 1}) | GIVEN}),
-        ("functions", "pfl", {"a": PLAIN | GIVEN}),
+        (
+            "chain.a.drive",
+            "prescribed",
+            {"a": limb(BONE | {"damping": 0}, BONE | {"name": "b"}) | GIVEN},
+        ),
         ("chain.a.damping", -1, {"a": PLAIN | {"damping": -1}}),
         ("chain.tail", "tail", {"tail": PLAIN}),
         ("chain.torso", "torso", {"torso": PLAIN}),
@@ -62,6 +65,8 @@ def test_wrong_chains_are_refused():
     ):
         with row(place, found):
             assert (place, found) in problems(chain=chain)
+    moved = {"chain": {"a": PLAIN | GIVEN}, "functions": ["pfl", "mass_matrix"]}
+    assert ("functions", "pfl") in problems(**moved)
     assert (
         len(parse_scene(GECKO | {"chain": {f"c{k}": PLAIN for k in range(40)}}, "x").chains) == 40
     )
