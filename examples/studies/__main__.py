@@ -4,6 +4,7 @@ righting        righting in the air from many random starts, as the paper plans 
 contact         motions on the ground (Sects. 4, 4.4): films, plots and a table
 landing         kicks that the tail rights onto the feet, planned and passive
 leaps           jumps that are made for a soft landing: 20 bodies, 30 tails
+ground          friction and stiffness of the ground from one landing: 60 landings
 morphology      plans of righting for tails of many shapes, from many tumbles: 20400
 replanning      bodies unlike the planned one: the plan's torques, PFL, predictive control
 pushed          hard pushes in flight: predictive control, and new plans where its flags ask
@@ -33,7 +34,7 @@ OPTIONS = {
     },
     "air": {"tumbles": (front.count, 1000, "tumbling starts")},
 }
-NAMES = ("contact", "landing", "leaps", *OPTIONS)
+NAMES = ("contact", "landing", "leaps", "ground", *OPTIONS)
 
 
 def main(name: str, folder, options: dict) -> int | None:
