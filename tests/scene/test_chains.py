@@ -180,9 +180,8 @@ def test_what_trees_lack_is_refused():
         "contacts": {"contacts": ["feet"]},
         "base": {"base": "fixed"},
         "baked": {"baked": True},
-        "plan": {"plan": {"duration": 1.0}},
         "identify": {"identify": {"markers": "x.csv"}},
-        "functions": {"functions": ["airborne_rates"]},
+        "functions": {"functions": ["tail_point_jacobians"]},
         "parameters.hind_foo": {"parameters": {"hind_foo": 1}},
     }.items():
         with row(place):
