@@ -102,25 +102,21 @@ def net_torques(draft: Draft, state: State, tau: Array) -> Array:
 
 def add_elastic_energy(draft: Draft, state: State, potential: Ref) -> None:
     """Add the energy that springs and stops store."""
-    for chain in each_chain(draft):
-        own_state = state.on(chain)
-        for step in (ENERGIES[name] for name in chain.passive if name in ENERGIES):
-            with draft.loop("i", chain.segments) as i:
-                own = passive_parameters(draft, step, partial(chain.of_chain, i=i))
-                draft.step(
-                    draft.of_segment(step),
-                    {"angles": own_state.angles(i)},
-                    own,
-                    potential_=potential,
-                )
+    _add_energies(draft, state, ENERGIES, potential_=potential)
 
 
 def add_rotor_energy(draft: Draft, state: State, kinetic: Ref) -> None:
     """Add the kinetic energy of rotors."""
+    _add_energies(draft, state, {"rotor": passive.rotor_energy}, kinetic_=kinetic)
+
+
+def _add_energies(
+    draft: Draft, state: State, steps: dict[str, StepFunction], **energy: Ref
+) -> None:
     for chain in each_chain(draft):
-        if "rotor" in chain.passive:
+        own = state.on(chain)
+        for step in (steps[name] for name in chain.passive if name in steps):
             with draft.loop("i", chain.segments) as i:
-                place = partial(chain.of_chain, i=i)
-                own = passive_parameters(draft, passive.rotor_energy, place)
-                rates = {"rates": state.on(chain).rates(i)}
-                draft.step(draft.of_segment(passive.rotor_energy), rates, own, kinetic_=kinetic)
+                parameters = passive_parameters(draft, step, partial(chain.of_chain, i=i))
+                reads = Vectors({"angles": own.angles(i), "rates": own.rates(i)})
+                draft.step(draft.of_segment(step), reads, parameters, **energy)

@@ -25,13 +25,8 @@ from ..sweeps.wrenches import core_bias
 from ..tail import Tail
 from .equations import CONSERVED
 
-QUATERNION = slice(0, 4)  # in x
+QUATERNION = slice(0, 4)  # in x, before the tail's coordinates
 TURN = 3  # numbers of omega, of a moment
-
-
-def at_coordinates(tail: Tail) -> int:
-    """Position of the tail's coordinates in x."""
-    return QUATERNION.stop
 
 
 def at_rates(tail: Tail) -> int:
@@ -84,7 +79,7 @@ def assemble_rates(draft: Draft, arrays: dict[str, Array]) -> Balance:
         draft.array("v", tail.nv),
         draft.array("v_dot", tail.nv),
     )
-    draft.copy(tail.all_q(q), x.part(at_coordinates(tail), nt))
+    draft.copy(tail.all_q(q), x.part(QUATERNION.stop, nt))
     draft.copy(tail.all_v(v), x.part(at_rates(tail), nt))
     quaternion = draft.array("quaternion", 4)
     draft.copy(quaternion[0], block(x, QUATERNION))
@@ -124,7 +119,7 @@ def assemble_rates(draft: Draft, arrays: dict[str, Array]) -> Balance:
     y, second = arrays["y"], at_rates(tail)
     reads = {"quaternion": quaternion[0], "turn": block(v, OMEGA)}
     draft.step(rotations.turned_quaternion, reads, rate=block(y, QUATERNION))
-    draft.copy(y.part(at_coordinates(tail), nt), tail.all_v(v))
+    draft.copy(y.part(QUATERNION.stop, nt), tail.all_v(v))
     draft.copy(y.part(second, nt), tail.all_v(v_dot))
     draft.copy(y.part(tail.airborne_state, TURN), block(v, OMEGA))
     pull = drift_rate(draft, quaternion, v, v_dot, y) if tail.widths else None

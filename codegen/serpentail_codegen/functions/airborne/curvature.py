@@ -22,7 +22,6 @@ from .balance import (
     TURN,
     Balance,
     assemble_rates,
-    at_coordinates,
     at_drift,
     at_rates,
 )
@@ -127,7 +126,7 @@ def store_state(draft: Draft, slopes: AirborneSlopes, found: Curvatures, H: Arra
     coordinate and anything, then those of coordinates alone.
     """
     tail, size, nt = draft.tail, draft.tail.airborne_arguments, draft.tail.nt
-    count, first = tail.airborne_state, at_coordinates(tail)
+    count, first = tail.airborne_state, QUATERNION.stop
     both = summed(draft, "both", (slopes.d_v, found.by_v, 0))
     for lane, at, some in placed(tail):
         with draft.loop("k", some) as k:

@@ -19,7 +19,6 @@ from .balance import (
     TURN,
     Balance,
     assemble_rates,
-    at_coordinates,
     at_drift,
     at_rates,
     turn_and_drift,
@@ -54,7 +53,7 @@ def placed(tail: Tail) -> tuple[tuple[int, int, int], ...]:
     Coordinates come first, because only they move momenta at fixed velocities.
     """
     moved = tail.airborne_state - QUATERNION.stop
-    return (0, at_coordinates(tail), moved), (moved, QUATERNION.start, QUATERNION.stop)
+    return (0, QUATERNION.stop, moved), (moved, QUATERNION.start, QUATERNION.stop)
 
 
 def store_slopes(draft: Draft, b: Balance, conserved: Array) -> AirborneSlopes:
@@ -151,7 +150,7 @@ def store_jacobian(draft: Draft, b: Balance, slopes: AirborneSlopes, J: Array) -
             for lane, at, some in placed(tail):
                 draft.copy(J.part((r + row) * size + at, some), source.lane(r + first, lane, some))
     with draft.loop("k", nt) as k:
-        draft.fill(J.part((k + at_coordinates(tail)) * size + k + second, 1), 1)
+        draft.fill(J.part((k + QUATERNION.stop) * size + k + second, 1), 1)
         to = J.part((k + second) * size + count, nt)
         draft.copy(to, slopes.by_torque.lane(k + TORSO_NV, 0, nt))
     with draft.loop("row", TORSO_NV if tail.widths else 0) as r:

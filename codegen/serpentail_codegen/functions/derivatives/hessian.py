@@ -1,8 +1,5 @@
 """Second derivatives: the Hessian of lambda^T (H v_dot + C)."""
 
-from collections.abc import Mapping
-from types import MappingProxyType
-
 from serpentail_scene.layout import OMEGA, QUATERNION, TORSO_NV, VELOCITY
 
 from ...autodiff.forward import Lanes, tangent_program, tangents_together
@@ -11,7 +8,7 @@ from ...ir.program import Array, Ref, padded
 from ...mechanics import rotation_derivatives as turns
 from ...mechanics import rotations
 from ..draft import Draft
-from ..function import Function, assemble
+from ..function import assemble
 from ..layout import block
 from ..scope import Vectors
 from ..tail import Tail
@@ -44,7 +41,7 @@ def assemble_inverse_dynamics_hessian(draft: Draft, arrays: dict[str, Array]) ->
     d_q, d_v = of_q.tangents(draft), of_v.tangents(draft)
     given |= d_q | {"dv_v": d_v["d_v"]}
     wanted = (of_q, BY_Q), (of_v, BY_V)
-    by_q, by_v = tangents_of_gradient(draft, VIRTUAL_POWER, *wanted, given, gradient)
+    by_q, by_v = tangents_of_gradient(draft, *wanted, given, gradient)
     blocks = HessianBlocks(draft, of_q, of_v, arrays)
     blocks.clear()
     blocks.of_motion(by_q["q"], by_q["v"], by_v["v"])
@@ -107,19 +104,18 @@ def split_directions(tail: Tail) -> tuple[Directions, Directions]:
 
 def tangents_of_gradient(
     draft: Draft,
-    function: Function,
     by_q: Wanted,
     by_v: Wanted,
     arguments: dict[str, Array],
-    gradients: Mapping[str, Array] = MappingProxyType({}),
+    gradients: dict[str, Array],
 ) -> tuple[dict[str, Array], dict[str, Array]]:
     """Return the tangents of the wanted gradients of ``power``, along coordinates and along
     velocities, as wide rows, and store some of the gradients.
 
-    Arguments: those of the function, the directions ``d_q`` and ``dv_v``, and ``b_power``, the
+    Arguments: those of VIRTUAL_POWER, the directions ``d_q`` and ``dv_v``, and ``b_power``, the
     weight of the power.
     """
-    sizes = {a.name: a.length(draft.tail) for a in function.inputs}
+    sizes = {a.name: a.length(draft.tail) for a in VIRTUAL_POWER.inputs}
     kept = {f"b_{name}": array for name, array in gradients.items()}
     outputs: dict[str, Array] = {}
     lanes, found = [], []
@@ -133,7 +129,7 @@ def tangents_of_gradient(
         outputs |= {f"{prefix}_b_{name}": array for name, array in rows.items()}
         found.append(rows)
 
-    inner = adjoint_program(assemble(function, draft.tail), by_q[1], ("power",))
+    inner = adjoint_program(assemble(VIRTUAL_POWER, draft.tail), by_q[1], ("power",))
     draft.call(tangents_together(inner, lanes, kept), **arguments, **outputs, **kept)
     return found[1], found[0]
 

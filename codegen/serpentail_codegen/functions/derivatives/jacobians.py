@@ -224,19 +224,23 @@ def power_gradient(
     return by["b_a"][0]
 
 
+def response(draft: Draft, factored: FactoredDynamics, weights: Array) -> Array:
+    """Return mu = H^-1 lambda: the weights lambda of v_dot are a load at B and torques."""
+    mu = draft.array("response", draft.tail.nv)
+    pull, p_dot = draft.vector("pull", 3), block(weights, VELOCITY)
+    draft.step(torso.torso_velocity, {"R": factored.R, "p_dot": p_dot}, u=pull)
+    load = {"load_force": pull, "load_moment": block(weights, OMEGA)}
+    factored.solve(weightless(draft, lambda k: draft.tail.coordinate_v(weights, k), **load), mu)
+    return mu
+
+
 def assemble_forward_dynamics_vjp(draft: Draft, arrays: dict[str, Array]) -> None:
     """lambda^T times the Jacobian of v_dot: mu = H^-1 lambda, then minus the gradient of mu^T (H
     v_dot + C).
     """
-    tail, multiplier = draft.tail, arrays["multiplier"]
-    v_dot, mu = draft.array("acceleration", tail.nv), draft.array("response", tail.nv)
+    tail, v_dot = draft.tail, draft.array("acceleration", draft.tail.nv)
     factored = assemble_forward_dynamics(draft, arrays | {"v_dot": v_dot})
-
-    # mu = H^-1 lambda: the multiplier is a load at B and torques
-    pull, p_dot = draft.vector("pull", 3), block(multiplier, VELOCITY)
-    draft.step(torso.torso_velocity, {"R": factored.R, "p_dot": p_dot}, u=pull)
-    load = {"load_force": pull, "load_moment": block(multiplier, OMEGA)}
-    factored.solve(weightless(draft, lambda k: tail.coordinate_v(multiplier, k), **load), mu)
+    mu = response(draft, factored, arrays["multiplier"])
 
     # minus the gradient of mu^T (H v_dot + C)
     axes = torso_axes(draft, arrays["q"], v_dot, mu, factored.R)

@@ -6,13 +6,13 @@ v_dot + C - J^T f) at fixed v_dot and mu. P has no solves, so it is differentiat
 
 from dataclasses import replace
 
-from serpentail_scene.layout import OMEGA, VELOCITY
+from serpentail_scene.layout import OMEGA
 from serpentail_scene.signatures.arguments import BRISTLES, LEGS, MULTIPLIER, V_DOT, Argument, Q, V
 from serpentail_scene.signatures.gradients import BRANCHES
 
 from ...autodiff.reverse import adjoint_program
 from ...ir.program import Array
-from ...mechanics import contact, rotations, torso
+from ...mechanics import contact, rotations
 from ...mechanics import rotation_derivatives as turns
 from ..contact import contact_load, gather_contact_loads, gather_points, press
 from ..draft import Draft
@@ -24,7 +24,7 @@ from ..layout import block
 from ..sweeps.pieces import attitude
 from ..tail import struct_parameters
 from .differentiated import POWER, U_VIRTUAL, A, assemble_virtual_power
-from .jacobians import in_tangent_space, weightless, with_unit_quaternion
+from .jacobians import in_tangent_space, response, with_unit_quaternion
 from .torso_axes import torso_axes
 
 SLIPS = Argument("slips", ("bristles",), "weights of the bristles' rates")
@@ -103,7 +103,7 @@ def gathered(draft: Draft, gradient: Array, parts: dict[str, Array]) -> None:
 def assemble_rates_vjp(draft: Draft, arrays: dict[str, Array]) -> None:
     """Gradient of weights^T (v_dot, rates of the bristles)."""
     tail, weights, q = draft.tail, arrays["weights"], with_unit_quaternion(draft, arrays["q"])
-    v_dot, mu = draft.array("acceleration", tail.nv), draft.array("response", tail.nv)
+    v_dot = draft.array("acceleration", tail.nv)
     given = arrays | {"q": q, "v_dot": v_dot}
     if tail.contacts:
         given["forces"] = draft.array("forces", 3 * tail.points)
@@ -115,12 +115,7 @@ def assemble_rates_vjp(draft: Draft, arrays: dict[str, Array]) -> None:
         factored.solve(factored.loads(load, torques), v_dot)
     else:
         factored = assemble_forward_dynamics(draft, given)
-
-    # mu = H^-1 lambda: the weights are a load at B and torques
-    pull = draft.vector("pull", 3)
-    draft.step(torso.torso_velocity, {"R": factored.R, "p_dot": block(weights, VELOCITY)}, u=pull)
-    pulls = {"load_force": pull, "load_moment": block(weights, OMEGA)}
-    factored.solve(weightless(draft, lambda k: tail.coordinate_v(weights, k), **pulls), mu)
+    mu = response(draft, factored, weights)
 
     # minus the gradient of P; a and u are constant in the world while the torso turns
     axes = torso_axes(draft, q, v_dot, mu, factored.R)

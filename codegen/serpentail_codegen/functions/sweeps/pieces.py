@@ -6,7 +6,7 @@ updated in place.
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 
 from serpentail_scene.keys import LIMBS
 
@@ -67,29 +67,18 @@ def each_segment(
         draft.stretch = None
 
 
-def pieces_of(
-    draft: Draft, stretch: Stretch, i: Index, downward: bool = False
-) -> AbstractContextManager[Index]:
+@contextmanager
+def pieces_of(draft: Draft, stretch: Stretch, i: Index, downward: bool = False) -> Iterator[Index]:
     """Open a loop over the pieces of segment i; yields the number of the piece."""
-    return _numbered(
-        draft, stretch.pieces, stretch.first_piece - stretch.pieces * stretch.first, i, downward
-    )
-
-
-def points_of(
-    draft: Draft, stretch: Stretch, i: Index, downward: bool = False
-) -> AbstractContextManager[Index]:
-    """Open a loop over the tail points of segment i; yields the number of points before each."""
-    return _numbered(
-        draft, stretch.points, stretch.first_point - stretch.points * stretch.first, i, downward
-    )
+    with draft.loop("j", stretch.pieces, downward) as j:
+        yield stretch.pieces * i + j + stretch.pieces_before(0)
 
 
 @contextmanager
-def _numbered(draft: Draft, count: int, first: int, i: Index, downward: bool) -> Iterator[Index]:
-    """Open a loop over a number of items of each segment; yields their number along the tail."""
-    with draft.loop("j", count, downward) as j:
-        yield count * i + j + first
+def points_of(draft: Draft, stretch: Stretch, i: Index, downward: bool = False) -> Iterator[Index]:
+    """Open a loop over the tail points of segment i; yields the number of points before each."""
+    with draft.loop("j", stretch.points, downward) as j:
+        yield stretch.points * i + j + stretch.points_before(0)
 
 
 def each_piece(draft: Draft, downward: bool = False) -> Iterator[tuple[Index, Index]]:
