@@ -167,15 +167,9 @@ class Reach:
         """Part of a segment's turn at each piece."""
         return 1.0 if self.tail.kind == "articulated" else 1 / self.tail.links
 
-    @property
-    def mount(self) -> str:
-        """Name of the parameter for the mount."""
-        return name_in(self.tail.owner, "tail_mount")
-
-    @property
-    def length(self) -> str:
-        """Name of the parameter for the length."""
-        return name_in(self.tail.owner, "tail_length")
+    def named(self, parameter: str) -> str:
+        """Return the name of one of its parameters."""
+        return name_in(self.tail.owner, parameter)
 
     @property
     def bodies(self) -> list[int]:
