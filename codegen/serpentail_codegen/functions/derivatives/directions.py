@@ -6,7 +6,7 @@ body axes, tail coordinates. The columns of such a matrix are those of a velocit
 
 from dataclasses import dataclass
 
-from serpentail_scene.layout import OMEGA, PER_SEGMENT, QUATERNION, VELOCITY
+from serpentail_scene.layout import OMEGA, PER_SEGMENT, POSITION, QUATERNION, VELOCITY
 
 from ...ir.program import Array, Index, Loop, Ref
 from ...mechanics import rotations
@@ -134,3 +134,13 @@ class Directions:
                 draft.copy(of_q.part(column, n), source.lane(r, self.of_q(i), n))
                 if of_v:
                     draft.copy(of_v.part(column, n), source.lane(r, self.of_v(i), n))
+
+
+def in_tangent_space(draft: Draft, q: Array, gradient: Array, dq: Array) -> None:
+    """Turn a gradient with respect to the numbers of q into one with respect to the directions of a
+    velocity.
+    """
+    draft.copy(block(dq, POSITION), block(gradient, POSITION))
+    reads = {"quaternion": block(q, QUATERNION), "gradient": block(gradient, QUATERNION)}
+    draft.step(rotations.turn_gradient, reads, turn=block(dq, OMEGA))
+    draft.copy(draft.tail.all_v(dq), draft.tail.all_q(gradient))

@@ -23,7 +23,7 @@ from ..sweeps.pieces import attitude
 from ..tail import Tail
 from .by_segments import derivatives_by_segments
 from .differentiated import CORE, FUNCTIONS, VIRTUAL_POWER
-from .directions import Directions
+from .directions import Directions, in_tangent_space
 from .torso_axes import TorsoAxes, acceleration_at, torso_axes, turned_back
 
 # ---- Jacobians -----------------------------------------------------------------------------------
@@ -251,16 +251,6 @@ def assemble_forward_dynamics_vjp(draft: Draft, arrays: dict[str, Array]) -> Non
 
 
 # ---- energy and momentum -------------------------------------------------------------------------
-
-
-def in_tangent_space(draft: Draft, q: Array, gradient: Array, dq: Array) -> None:
-    """Turn a gradient with respect to the numbers of q into one with respect to the directions of a
-    velocity.
-    """
-    draft.copy(block(dq, POSITION), block(gradient, POSITION))
-    reads = {"quaternion": block(q, QUATERNION), "gradient": block(gradient, QUATERNION)}
-    draft.step(rotations.turn_gradient, reads, turn=block(dq, OMEGA))
-    draft.copy(draft.tail.all_v(dq), draft.tail.all_q(gradient))
 
 
 def assemble_energy_derivatives(draft: Draft, arrays: dict[str, Array]) -> None:

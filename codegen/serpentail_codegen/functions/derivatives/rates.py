@@ -24,7 +24,8 @@ from ..layout import block
 from ..sweeps.pieces import attitude
 from ..tail import struct_parameters
 from .differentiated import POWER, U_VIRTUAL, A, assemble_virtual_power
-from .jacobians import in_tangent_space, response, with_unit_quaternion
+from .directions import in_tangent_space
+from .jacobians import response, with_unit_quaternion
 from .torso_axes import torso_axes
 
 SLIPS = Argument("slips", ("bristles",), "weights of the bristles' rates")
