@@ -8,6 +8,9 @@ from . import program as ir
 from .builder import narrowed
 from .step import Step
 
+Around = tuple[ir.Loop | ir.When, ...]  # a statement
+More = Callable[[ir.Statement, Around, set[str]], set[str]]
+
 
 def overlap(ref: ir.Ref, other: ir.Ref) -> bool:
     """Tell if two references may share a number."""
@@ -100,44 +103,33 @@ def rewritten(body: ir.Body, rewrite: Callable[[ir.Statement], Iterable[ir.State
     return tuple(out)
 
 
-def _fixpoint(
-    body: ir.Body, start: Collection[str], more: Callable[[ir.Statement, set[str]], set[str]]
-) -> set[str]:
+def _fixpoint(body: ir.Body, start: Collection[str], more: More) -> set[str]:
     """Return names with what each statement adds to them, until none adds any."""
     reached, before = set(start), -1
     while before < len(reached):
         before = len(reached)
-        for statement, _ in ir.statements(body):
-            reached |= more(statement, reached)
+        for statement, around in ir.statements(body):
+            reached |= more(statement, around, reached)
     return reached
 
 
-def forward_slice(body: ir.Body, start: Collection[str]) -> set[str]:
-    """Return the arrays that may depend on the arrays ``start``, by name."""
+def forward_slice(body: ir.Body, start: Collection[str], decided: bool = False) -> set[str]:
+    """Return the arrays that may depend on the arrays ``start``, by name; ``decided``: also those
+    that conditions on these decide about.
+    """
 
-    def more(statement: ir.Statement, reached: set[str]) -> set[str]:
-        return names(writes(statement)) if names(reads(statement)) & reached else set()
+    def more(statement: ir.Statement, around: Around, reached: set[str]) -> set[str]:
+        deciding = [outer.scalar for outer in around if decided and isinstance(outer, ir.When)]
+        moves = names((*reads(statement), *deciding)) & reached
+        return names(writes(statement)) if moves else set()
 
     return _fixpoint(body, start, more)
-
-
-def decided_slice(body: ir.Body, start: Collection[str]) -> set[str]:
-    """Return what ``forward_slice`` does, and the arrays that conditions on these decide about."""
-    reached, before = forward_slice(body, start), -1
-    while before < len(reached):
-        before = len(reached)
-        for statement, around in ir.statements(body):
-            conditions = [outer.scalar for outer in around if isinstance(outer, ir.When)]
-            if names(conditions) & reached:
-                reached |= names(writes(statement))
-        reached = forward_slice(body, reached)
-    return reached
 
 
 def backward_slice(body: ir.Body, end: Collection[str]) -> set[str]:
     """Return the arrays that the arrays ``end`` may depend on, by name."""
 
-    def more(statement: ir.Statement, reached: set[str]) -> set[str]:
+    def more(statement: ir.Statement, around: Around, reached: set[str]) -> set[str]:
         targets = statement.protects if isinstance(statement, ir.Guard) else writes(statement)
         if not names(targets) & reached:
             return set()

@@ -7,7 +7,7 @@ is stored in the lanes where it holds.
 
 from dataclasses import replace
 
-from ..ir.dataflow import decided_slice, inlined, on_arrays
+from ..ir.dataflow import forward_slice, inlined, on_arrays
 from ..ir.interpret import unroll
 from ..ir.program import Apply, Array, Guard, Program
 from ..ir.step import Step, compacted
@@ -17,7 +17,7 @@ def batched(program: Program, states: int) -> Program:
     """Return a program over so many states, the lanes of its inputs and outputs."""
     program = inlined(program)
     arguments = {a.name for a in program.arrays if a.role in ("input", "output")}
-    wide = decided_slice(program.body, arguments)
+    wide = forward_slice(program.body, arguments, decided=True)
     array = {a.name: replace(a, lanes=states) if a.name in wide else a for a in program.arrays}
     body = on_arrays(program.body, array)
     return replace(program, name=f"{program.name}_rows", arrays=tuple(array.values()), body=body)
