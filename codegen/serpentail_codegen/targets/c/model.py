@@ -10,7 +10,7 @@ from ...scene.scene import Scene
 from ..target import SEAL
 from ..templating import render
 from .casadi_external.functions import casadi_context
-from .form import PrintedFunction
+from .form import PrintedFunction, values
 from .records import layouts
 from .routine import dialect
 from .simulation import simulation_context
@@ -19,7 +19,6 @@ from .views import (
     FunctionView,
     callee_view,
     callees_of,
-    parameter_views,
     step_views,
 )
 
@@ -108,7 +107,8 @@ def model_context(scene: Scene, tail: Tail) -> dict[str, Any]:
         "angles": (*ANGLES[scene.coordinates], *HINGES * (tail.hinges > 0)),
         "polar": tail.polar,
         "groups": ", ".join(f"{count} of the {name}" for name, count in tail.groups.items()),
-        "parameters": parameter_views(scene),
+        "parameters": struct_parameters(scene),
+        "defaults": {p.name: values(scene, p.name) for p in struct_parameters(scene)},
         "parameter_count": sum(p.size for p in struct_parameters(scene)),
         # the type of all numbers, its limits and its functions
         "real": scene.real,

@@ -7,12 +7,11 @@ from typing import Any, Protocol
 
 from serpentail_scene.signatures.arguments import FACTORS, Argument
 
-from ...functions.tail import Tail, struct_parameters
+from ...functions.tail import Tail
 from ...ir.program import Program
 from ...ir.tape import operation_count
 from ...passes.fuse_steps import AFTER
-from ...scene.scene import Scene
-from .form import PrintedFunction, values
+from .form import PrintedFunction
 from .routine import CFunction, Routine, routine_arguments, routine_lines
 
 # operations: smaller steps are always inlined; for others the compiler decides
@@ -99,20 +98,6 @@ def wrapped(head: str, arguments: list[str]) -> str:
         else:
             lines[-1] += f", {argument}"
     return "\n".join(lines) + ")"
-
-
-def parameter_views(scene: Scene) -> list[dict[str, Any]]:
-    """Return the fields of the parameter struct."""
-    return [
-        {
-            "name": p.name,
-            "size": p.size,
-            "unit": p.unit,
-            "meaning": p.meaning,
-            "defaults": values(scene, p.name),
-        }
-        for p in struct_parameters(scene)
-    ]
 
 
 def step_views(printed: Sequence[HasBody], real: str, prefix: str) -> list[dict[str, Any]]:
