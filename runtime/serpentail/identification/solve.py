@@ -157,13 +157,12 @@ def _to_pin(unknowns: Unknowns, values: np.ndarray, step: np.ndarray) -> np.ndar
 
 def _longest(unknowns: Unknowns, values: np.ndarray, step: np.ndarray) -> float:
     """Return how much of a step leaves numbers above their bounds."""
-    most = 1.0
-    for each, least, value, change in zip(unknowns.each, unknowns.least, values, step, strict=True):
-        room = value - max(least, 0.0)
-        if least > -np.inf and change < 0 < room:
-            margin = 0.0 if room <= PINNED * each.size else MARGIN
-            most = min(most, (1 - margin) * room / -change)
-    return most
+    least = unknowns.least
+    room = values - np.maximum(least, 0)
+    falls = (least > -np.inf) & (step < 0) & (room > 0)
+    margin = np.where(room <= PINNED * unknowns.sizes, 0.0, MARGIN)
+    most = ((1 - margin) * room)[falls] / -step[falls]
+    return float(most.min(initial=1.0))
 
 
 def _line_search(
@@ -178,13 +177,11 @@ def _line_search(
     The weight of the defects' sizes is large enough for the step to go down (Nocedal and Wright,
     Eq. 18.36).
     """
-    # slope and value of the cost; sizes of the defects, over those of the steps
+    # slope of the cost; sizes of the defects, over those of the steps
     priors = unknowns.prior_rows(point.values)
     slope = -float(priors[:, -1] @ (priors[:, :-1] @ (step.shared / unknowns.sizes)))
-    cost = float((priors[:, -1] ** 2).sum())
     for each, local in zip(linear, step.local, strict=True):
         slope -= float(each.residual @ each.change(local, step.shared))
-        cost += float(each.residual @ each.residual)
     scales = [1 / np.maximum(np.abs(move).max(axis=0), 1e-12) for move in step.states]
     off = sum(
         float((np.abs(each.defects) * scale).sum())
@@ -192,7 +189,7 @@ def _line_search(
     )
     if off > 0:
         weight = max(weight, 2 * max(slope, 0.0) / off)
-    before = cost / 2 + weight * off
+    before = _merit(unknowns, point, weight, scales)
     expected = slope - weight * off
 
     # half as far, until cost and defects have fallen enough

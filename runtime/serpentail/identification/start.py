@@ -136,11 +136,10 @@ def _begin(placed: Placements, tracks: MarkerTracks) -> tuple[np.ndarray, np.nda
     body = world_points(placed, q[:1])[0]
 
     # on the torso alone if any frame allows it
-    use = tracks.seen & placed.on_torso
-    laid = np.array([off_line(body[markers], LINE) for markers in use])
-    if not laid.any():
-        use = tracks.seen
+    for use in (tracks.seen & placed.on_torso, tracks.seen):
         laid = np.array([off_line(body[markers], LINE) for markers in use])
+        if laid.any():
+            break
     for frame in np.flatnonzero(laid):
         markers = use[frame]
         q[frame, TORSO_Q] = _laid(body[markers], tracks.positions[frame, markers])
