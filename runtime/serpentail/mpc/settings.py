@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ..basics.checks import none_of, number, refusal, shown
+from ..basics.checks import none_of, number, refusal, shown, whole_number
 from ..basics.errors import PlanningError
 from ..model.model import Model
 from ..planning.goal import Bounds
@@ -96,7 +96,4 @@ def _number(name: str, value: Any, unit: str, **bounds: float) -> float:
 
 
 def _count(name: str, value: Any) -> int:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 1 <= value <= MOST:
-        needs = f"a whole number from 1 to {MOST}"
-        raise refusal(f"Mpc: {name}", value, needs, PlanningError)
-    return int(value)
+    return whole_number(f"Mpc: {name}", value, PlanningError, least=1, most=MOST)
