@@ -10,12 +10,11 @@ from .law import VALUE_LIMIT, Errors, law
 from .states import (
     Case,
     arguments,
-    called_functions,
     casadi_outputs,
+    functions_of,
     named,
     outputs,
     scaled,
-    state_functions,
 )
 
 
@@ -23,7 +22,7 @@ from .states import (
 def calls_repeat(model: Model, s: Case) -> Errors:
     """The same call gives the same bits, at once and after another call."""
     errors = {}
-    for name in called_functions(model):
+    for name in functions_of(model, airborne=True):
         first, second, _, last = (outputs(model, name, case) for case in (s, s, scaled(s, 0.5), s))
         errors[name] = differing_outputs(first, second) + differing_outputs(first, last)
     return errors
@@ -36,7 +35,7 @@ def batches_are_singles(model: Model, s: Case) -> Errors:
     """
     cases = [scaled(s, 1 - k / 16) for k in range(9)]
     errors = {}
-    for name in called_functions(model):
+    for name in functions_of(model, airborne=True):
         batches = zip(*(arguments(model, name, case) for case in cases), strict=True)
         whole = named(model, name, model.kernel(name)(*map(np.stack, batches)))
         if model.profile == "fast" and model.batch_library.entry(name, len(cases)):
@@ -57,7 +56,7 @@ def casadi_functions_agree(model: Model, s: Case) -> Errors:
         name: differences(
             model, name, s, casadi_outputs(model, name, getattr(model.casadi, name), s)
         )
-        for name in state_functions(model)
+        for name in functions_of(model)
         if not is_derivative(model, name)
     }
 
@@ -66,7 +65,7 @@ def casadi_functions_agree(model: Model, s: Case) -> Errors:
 def casadi_externals_are_the_compiled_code(model: Model, s: Case) -> Errors:
     """casadi.external on the compiled C gives the bits of the model's own call."""
     errors = {}
-    for name in called_functions(model):
+    for name in functions_of(model, airborne=True):
         results = casadi_outputs(
             model, name, model.casadi.external(name), s, model.casadi.parameter_vector
         )

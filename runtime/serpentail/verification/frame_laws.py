@@ -24,7 +24,7 @@ from .errors import (
     worst,
 )
 from .law import VALUE_LIMIT, Errors, fastest, law, slope
-from .states import Case, at_origin, outputs, state_functions
+from .states import Case, at_origin, functions_of, outputs
 
 WORLD = ("mass_matrix_world", "bias_force_world")
 # results that depend on position and velocity of B
@@ -63,7 +63,7 @@ def pose_in_the_world_turns_all_alike(model: Model, s: Case) -> Errors:
     errors, other = {}, model
     if "gravity_vector" in model.parameters:  # it turns with the world
         other = model.with_parameters(gravity_vector=Z @ fall(model.parameters))
-    for name in state_functions(model):
+    for name in functions_of(model):
         axes = changed_axes(Z, Z if name in WORLD else np.eye(3), model.nv)
         expected = turned_outputs(model, outputs(model, name, s), axes, shift)
         errors[name] = differences(other, name, turned, expected.values())
@@ -93,7 +93,7 @@ def position_and_speed_of_the_torso_do_not_matter(model: Model, s: Case) -> Erro
     q, v = s.q.copy(), s.v.copy()
     q[POSITION] += 5.0
     v[VELOCITY] -= 3.0
-    names = [name for name in state_functions(model) if name not in PLACED]
+    names = [name for name in functions_of(model) if name not in PLACED]
     if "air_density" in model.parameters:  # which derivatives by it depend on
         names = [name for name in names if "parameter_derivatives" not in name]
     return same_bits(model, names, s, replace(s, q=q, v=v))
@@ -104,7 +104,7 @@ def quaternion_has_no_norm_and_no_sign(model: Model, s: Case) -> Errors:
     """The quaternion times -2 is the same attitude: the same results, bit for bit."""
     q = s.q.copy()
     q[QUATERNION] *= -2
-    return same_bits(model, state_functions(model), s, replace(s, q=q))
+    return same_bits(model, functions_of(model), s, replace(s, q=q))
 
 
 @law("tail_points", VALUE_LIMIT, only="articulated")

@@ -156,23 +156,16 @@ def scaled(s: Case, factor: float) -> Case:
 # Outputs
 
 
-def state_functions(model: Model) -> list[str]:
-    """Return the functions of a state alone; those of contact and implicit steps take more."""
-    return functions_of(model, "accelerations", *(field.name for field in fields(Case)))
+def functions_of(model: Model, airborne: bool = False) -> list[str]:
+    """Return the functions of a state alone, or of an airborne one, too.
 
-
-def called_functions(model: Model) -> list[str]:
-    """Return those, and functions of an airborne state."""
-    known = {*vars(Case), *(field.name for field in fields(Case))}
-    return functions_of(model, *known)
-
-
-def functions_of(model: Model, *known: str) -> list[str]:
-    """Return the functions that take exactly these arguments, but for those of simulations."""
+    Those of contact and of implicit steps take more arguments, and simulations have their own.
+    """
+    known = {"accelerations", *(field.name for field in fields(Case))}
+    known |= {*vars(Case)} if airborne else set()
     functions = model.manifest["functions"]
     names = [name for name in model.kernels if name not in in_group(SIMULATION)]
-    inputs = {name: {a["name"] for a in functions[name]["inputs"]} for name in names}
-    return [name for name in names if inputs[name] <= {*known}]
+    return [name for name in names if {a["name"] for a in functions[name]["inputs"]} <= known]
 
 
 def outputs(model: Model, name: str, state: Case) -> dict[str, np.ndarray]:
