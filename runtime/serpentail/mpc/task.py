@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from ..model.model import Model
-from ..planning.goal import Bounds, middle
+from ..planning.gains.riccati import ANGLE, NONE, RATE, TURN_RATE, most_torque
+from ..planning.goal import middle
 from ..planning.problem import PlanningProblem
 from ..planning.program.end import goal_matrix
 from ..planning.result.curve import Curve, fitted
@@ -15,12 +16,9 @@ from ..planning.result.plan import Plan
 from .kernel import FUNCTIONS, kernel
 from .settings import NEEDED, MpcSettings
 
-# errors at the end that weigh as much as a correction by the largest torque all the time
-TURN, TURN_RATE = 1e-3, 0.1  # rad, rad/s: of the torso
-ANGLE, RATE = 1e-2, 1.0  # rad, rad/s: of the tail
+TURN = 1e-3  # rad: weighs at the end as ANGLE, of the torso
 # distances from the target: beyond NEAR a tick takes another step, beyond MISS it has a flag
 NEAR, MISS = np.radians([0.5, 1.0]) / TURN
-NONE = 1e30  # no bound
 BLOCKS = ("torque", "attitude", "tail", "tail_rate")
 
 
@@ -42,7 +40,7 @@ def task_of(model: Model, plan: Plan, settings: MpcSettings) -> MpcTask:
     horizon = min(settings.horizon, duration)
     times, polynomials = polynomials_of(plan.curve)
     bounds = settings.bounds
-    most = _most_torque(plan, bounds)
+    most = most_torque(plan, bounds)
     arrays = {
         "times": times,
         "plan": polynomials,
@@ -98,14 +96,6 @@ def polynomials_of(curve: Curve) -> tuple[np.ndarray, np.ndarray]:
 def _steps(time: float, step: float) -> int:
     """Return the number of steps of at most this length (s) in a time (s)."""
     return int(np.ceil(time / step - 1e-9))
-
-
-def _most_torque(plan: Plan, bounds: Bounds) -> np.ndarray:
-    """Return the bounds of torques (2m,); without bounds, the largest torques of the plan."""
-    if bounds.torque is not None:
-        return np.asarray(bounds.torque, float)
-    used = np.abs(plan.trajectory.tau).max(axis=0)
-    return np.maximum(used, max(float(used.max()), 1e-12) / 10)
 
 
 def _limits(bound: np.ndarray | None, most: np.ndarray) -> np.ndarray:

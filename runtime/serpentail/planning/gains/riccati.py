@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from ...model.model import Model
-from ..goal import middle
+from ..goal import Bounds, middle
 from ..program.end import goal_matrix
 from ..result.curve import fitted
 from ..result.plan import Plan
@@ -41,6 +41,14 @@ def tables_of(model: Model, plan: Plan, period: float, knots: int) -> dict[str, 
     }
 
 
+def most_torque(plan: Plan, bounds: Bounds) -> np.ndarray:
+    """Return the bounds of torques (2m,); without bounds, the largest torques of the plan."""
+    if bounds.torque is not None:
+        return np.asarray(bounds.torque, float)
+    used = np.abs(plan.trajectory.tau).max(axis=0)
+    return np.maximum(used, max(float(used.max()), 1e-12) / 10)
+
+
 def _recursion(model: Model, plan: Plan, period: float) -> tuple[np.ndarray, ...]:
     """Return times (S,) s of steps, gains (S, 2m, n) and costs (S, n, n) of the error e there.
 
@@ -55,9 +63,7 @@ def _recursion(model: Model, plan: Plan, period: float) -> tuple[np.ndarray, ...
 
     # backwards: the least sum of squares from each step to the end
     problem, length = plan.problem, widths[k] / parts[k]
-    used = np.abs(plan.trajectory.tau).max(axis=0)
-    most = np.maximum(used, max(float(used.max()), 1e-12) / 10)
-    most = most if problem.bounds.torque is None else np.asarray(problem.bounds.torque, float)
+    most = most_torque(plan, problem.bounds)
     R, n = np.diag(1 / most**2) / plan.duration, F.shape[1]
     Q, P = np.zeros((n, n)), _end_cost(model, plan)
     Q[3 + nt : 3 + 2 * nt, 3 + nt : 3 + 2 * nt] = problem.smoothing**2 * R
