@@ -19,10 +19,10 @@ def near(found, expected, limit):
 
 def test_it_is_the_first_joint_s_wrench_of_pinocchio():
     pytest.importorskip("pinocchio")
-    from tests.references.pinocchio_chain import PinocchioChain
+    from tests.references.pinocchio_tree import chain
 
     for name, size in (("m1_n3", (1, 3)), ("m2_n2", (2, 2)), ("m3_n4", (3, 4))):
-        model, peer = zoo.model(name), PinocchioChain(TABLE_1, *size)
+        model, peer = zoo.model(name), chain(TABLE_1, *size)
         for q, v, v_dot, _ in zip(*random_states(size[0], 5, 20, "random"), strict=True):
             expected = peer.mount_wrench(q, v, v_dot)
             of_casadi = [x.full().ravel() for x in model.casadi.mount_wrench(q, v, v_dot)]

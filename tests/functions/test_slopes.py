@@ -27,11 +27,11 @@ def turned(q, v):
 
 def test_it_is_pinocchios():
     pytest.importorskip("pinocchio")
-    from tests.references.pinocchio_chain import PinocchioChain
+    from tests.references.pinocchio_tree import chain
 
     vector = (3.0, -5.0, 2.0)
     model = zoo.model("slope").with_parameters(gravity_vector=vector)
-    peer = PinocchioChain(TABLE_1 | {"gravity_vector": vector}, 1, 3)
+    peer = chain(TABLE_1 | {"gravity_vector": vector}, 1, 3)
     for q, v, v_dot, tau in zip(*random_states(1, 8, 20, "random"), strict=True):
         expected = peer.forward_dynamics(q, v, tau)
         for found in (model.forward_dynamics(q, v, tau), model.casadi.forward_dynamics(q, v, tau)):

@@ -48,7 +48,7 @@ POINTS = ("tail_points", "tail_point_jacobians")
 
 @dataclass(frozen=True)
 class Reference:
-    """Another derivation of one kind of tail: its class, what it computes, and if exactly."""
+    """Another derivation of one kind of tail: its maker, what it computes, and if exactly."""
 
     title: str
     module: str
@@ -86,9 +86,7 @@ def plain(model: st.Model) -> bool:
 
 
 REFERENCES = (
-    Reference(
-        "Pinocchio", "pinocchio_chain", "PinocchioChain", "articulated", (*COMPARED, *POINTS)
-    ),
+    Reference("Pinocchio", "pinocchio_tree", "chain", "articulated", (*COMPARED, *POINTS)),
     Reference("MuJoCo", "mujoco_chain", "MujocoChain", "articulated", (*COMPARED, *POINTS)),
     Reference("40 digits", "exact_chain", "ExactChain", "articulated", exact=True),
     Reference("40 digits", "exact_continuum", "ExactContinuum", "continuum", exact=True),
