@@ -28,11 +28,11 @@ def swing(**settings):
 
 @pytest.fixture(scope="module")
 def peer():
-    """The same tail by MuJoCo, whose torso is held."""
-    pytest.importorskip("mujoco")
-    from tests.references.mujoco_chain import MujocoChain
+    """The same tail by Pinocchio, whose torso is held."""
+    pytest.importorskip("pinocchio")
+    from tests.references import pinocchio_tree
 
-    return MujocoChain(TABLE_1, 2, 2)
+    return pinocchio_tree.chain(TABLE_1, 2, 2)
 
 
 def test_runs_are_those_of_another_integrator_and_derivation(peer):

@@ -54,19 +54,19 @@ def test_runs_get_what_motors_give_by_every_method():
 
 
 def test_rotors_are_armatures():
-    """MuJoCo has them at each of the three joints that a coordinate turns."""
-    pytest.importorskip("mujoco")
-    from tests.references.mujoco_chain import MujocoChain
+    """Pinocchio has them at each of the three joints that a coordinate turns."""
+    pytest.importorskip("pinocchio")
+    from tests.references import pinocchio_tree
 
-    peer, rotors = MujocoChain(TABLE_1, 1, 3), np.array(model().parameters["tail_rotor"])
-    peer.model.dof_armature[6:] = np.tile(rotors / 3, 3)
+    peer, rotors = pinocchio_tree.chain(TABLE_1, 1, 3), np.array(model().parameters["tail_rotor"])
+    peer.model.armature = np.concatenate([np.zeros(6), np.tile(rotors / 3, 3)])
     for q, v, v_dot, tau in zip(*random_states(1, 2, 20, "random"), strict=True):
         expected = peer.forward_dynamics(q, v, tau)
         for found in (model().forward_dynamics, model().casadi.forward_dynamics):
             assert block_error(np.array(found(q, v, tau)).ravel(), expected) < 1e-10
-        np.testing.assert_allclose(model().mass_matrix(q), peer.mass_matrix(q), atol=1e-15)
-        assert model().energy(q, v)[0] == pytest.approx(peer.energy(q, v)[0], rel=1e-13)
-        force = peer.mass_matrix(q) @ v_dot + peer.bias_force(q, v)
+        np.testing.assert_allclose(model().mass_matrix(q), H := peer.mass_matrix(q), atol=1e-15)
+        assert model().energy(q, v)[0] == pytest.approx(v @ H @ v / 2, rel=1e-13)
+        force = H @ v_dot + peer.bias_force(q, v)
         assert block_error(model().inverse_dynamics(q, v, v_dot), force) < 1e-11
 
 

@@ -1,7 +1,7 @@
 """`make verify`: the laws, and the model against other derivations of it, in one report.
 
-The others are the generator's interpreter, Pinocchio, MuJoCo, arithmetic of 40 digits and the same
-tail in other segments.
+The others are the generator's interpreter, Pinocchio, arithmetic of 40 digits and the same tail in
+other segments.
 """
 
 import json
@@ -87,7 +87,6 @@ def plain(model: st.Model) -> bool:
 
 REFERENCES = (
     Reference("Pinocchio", "pinocchio_tree", "chain", "articulated", (*COMPARED, *POINTS)),
-    Reference("MuJoCo", "mujoco_chain", "MujocoChain", "articulated", (*COMPARED, *POINTS)),
     Reference("40 digits", "exact_chain", "ExactChain", "articulated", exact=True),
     Reference("40 digits", "exact_continuum", "ExactContinuum", "continuum", exact=True),
 )
