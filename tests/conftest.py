@@ -42,6 +42,13 @@ def pytest_sessionstart(session):
     extension()
 
 
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    """A cache of a test's own, which is empty."""
+    monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
 def missing():
     """Return the libraries of extras that are not installed."""
     return [name for name in LIBRARIES if find_spec(name) is None]

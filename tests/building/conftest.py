@@ -1,4 +1,4 @@
-"""A cache of a test's own, and a generator that counts."""
+"""A generator that counts."""
 
 import shutil
 
@@ -7,12 +7,6 @@ import pytest
 from serpentail.building import generator
 from serpentail_codegen.scene.parse import load_scene
 from tests.support.models import folder_of
-
-
-@pytest.fixture
-def cache(tmp_path, monkeypatch):
-    monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path / "cache"))
-    return tmp_path / "cache"
 
 
 @pytest.fixture

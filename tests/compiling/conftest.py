@@ -34,10 +34,8 @@ def forbid_processes(monkeypatch):
 
 
 @pytest.fixture(autouse=True)
-def cache(tmp_path, monkeypatch):
+def usual_compiler(cache, monkeypatch):
     monkeypatch.delenv("CC", raising=False)
-    monkeypatch.setenv("SERPENTAIL_CACHE", str(tmp_path / "cache"))
-    return tmp_path / "cache"
 
 
 @pytest.fixture

@@ -10,17 +10,13 @@ from serpentail_codegen.functions.tail import Tail
 from serpentail_codegen.scene.variant import Shape
 from serpentail_codegen.targets.c.straight import straight_line
 from serpentail_scene.signatures.table import FIXED
+from tests.references.metrics import near
 from tests.support import zoo
 from tests.support.rows import row
 
 # on a fixed base, and the same tail on a torso that moves
 PAIRS = {"fixed": "m2_n2", "fixed_arcs": "arcs2", "fixed_mixed": "mixed"}
 PARTS = {"implicit_factor", "implicit_solve", "tracked_dynamics"}  # of pfl and implicit
-
-
-def near(found, expected, limit):
-    """Compare arrays with a limit of the largest entry."""
-    np.testing.assert_allclose(found, expected, rtol=0, atol=limit * np.abs(expected).max())
 
 
 @pytest.mark.parametrize(

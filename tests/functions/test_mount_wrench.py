@@ -5,16 +5,12 @@ import pytest
 
 import serpentail as st
 from serpentail_codegen.scene.parse import parse_scene
+from tests.references.metrics import near
 from tests.references.parameters import TABLE_1, random_states
 from tests.support import models, zoo
 from tests.support.rows import row
 
 STENCIL = (6 / 7, -15 / 56, 5 / 63, -1 / 56, 1 / 385, -1 / 5544)  # differences of order 12
-
-
-def near(found, expected, limit):
-    """Compare arrays with a limit of the largest entry."""
-    np.testing.assert_allclose(found, expected, rtol=0, atol=limit * np.abs(expected).max())
 
 
 def test_it_is_the_first_joint_s_wrench_of_pinocchio():

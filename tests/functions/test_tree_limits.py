@@ -34,15 +34,23 @@ def built(name="limit", **changes):
     return st.load(folder_of(parse_scene(tables, name)))
 
 
-def test_legs_without_mass_change_nothing():
+def test_legs_and_limbs_without_mass_change_nothing():
     link = {"links": 1, "length": 0.03, "mass": 1e-11, "link_inertia": [1e-16, 1e-17, 1e-16]}
     leg = zoo.CHAINS["leg"] | {"segments": [link]}
     leg = {key: x for key, x in leg.items() if key not in ("stiffness", "damping")}
-    tree, alone = built(chain={"leg": leg}), built()
-    q, v, _, tau = next(own_tails.states(tree.nq, 1))
-    tau[2:] = 0
-    v_dot = alone.forward_dynamics(q[:9], v[:8], tau[:2])
-    assert block_error(tree.forward_dynamics(q, v, tau)[:8], v_dot) < 1e-6
+    limb = zoo.LIMBS["leg"] | {"joints": [dict(each) for each in zoo.LIMBS["leg"]["joints"][1:]]}
+    for joint in limb["joints"]:
+        joint |= {"mass": 1e-14, "inertia": [1e-20, 1e-21, 1e-20]}
+        for key in ("radius", "stiffness", "rest", "stops", "stop_stiffness"):
+            joint.pop(key, None)
+    alone = built()
+    for chain, most in ((leg, 1e-6), (limb, 1e-9)):
+        tree = built(chain={"leg": chain})
+        q, v, _, tau = next(own_tails.states(tree.nq, 1))
+        tau[2:] = 0
+        v_dot = alone.forward_dynamics(q[:9], v[:8], tau[:2])
+        with row(chain):
+            assert block_error(tree.forward_dynamics(q, v, tau)[:8], v_dot) < most
 
 
 def test_it_does_not_matter_which_chain_is_the_tail():
@@ -174,19 +182,6 @@ def test_a_wheel_may_spin_in_the_body():
     assert (runs.q[2] == alone.q).all()
 
 
-def test_a_limb_without_mass_changes_nothing():
-    leg = zoo.LIMBS["leg"] | {"joints": [dict(each) for each in zoo.LIMBS["leg"]["joints"][1:]]}
-    for joint in leg["joints"]:
-        joint |= {"mass": 1e-14, "inertia": [1e-20, 1e-21, 1e-20]}
-        for key in ("radius", "stiffness", "rest", "stops", "stop_stiffness"):
-            joint.pop(key, None)
-    tree, alone = built(chain={"leg": leg}), built()
-    q, v, _, tau = next(own_tails.states(tree.nq, 1))
-    tau[2:] = 0
-    v_dot = alone.forward_dynamics(q[:9], v[:8], tau[:2])
-    assert block_error(tree.forward_dynamics(q, v, tau)[:8], v_dot) < 1e-9
-
-
 def test_a_flight_with_prescribed_legs_keeps_its_books(tmp_path):
     """Energy, momentum, the velocity of the COM; wrong schedules, and what does not follow yet."""
     leg = tables_of(SCENES / "rat_legs.toml")["chain"]["hind"] | {"drive": "prescribed"}
@@ -233,31 +228,23 @@ def gecko():
     return st.build("gecko_legs", functions=["+implicit"], targets=["c"])
 
 
-def test_a_pair_at_equal_angles_neither_yaws_nor_rolls(gecko):
-    q, v, tau = np.zeros(gecko.nq), np.zeros(gecko.nv), np.zeros(gecko.layout.nt)
-    q[3], q[7], v[6] = 1, 0.4, 3.0  # the tail turns upward alone
-    for pair in ("hind", "fore"):
-        for side in ("right", "left"):
-            chain = gecko.layout[f"{pair}_{side}"]
-            q[chain.q], v[chain.v], tau[chain.tau] = (0.3, -0.5), (2.0, -7.0), (1e-6, 3e-6)
-    v_dot = gecko.forward_dynamics(q, v, tau)
-    assert np.abs(v_dot[[0, 4, 5]]).max() < 1e-12 * np.abs(v_dot).max()
-    for pair in ("hind", "fore"):
-        right, left = (v_dot[gecko.layout[f"{pair}_{side}"].v] for side in ("right", "left"))
-        np.testing.assert_allclose(left, right, rtol=1e-11)
-
-
-def test_equal_legs_of_a_rat_neither_yaw_nor_roll():
+def test_pairs_at_equal_angles_neither_yaw_nor_roll(gecko):
+    """Of the gecko, whose tail turns upward alone, and of a rat with three joints in each leg."""
     rat = st.build("rat_legs", targets=["c"])
-    q, v, tau = np.zeros(rat.nq), np.zeros(rat.nv), np.zeros(rat.nu)
-    q[3] = 1
-    for side in ("right", "left"):
-        leg = rat.layout[f"hind_{side}"]
-        q[leg.q], v[leg.v], tau[leg.tau] = (0.3, -0.5, 0.2), (2, -7, 3), (1e-3, 3e-3, -1e-3)
-    v_dot = rat.forward_dynamics(q, v, tau)
-    assert np.abs(v_dot[[0, 4, 5]]).max() < 1e-12 * np.abs(v_dot).max()
-    right, left = (v_dot[rat.layout[f"hind_{side}"].v] for side in ("right", "left"))
-    np.testing.assert_allclose(left, right, rtol=1e-11)
+    moves = ((0.3, -0.5, 0.2), (2, -7, 3), (1e-3, 3e-3, -1e-3))
+    for model, pairs, tail in ((gecko, ("hind", "fore"), (0.4, 3.0)), (rat, ("hind",), (0, 0))):
+        q, v, tau = np.zeros(model.nq), np.zeros(model.nv), np.zeros(model.layout.nt)
+        q[3], q[7], v[6] = 1, *tail
+        layout = model.layout
+        legs = [[layout[f"{pair}_{side}"] for side in ("right", "left")] for pair in pairs]
+        for leg in (each for pair in legs for each in pair):
+            for x, own, values in zip((q, v, tau), (leg.q, leg.v, leg.tau), moves, strict=True):
+                x[own] = values[: x[own].size]
+        v_dot = model.forward_dynamics(q, v, tau)
+        with row(model.name):
+            assert np.abs(v_dot[[0, 4, 5]]).max() < 1e-12 * np.abs(v_dot).max()
+            for right, left in legs:
+                np.testing.assert_allclose(v_dot[left.v], v_dot[right.v], rtol=1e-11)
 
 
 @pytest.mark.parametrize("method", ["tsit5", "dp8", "rk4", "ros34pw2", "implicit_euler"])

@@ -40,6 +40,11 @@ def equilibrated_condition(mass):
     return float(np.linalg.cond(mass / np.outer(scale, scale)))
 
 
+def near(found, expected, limit):
+    """Compare arrays with a limit of the largest entry."""
+    np.testing.assert_allclose(found, expected, rtol=0, atol=limit * np.abs(expected).max())
+
+
 def _scaled_error(x, x_ref, floor):
     """Return max|d| / max|ref|, with a scale never below the floor."""
     scale = np.max(np.abs(x_ref), initial=0.0)

@@ -4,6 +4,7 @@ one scene and one command for a jump, a flight and a landing.
 
 import json
 import re
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -227,20 +228,20 @@ def test_one_command_makes_the_landing_and_phases_can_be_changed(capsys):
 @pytest.mark.slow
 def test_the_landing_survives_other_tails_or_says_in_one_message_why_not():
     """Feet first, then upright and at rest on them; else one warning names the phase and time."""
-    landed = 0
-    for length in (100, 137.5, 175, 212.5, 250):
-        for mass in (2, 3.6, 5.2, 6.8, 8.4, 10):
-            changes = {"tail_length": f"{length} mm", "tail_mass": f"{mass} g"}
-            scene = st.scenario(KICK, zoo.folder("ground"), changes)
-            motion = scene.simulate()
-            told = st.summary(scene.model, motion)
-            lands = told["landed"] and told["landing_group"] == "feet"
-            why = [words for words in motion.warnings if words.startswith("phase")]
-            landed += lands
-            with row(length, mass, why):
-                assert motion.info["phases"][1]["plan"]["success"] or "tried" in why[0]
-                assert len(why) == (not lands) and all(" at t = " in words for words in why)
-    assert landed >= 27
+    landed, masses = 0, (2, 3.6, 5.2, 6.8, 8.4, 10)
+    # some of them take long; the last one lands by a plan that is tried again
+    for length, mass in (*product((100, 175, 250), masses), (212.5, 6.8)):
+        changes = {"tail_length": f"{length} mm", "tail_mass": f"{mass} g"}
+        scene = st.scenario(KICK, zoo.folder("ground"), changes)
+        motion = scene.simulate()
+        told = st.summary(scene.model, motion)
+        lands = told["landed"] and told["landing_group"] == "feet"
+        why = [words for words in motion.warnings if words.startswith("phase")]
+        landed += lands
+        with row(length, mass, why):
+            assert motion.info["phases"][1]["plan"]["success"] or "tried" in why[0]
+            assert len(why) == (not lands) and all(" at t = " in words for words in why)
+    assert landed >= 17
 
 
 def test_what_a_phase_cannot_be_is_named_all_at_once(tmp_path):
