@@ -48,7 +48,7 @@ class Drawn:
         self.passive_values = self.parameters
 
     @property
-    def joints_each(self):
+    def turns_each(self):
         return np.full(self.segments, self.links or 1)
 
     def tail_points(self, q):

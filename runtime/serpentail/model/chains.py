@@ -98,6 +98,15 @@ def values_of(chain: ChainLayout, values: Mapping[str, Any]) -> dict[str, Any]:
     return {names[name]: value for name, value in values.items() if name in names}
 
 
+def turns_of(joints: np.ndarray, values: Mapping[str, Any]) -> np.ndarray:
+    """Return by how many times its coordinates each segment turns (m,): its number of joints
+    (m,), or the sum of their ratios.
+    """
+    if "joint_ratios" not in values:
+        return joints
+    return np.add.reduceat(np.ravel(values["joint_ratios"]), np.cumsum(joints) - joints)
+
+
 def refuse_several(model: "Model", field: str, remedy: str, error: type[Exception]) -> None:
     """Raise an error about what works only for a tail alone, if the model has more chains."""
     names = ", ".join(chain.name for chain in model.layout.chains[1:])

@@ -14,7 +14,7 @@ from ..basics.errors import SerpentailError
 from ..basics.extras import needed
 from ..basics.near_names import NearNames
 from ..compiling.cache import cache_folder
-from .chains import layout_of, of_all_coordinates
+from .chains import layout_of, of_all_coordinates, turns_of
 from .growth import Grow, take_over
 from .lazy import lazy_property
 from .library import BatchLibrary
@@ -73,10 +73,8 @@ class Model(ModelMethods, ModelStates, NearNames):
         continuum tail.
     samples : int or None
         Number of sample points of a continuum tail; None for an articulated one.
-    joints_each : ndarray, shape (m,)
-        How many joints share the coordinates of each segment; 1 for an arc.
-    turns_each : ndarray, shape (m,)
-        By how many times its coordinates each segment turns: the sum of its joints' ratios.
+    joints_each, turns_each : ndarray, shape (m,)
+        How many joints share the coordinates of each segment, 1 for an arc; the sum of their ratios.
     fixed : bool
         Whether the base is fixed, so that only the tail moves.
     nq, nv, nu : int
@@ -165,12 +163,9 @@ class Model(ModelMethods, ModelStates, NearNames):
         self.links = links_of(manifest["dimensions"]["links"], self.kinds)
         jointed = self.kind == "articulated"
         self.samples: int | None = None if jointed else manifest["scene"]["samples"]
-        # how many joints turn by the coordinates of each segment (m,); 1 of an arc
         links = np.broadcast_to(0 if self.links is None else self.links, self.segments)
         self.joints_each = np.maximum(links, 1)
-        ratios, first = parameters.get("joint_ratios"), np.cumsum(self.joints_each)[:-1]
-        shares = [] if ratios is None else np.split(np.ravel(ratios), first)
-        self.turns_each = np.array([sum(x) for x in shares]) if shares else self.joints_each
+        self.turns_each = turns_of(self.joints_each, parameters)
         self.layout = layout_of(manifest, self.kinds)
         self.fixed: bool = self.layout.fixed
         self.nq, self.nv = self.layout.nq, self.layout.nv
