@@ -74,7 +74,7 @@ class Model(ModelMethods, ModelStates, NearNames):
     samples : int or None
         Number of sample points of a continuum tail; None for an articulated one.
     joints_each, turns_each : ndarray, shape (m,)
-        How many joints share the coordinates of each segment, 1 for an arc; the sum of their ratios.
+        How many joints share the coordinates of each segment, 1 for an arc; sum of their ratios.
     fixed : bool
         Whether the base is fixed, so that only the tail moves.
     nq, nv, nu : int
