@@ -188,6 +188,10 @@ def test_totals_and_bends_follow_from_the_links():
     reference = st.Reference.of_bends(model, [0.0, 0.1], [[0.3, 0.4, 0.6]] * 2)
     np.testing.assert_allclose(reference.curve.at(0.05)[0], [0.1, 0, 0.2, 0, 0.3, 0])
     assert model.links == (3, 2, 2) and list(model.joints_each) == [3, 2, 2]
+    ratios = zoo.model("ratios")
+    np.testing.assert_allclose(ratios.state(bend=[0.8, 0.4]).q[7:], [0.5, 0, 0.5, 0])
+    with pytest.raises(st.ModelError, match="segment 2 sum to 0"):
+        ratios.with_parameters(joint_ratios=[1, 1, 1, -1])
     masses, length = model.parameters["link_masses"], model.parameters["tail_length"]
     assert (model.parameters["tail_mass"], length) == pytest.approx((0.0026, 0.135))
     lighter = model.with_parameters(link_masses=0.5 * np.array(masses))

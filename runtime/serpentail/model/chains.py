@@ -100,11 +100,19 @@ def values_of(chain: ChainLayout, values: Mapping[str, Any]) -> dict[str, Any]:
 
 def turns_of(joints: np.ndarray, values: Mapping[str, Any]) -> np.ndarray:
     """Return by how many times its coordinates each segment turns (m,): its number of joints
-    (m,), or the sum of their ratios.
+    (m,), or the sum of their ratios, which only the tail's joints have; ModelError if one is 0.
     """
     if "joint_ratios" not in values:
         return joints
-    return np.add.reduceat(np.ravel(values["joint_ratios"]), np.cumsum(joints) - joints)
+    own, ratios = np.ravel(values["joint_ratios"]), np.ones(joints.sum())
+    ratios[: len(own)] = own
+    turns = np.add.reduceat(ratios, np.cumsum(joints) - joints)
+    if not turns.all():
+        each = (
+            f"those of segment {int(np.argmin(turns != 0)) + 1} sum to 0, so that it would not bend"
+        )
+        raise ModelError(f"joint_ratios: value {own.tolist()}: {each}: change one of them")
+    return turns
 
 
 def refuse_several(model: "Model", field: str, remedy: str, error: type[Exception]) -> None:
