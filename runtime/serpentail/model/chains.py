@@ -56,7 +56,7 @@ def layout_of(manifest: Mapping[str, Any], kinds: tuple[str, ...]) -> Layout:
     """Return the layout of a model whose segments are of these kinds."""
     fixed = manifest["scene"].get("base") == "fixed"
     layout = Layout(len(kinds), fixed, (), kinds.count(HINGE))
-    given = layout.nt - manifest["dimensions"]["nt"]
+    given = layout.nt - manifest["dimensions"].get("nt", layout.nt)
     layout = replace(layout, given=given)
     polar = manifest["scene"]["coordinates"] == "polar"
     chains, first = [], 0

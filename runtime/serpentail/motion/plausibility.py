@@ -89,12 +89,13 @@ def _depths(model: Model, motion: "Trajectory") -> dict[str, Moment]:
     """Return the largest depth (m) of each part without contact, and its time."""
     contact = motion.contact
     assert contact is not None
-    q, axes, depths, given = motion.q, semi_axes(model), {}, _given_in(motion)
+    q, axes, depths, given = motion.q, semi_axes(model), {}, motion.given
     if "torso" not in contact.groups:
         depths["torso"] = _largest(motion, lambda rows: _depth_of_torso(q[rows], axes))
     if "tail" not in contact.groups and "tail_points" in model.kernels:
         depths["tail"] = _largest(
-            motion, lambda rows: -model.tail_points(q[rows], *given(rows))[..., 2].min(axis=1)
+            motion,
+            lambda rows: -model.tail_points(q[rows], *(x[rows] for x in given))[..., 2].min(axis=1),
         )
     legs = contact.legs
     if legs is not None and "leg_points" in model.kernels:
@@ -116,8 +117,10 @@ def _through_the_torso(model: Model, motion: "Trajectory") -> list[str]:
     if not torso_is_known(model):
         return []
 
+    known = motion.q, *motion.given
+
     def depth(rows: slice) -> Array:
-        return depth_in_torso(model, motion.q[rows], *_given_in(motion)(rows))
+        return depth_in_torso(model, *(each[rows] for each in known))
 
     deepest, time = _largest(motion, depth)
     if not deepest > SUNK:
@@ -128,11 +131,6 @@ def _through_the_torso(model: Model, motion: "Trajectory") -> list[str]:
 def torso_is_known(model: Model) -> bool:
     """Tell if it can be found whether the tail is in the torso."""
     return "tail_points" in model.kernels and bool(semi_axes(model).all())
-
-
-def _given_in(motion: "Trajectory") -> Callable[[slice], list[Array]]:
-    """Return what gives the motion of prescribed joints in some rows."""
-    return lambda rows: [each[rows] for each in motion.given]
 
 
 def depth_in_torso(model: Model, q: Array, *given: Array) -> Array:

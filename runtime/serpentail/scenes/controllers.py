@@ -34,13 +34,11 @@ def legs_of(table: Mapping) -> Legs:
 def prescribed_of(table: Mapping) -> Prescribed:
     """Return the schedule of a table [simulate.prescribed]: angles by chain, moves or times."""
     angles = {name: value for name, value in table.items() if name not in NODES}
-    if "times" not in table:
-        if "blend" in table:
-            raise refusal("simulate.prescribed.blend", table["blend"], "times", SimulationError)
-        return Prescribed.moves(angles, table.get("moves", []))
-    if "moves" in table:
-        needs = "moves or times, not both"
+    if {"moves", "times"} <= table.keys() or ("blend" in table and "times" not in table):
+        needs = "either moves, or times and perhaps blend"
         raise refusal("simulate.prescribed", dict(table), needs, SimulationError)
+    if "times" not in table:
+        return Prescribed.moves(angles, table.get("moves", []))
     return Prescribed(table["times"], angles, table.get("blend", "quintic"))
 
 

@@ -171,6 +171,13 @@ class Reach:
         """Return the name of one of its parameters."""
         return name_in(self.tail.owner, parameter)
 
+    def hulls(self, prefix: str, rate: str, acceleration: str, first: int, i: str) -> str:
+        """Print what bounds rate and acceleration of coordinate ``first + i`` over a step."""
+        k = self.tail.coordinates_before + first
+        if self.tail.prescribed:
+            return f"{rate} = rates[{k} + {i}], {acceleration} = accelerations[{k} + {i}]"
+        return f"{prefix}_hulls(run, h, {k + 7} + {i}, &{rate}, &{acceleration})"
+
     @property
     def bodies(self) -> list[int]:
         """Number of bodies before each stretch of a limb."""

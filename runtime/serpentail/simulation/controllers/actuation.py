@@ -22,9 +22,7 @@ ROUNDING = 1e-6  # of a tension's limit, by which those of a solver may go beyon
 
 
 class Actuation:
-    """Controllers and legs, or angles of prescribed joints, as a C record, times to stop at, and
-    errors of a user's function.
-    """
+    """Controllers and schedule as a C record, times to stop at, errors of a user's function."""
 
     def __init__(
         self,
@@ -246,13 +244,7 @@ class RunActuations:
     drives: addresses of the C records of the runs' actuations.
     """
 
-    def __init__(
-        self,
-        records: Records,
-        controller: object,
-        start: Start,
-        legs: Schedule = None,
-    ):
+    def __init__(self, records: Records, controller: object, start: Start, legs: Schedule = None):
         self.records = records
         self.span = start.start, start.end
         controllers = controllers_of(controller, start.runs if start.many else None)
