@@ -18,6 +18,7 @@ PLAIN = {"kind": "articulated", "segments": 1, "links": 1, "mount": [0, 0, 0]}
 PLAIN |= {"mass": "1 g", "length": "2 cm"}
 GIVEN = {"drive": "prescribed"}
 BONE = {"name": "knee", "length": "4 cm", "mass": "3 g", "radius": "4 mm"}
+SPRUNG = BONE | {"stiffness": 1}, BONE | {"name": "b"}
 
 
 def problems(**keys):
@@ -44,7 +45,7 @@ def test_wrong_chains_are_refused():
         (
             "chain.a.drive",
             "prescribed",
-            {"a": limb(BONE | {"damping": 0}, BONE | {"name": "b"}) | GIVEN},
+            {"a": limb(*SPRUNG) | GIVEN},
         ),
         ("chain.a.damping", -1, {"a": PLAIN | {"damping": -1}}),
         ("chain.tail", "tail", {"tail": PLAIN}),
