@@ -234,9 +234,7 @@ def random_limb(rng):
 
 
 def random_tree(seed, prescribed):
-    """A scene of a tail and one to four more chains or pairs, some of them prescribed if one may
-    be, and the same as a set of bodies.
-    """
+    """A scene of a tail and one to four more chains or pairs, and the same as a set of bodies."""
     rng, drives = np.random.default_rng(seed), np.random.default_rng(seed)
     tail, (segments, mount, angles) = random_chain(rng)
     placed = zoo.TORSO | {"tail_mount": tail.pop("mount"), "mount_angles": tail.pop("mount_angles")}
@@ -254,9 +252,7 @@ def random_tree(seed, prescribed):
 
 
 def check_against_pinocchio(seed, prescribed=False):
-    """H, H v_dot + C, v_dot and the torques of prescribed joints, of programs over floats, against
-    those of a tree of hinges.
-    """
+    """H, H v_dot + C, v_dot, torques of drives of programs over floats: those of a tree of hinges."""
     scene, animal = random_tree(seed, prescribed)
     from tests.references.pinocchio_tree import PinocchioTree
 
