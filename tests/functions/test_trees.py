@@ -252,7 +252,7 @@ def random_tree(seed, prescribed):
 
 
 def check_against_pinocchio(seed, prescribed=False):
-    """H, H v_dot + C, v_dot, torques of drives of programs over floats: those of a tree of hinges."""
+    """H, H v_dot + C, v_dot and torques of drives, by programs, are those of a tree of hinges."""
     scene, animal = random_tree(seed, prescribed)
     from tests.references.pinocchio_tree import PinocchioTree
 
