@@ -7,31 +7,37 @@ import numpy as np
 import pytest
 
 import serpentail as st
+from serpentail.sequence import optimise
 from tests.sequence.test_phases import DAMPING, kick, rat, sequence, settled
 from tests.support.rows import row
 
-PUSH = {"at": 0.02, "gamma": 4.4, "delta": -0.6, "duration": 0.032, "shape": "accelerate"}
+CROUCH = {"at": 0.02, "gamma": 3.2, "delta": -0.6, "duration": 0.07, "shape": "quintic"}
+PUSH = {"at": 0.16, "gamma": 4.9, "delta": -1.4, "duration": 0.042, "shape": "accelerate"}
 STRETCH = {"before_landing": 0.12, "gamma": 3.93, "delta": -1.13, "duration": 0.08}
 YIELD = {"at": "touch_down", "gamma": 3.93, "delta": -0.35, "duration": 0.03}
 GOAL = st.Goal(torso_rate=None, tail=[radians(-20), 0.0], tail_rate=[0.0, 0.0])
 PLAN = {"goal": GOAL, "bounds": st.Bounds(angle=(pi / 3, 1e-3), torque=0.02)}
 
 
+def slippery():
+    return rat().with_parameters(mu=0.55)
+
+
 def leap():
-    """A push, a flight in its plane, and legs that yield."""
+    """A crouch and a push on slippery ground, a flight in its plane, and legs that yield."""
     flight = st.Phase("flight", 1.5, until="landing", plan=PLAN, moves=[STRETCH])
     land = st.Phase("land", 1.0, controller=DAMPING, moves=[YIELD | {"shape": "decelerate"}])
-    return sequence(kick(moves=[PUSH]), flight, land)
+    return replace(sequence(kick(moves=[CROUCH, PUSH]), flight, land), model=slippery())
 
 
 @pytest.mark.slow  # some 1000 runs and a plan
 def test_what_is_found_keeps_its_limits():
     limits = {"push": 20, "landing": 22, "tilt": "60 deg", "spin": 3e-4}
     first = leap().simulate(*settled())
-    assert st.summary(rat(), first.trajectory)["com_rise_m"] < 0.25
+    assert not st.summary(slippery(), first.trajectory)["landed"]
     found = st.optimise(leap(), *settled(), limits=limits, goal={"rise": 0.25}, time_limit=600)
     again = found.sequence.simulate(*settled())
-    told, measures = st.summary(rat(), again.trajectory), found.report["measures"]
+    told, measures = st.summary(slippery(), again.trajectory), found.report["measures"]
     assert found.success and again.complete and told["landed"]
     assert told["com_rise_m"] == pytest.approx(measures["rise"]) and told["com_rise_m"] >= 0.25
     assert told["tilt_max_deg"] <= 60 and again.phases[1].plan.success
@@ -39,6 +45,23 @@ def test_what_is_found_keeps_its_limits():
     force = told["peak_ground_force_weights"]
     assert force == pytest.approx(max(measures["push"], measures["landing"])) and force <= 22
     assert {doubt.partition(": ")[0] for doubt in found.doubts} <= {*found.report["repeats"]}
+
+
+def test_only_a_push_that_is_right_is_asked_for_less_spin(monkeypatch):
+    """One that is too low is searched for again with the same limits."""
+    for rise, share in ((0.5, 1.0), (0.05, optimise.LESS)):
+        asked = []
+
+        def kept(sequence, _unknowns, _measured, wanted, *_, asked=asked, **_settings):
+            asked.append(wanted.limits["spin"])
+            return sequence
+
+        monkeypatch.setattr(optimise, "searched", kept)
+        monkeypatch.setattr(optimise, "TURNS", 2)
+        with row(rise):
+            limits = {"spin": 1e-2, "tilt": "0.1 deg"}
+            st.optimise(leap(), *settled(), limits=limits, goal={"rise": rise})
+            assert asked == [1e-2, share * 1e-2]
 
 
 def test_what_cannot_be_is_refused():

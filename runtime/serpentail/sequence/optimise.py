@@ -48,7 +48,8 @@ def optimise(
 
     The sequence's own moves are the first guess. The angles (within 0.9 rad) and durations (half to
     twice) of the push and of the landing, and the angles before the landing, are searched for by
-    differential evolution, with a run for each try. The flight is planned as ever.
+    differential evolution, with a run for each try. The flight is planned as ever. A slow first
+    move, a crouch, turns a push into the cone of friction: on slippery ground it needs one.
 
     Parameters
     ----------
