@@ -59,13 +59,18 @@ def identified(tracks: np.ndarray, model: st.Model, q: np.ndarray, v: np.ndarray
     def missed(x: np.ndarray, frames: int) -> np.ndarray:
         return ((seen(model, q, v, x - 1, frames) - tracks[:frames]) / NOISE).ravel()
 
-    # the start from the flight, then all from there; SciPy's steps are shares of x, begun at 1
-    x, ground = np.ones(2 + 2 * model.nv), np.ones(2)
-    flown = least_squares(lambda x: missed(np.append(ground, x), FLOWN), x[2:], diff_step=STEP)
-    found = least_squares(missed, np.append(ground, flown.x), diff_step=STEP, args=(FRAMES,))
+    # the start from the flight; SciPy's steps are shares of x, begun at 1
+    x = np.ones(2 * model.nv)
+    flown = least_squares(lambda x: missed(np.append([1, 1], x), FLOWN), x, diff_step=STEP)
+    # all from there; again from a lower mu if it ends where no foot slides, which tells no mu
+    for mu in (1.0, 0.5):
+        begin = np.concatenate([[mu, 1.0], flown.x])
+        found = least_squares(missed, begin, diff_step=STEP, args=(FRAMES,))
+        if np.linalg.norm(found.jac[:, 0]) > 1:
+            break
     std = np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac)))[:2]
-    begin = [model.parameters[name] for name in WANTED]
-    return begin * np.exp(found.x[:2] - 1 + WIDTH * np.outer([-1, 0, 1], std))
+    values = [model.parameters[name] for name in WANTED]
+    return values * np.exp(found.x[:2] - 1 + WIDTH * np.outer([-1, 0, 1], std))
 
 
 def landing(number: int) -> dict:
