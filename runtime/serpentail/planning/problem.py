@@ -264,9 +264,8 @@ def _refuse_of_several(model: Model, settings: Mapping[str, Any], refused: Refus
 def _refuse_on_passive(model: Model, bounds: Bounds | None, damping: float | None) -> None:
     """PlanningError for what needs a motor at each coordinate."""
     passive = [n for n, own in zip(model.names.tail, model.layout.driven, strict=True) if not own]
-    asked = {"damping": bool(damping), "bounds.torque_rate": False}
-    if bounds is not None:
-        asked["bounds.torque_rate"] = bounds.torque_rate is not None
+    rated = bounds is not None and bounds.torque_rate is not None
+    asked = {"damping": bool(damping), "bounds.torque_rate": rated}
     for name in [name for name, here in asked.items() if passive and here]:
         raise PlanningError(
             f"{name}: needs a motor at each coordinate, and {passive[0]} is passive: leave it out, "
