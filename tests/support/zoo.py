@@ -27,8 +27,9 @@ FEW = ["mass_matrix", "forward_dynamics", "energy", "contact_dynamics"]
 FEW += ["pfl", "rollout", "implicit"]
 # derivatives of flight are those of the same tail without contact
 LANDING = [*FLYING, "contact_points", "leg_points", "contact_dynamics", "pfl", "implicit"]
-TAPED = ["mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics", "energy"]
-TAPED += ["momentum", "contact_points", "contact_dynamics", "rollout", "implicit", "gradients"]
+STANDING = ["mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics", "energy"]
+STANDING += ["momentum", "contact_points", "contact_dynamics", "rollout", "implicit"]
+TAPED = [*STANDING, "gradients"]
 # what differs from coordinate to coordinate shows an exchange of two of them
 ELASTIC = {
     "tail_stiffness": [0.004, 0.006, 0.005, 0.003],
@@ -138,7 +139,9 @@ ZOO: dict[str, dict[str, Any]] = {
     # several chains
     "tree": _own("articulated", OWN_LINKS[:2], chain=CHAINS),
     "limbs": _own("articulated", OWN_LINKS[1:2], chain=LIMBS),
-    "tree_ground": _own("articulated", OWN_LINKS[1:2], **TOUCHING),
+    "tree_ground": _own(
+        "articulated", OWN_LINKS[1:2], functions=[*STANDING, "pfl", "tail_points"], **TOUCHING
+    ),
     # other gravity
     "slope": _links(1, 3, slope={"angle": "25 deg", "toward": "-x"}, contacts=["torso"]),
     # other numbers
