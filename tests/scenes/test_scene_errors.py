@@ -229,8 +229,8 @@ def test_one_command_makes_the_landing_and_phases_can_be_changed(capsys):
 def test_the_landing_survives_other_tails_or_says_in_one_message_why_not():
     """Feet first, then upright and at rest on them; else one warning names the phase and time."""
     landed, masses = 0, (2, 3.6, 5.2, 6.8, 8.4, 10)
-    # some of them take long; the last one lands by a plan that is tried again
-    for length, mass in (*product((100, 175, 250), masses), (212.5, 6.8)):
+    # one does not land, one by a plan that is tried again: these take most of the time
+    for length, mass in (*product((100, 175, 212.5), masses), (250, 2), (250, 10)):
         changes = {"tail_length": f"{length} mm", "tail_mass": f"{mass} g"}
         scene = st.scenario(KICK, zoo.folder("ground"), changes)
         motion = scene.simulate()
@@ -241,7 +241,7 @@ def test_the_landing_survives_other_tails_or_says_in_one_message_why_not():
         with row(length, mass, why):
             assert motion.info["phases"][1]["plan"]["success"] or "tried" in why[0]
             assert len(why) == (not lands) and all(" at t = " in words for words in why)
-    assert landed >= 17
+    assert landed >= 18
 
 
 def test_what_a_phase_cannot_be_is_named_all_at_once(tmp_path):
