@@ -68,8 +68,8 @@ def batch_rollout(
 ) -> BatchRollout | None:
     """Return what advances runs in lanes, of a scene with rollout and a free torso.
 
-    With contacts it needs implicit methods. Models in air, with prescribed joints or with stops that
-    damp have none, and trees with damping: theirs is not one array.
+    With contacts it needs implicit methods. Models in air, with prescribed joints or with damped
+    stops have none, and trees with damping: theirs is not one array.
     """
     names = {f.function.name for f in printed}
     if "rollout" not in scene.functions or tail.fixed or tail.widths or tail.given:
