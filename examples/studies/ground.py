@@ -62,12 +62,14 @@ def identified(tracks: np.ndarray, model: st.Model, q: np.ndarray, v: np.ndarray
     # the start from the flight; SciPy's steps are shares of x, begun at 1
     x = np.ones(2 * model.nv)
     flown = least_squares(lambda x: missed(np.append([1, 1], x), FLOWN), x, diff_step=STEP)
-    # all from there; again from a lower mu if it ends where no foot slides, which tells no mu
-    for mu in (1.0, 0.5):
+    # all from there; from another mu if it ends where no foot slides, which tells no mu
+    for mu in (1.0, 0.5, 1.5):
         begin = np.concatenate([[mu, 1.0], flown.x])
         found = least_squares(missed, begin, diff_step=STEP, args=(FRAMES,))
         if np.linalg.norm(found.jac[:, 0]) > 1:
             break
+    else:
+        raise ValueError("tracks: no foot slides, so mu has no interval: record a faster landing")
     std = np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac)))[:2]
     values = [model.parameters[name] for name in WANTED]
     return values * np.exp(found.x[:2] - 1 + WIDTH * np.outer([-1, 0, 1], std))
