@@ -132,6 +132,14 @@ def test_legs_with_mass_push_with_less_than_20_body_weights():
     assert 10 < run.info["peaks"]["all"][0] / weight_of(rat.model.parameters) < 20
     assert run.info["imbalance"]["relative"] < 1e-4
     assert {each["group"] for each in run.events} == {*rat.model.contacts}
+    alone = st.build("rat_kick", chain={}, contacts=[], functions=["mount_wrench"])
+    for k in np.flatnonzero(run.contact.of("tail").total == 0)[::20]:
+        q, v, bristles = run.q[k], run.v[k], run.contact.bristles[k].ravel()
+        v_dot = rat.model.contact_dynamics(q, v, run.tau[k], bristles)[0]
+        expected = alone.mount_wrench(q[: alone.nq], v[: alone.nv], v_dot[: alone.nv])
+        for found, part in zip(run.mount_wrench, expected, strict=True):
+            with row(run.t[k]):
+                np.testing.assert_allclose(found[k], part, atol=1e-9 * abs(part).max())
 
 
 def test_hinges_about_x_and_z_are_a_segment_of_one_link():

@@ -181,7 +181,8 @@ def test_first_meshes_are_finer_for_longer_tails():
         (5, {}, [144], 12),
     ):
         settings = SimpleNamespace(mesh=st.Mesh(**given), guess=st.Guess())
-        model = SimpleNamespace(segments=segments)
+        chains = [SimpleNamespace(segments=slice(0, segments))]
+        model = SimpleNamespace(layout=SimpleNamespace(chains=chains))
         meshes = Attempts(model, settings, collocation_rule()).meshes()
         with row(segments, given):
             assert [mesh.intervals for mesh in meshes] == intervals

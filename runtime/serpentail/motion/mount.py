@@ -18,12 +18,14 @@ def mount_wrenches(model: Model, motion: Any) -> tuple[Array, Array]:
         return model.mount_wrench(motion.q, motion.v, v_dot, *motion.given)
     R, points = rotation_matrix(pose[:, QUATERNION]), model.tail_points(motion.q, *motion.given)
 
-    # the ground pushes on the torso, by the massless legs too, and on all tail points but the first
+    # the ground pushes on the torso, by massless legs too, and on a chain's points but the first
     f_ext = np.zeros((len(pose), 6 + points[0].size))
+    forces = f_ext[:, 6:].reshape(points.shape)
+    chains = {chain.name: chain.points for chain in model.layout.chains}
     for group in contact.groups:
         part = contact.of(group)
-        if group == "tail":
-            f_ext[:, 9:] = part.forces.reshape(len(pose), -1)
+        if group in chains:
+            forces[:, chains[group]][:, 1:] = part.forces
             continue
         arms = part.points - pose[:, None, POSITION]
         f_ext[:, VELOCITY] += part.forces.sum(axis=1)
@@ -33,6 +35,7 @@ def mount_wrenches(model: Model, motion: Any) -> tuple[Array, Array]:
     force, moment = model.mount_wrench(motion.q, motion.v, v_dot, *motion.given)
 
     # the torso holds what pushes on the tail
-    forces, arms = f_ext[:, 6:].reshape(points.shape), points - points[:, :1]
+    own = model.layout.chains[0].points
+    forces, arms = forces[:, own], points[:, own] - points[:, :1]
     force = force + np.einsum("kji,kpj->ki", R, forces)
     return force, moment + np.einsum("kji,kpj->ki", R, np.cross(arms, forces))
