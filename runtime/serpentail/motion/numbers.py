@@ -183,7 +183,7 @@ NUMBERS = (
         lambda run: float(np.abs(run.motion.tau).max(initial=0))),
     Number("energy_change_J", "J", "energy at the end minus energy at the start",
         lambda run: float(run.motion.energy[-1] - run.motion.energy[0])),
-    Number("work_J", "J", "work of the torques, the damping, the ground, the legs' drives, the air",
+    Number("work_J", "J", "work of torques, damping, ground, drives of legs and joints, air",
         _entry("work_J")),
     Number(
         "imbalance", "",
