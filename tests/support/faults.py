@@ -35,6 +35,7 @@ def broken(model, name, change):
     def call(*arrays, out=None):
         return change(kernel(*arrays), *arrays)
 
+    call.names = kernel.names
     faulty.kernels = copy.copy(model.kernels)
     faulty.kernels[name] = call
     return faulty
