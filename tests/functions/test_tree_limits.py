@@ -172,6 +172,24 @@ def test_a_reaction_wheel_turns_the_body_back():
     assert H[8, 8] == pytest.approx(J + rotor, rel=1e-12)
 
 
+def test_a_single_hinge_has_spring_damping_and_stops():
+    """It moves as without them under their torque, and its run keeps its books."""
+    passive = {"stiffness": 1e-4, "damping": 1e-6, "stops": [-1.0, 0.3], "stop_stiffness": 1e-2}
+    spin = {"name": "spin", "length": 0.02, "mass": 1e-3, "inertia": [3e-8, 1e-9, 3e-8]}
+    place = {"kind": "limb", "mount": [0, 0.01, -0.02]}
+
+    def with_one(hinge):
+        return built("spin", functions=RUNS, chain={"leg": place | hinge})
+
+    own, bare = (with_one({"joints": [spin | more]}) for more in (passive, {}))
+    start = own.state(height=1, bend=[0.1, -0.2, 0.2], spin=[3, 2, 1], bend_rate=[1, 2, 3])
+    tau = [0, 0, -passive["stiffness"] * 0.2 - passive["damping"] * 3]
+    found = own.forward_dynamics(start.q, start.v, [0, 0, 0])
+    np.testing.assert_allclose(found, bare.forward_dynamics(start.q, start.v, tau), rtol=1e-12)
+    run = st.simulate(own.with_parameters(leg_damping=2e-6), start, 0.1, rtol=1e-10)
+    assert run.info["imbalance"]["relative"] < 1e-8 and run.info["work_J"]["damping"] < -1e-7
+
+
 def test_a_wheel_may_spin_in_the_body():
     """The robot's tails begin in the body and its wheel is there: no reason to warn; many at once
     are what each is alone.

@@ -200,7 +200,11 @@ def passive_parameters(passive: Collection[str], size: int) -> tuple[Parameter, 
 
 
 def for_all(parameter: Parameter, value: Any) -> Any:
-    """Return one number for each coordinate, also if a single number stands for all."""
+    """Return one number for each coordinate, also if a single number stands for all; of a single
+    coordinate it is no list.
+    """
+    if parameter.size == 1:
+        return value[0] if isinstance(value, list | tuple) and len(value) == 1 else value
     alone = isinstance(value, int | float) and not isinstance(value, bool)
     return [value] * parameter.size if alone else value
 
@@ -246,7 +250,8 @@ def missing(named: Mapping[str, Any], parts: Collection[str]) -> list[Problem]:
 
 def stop_problems(numbers: Mapping[str, Any]) -> list[Problem]:
     """Return a problem for each coordinate whose stops leave no room between them."""
-    pairs = zip(numbers["tail_stop_lower"], numbers["tail_stop_upper"], strict=True)
+    ends = (numbers["tail_stop_lower"], numbers["tail_stop_upper"])
+    pairs = zip(*(end if isinstance(end, list | tuple) else [end] for end in ends), strict=True)
     return [
         Problem(
             f"parameters.tail_stop_lower[{k}]",

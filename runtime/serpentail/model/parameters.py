@@ -243,7 +243,7 @@ def checked_value(
     pieces = fields[name].get("pieces")
     kind = "a finite number" if size == 1 else f"{size} finite numbers"
     kind += f", {size // pieces} of each piece of the tail" if pieces else ""
-    of_all = "per" in fields[name]  # one number may be given for all coordinates
+    of_all = "per" in fields[name] and size > 1  # one number may be given for all coordinates
     kind += ", or one for all," if of_all else ""
     needs = f"needs {kind} ({unit}){', ' if rule.words else ''}{rule.words}"
     shape = (size,) if size > 1 or pieces else ()

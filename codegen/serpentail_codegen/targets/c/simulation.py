@@ -58,14 +58,15 @@ def motors(scene: Scene) -> list[tuple[str, str, tuple[float, ...]]]:
 
 
 def damped_chains(tail: Tail) -> list[tuple[str, int, int]]:
-    """Return the damping parameter of each chain of a tree, and its coordinates from which to
+    """Return the damping of coordinate k of each chain of a tree, and its coordinates from which to
     which.
     """
-    return [
+    found = [
         (name_in(c.owner, "tail_damping"), c.coordinates_before, c.coordinates_before + c.nt)
         for c in tail.branches
         if "damping" in c.passive
     ]
+    return [(f"{name}[k - {a}]" if b - a > 1 else name, a, b) for name, a, b in found]
 
 
 def simulation_context(
