@@ -75,6 +75,7 @@ def test_models_that_cannot_be_identified_are_refused():
         ("single", [], st.ModelError, "float"),
         ("baked", ["tail_mass"], st.IdentificationError, "baked"),
         ("fixed", [], st.ModelError, "fixed"),
+        ("tree", [], st.ModelError, "tail alone"),
         (None, [], st.IdentificationError, "model: value 3"),
     ):
         with row(name), pytest.raises(error, match=words):
@@ -86,7 +87,8 @@ def test_models_that_cannot_be_identified_are_refused():
     ):
         with row(words), pytest.raises(st.IdentificationError, match=words):
             st.joint_torques(zoo.model("m1_n3"), given, {"a": st.Marker(tail=1)}, cutoff=cutoff)
-    for name, words in (("fixed", "fixed"), ("polar", "polar"), ("single", "float")):
+    wrong = (("fixed", "fixed"), ("polar", "polar"), ("single", "float"), ("tree", "tail alone"))
+    for name, words in wrong:
         with row(name), pytest.raises(st.ModelError, match=words):
             st.joint_torques(zoo.model(name), data, {"a": st.Marker(tail=1)}, cutoff=10)
 

@@ -10,6 +10,7 @@ import numpy as np
 from ..basics.checks import number, refusal
 from ..basics.errors import IdentificationError, ModelError
 from ..basics.progress import Stage
+from ..model.chains import refuse_several
 from ..model.checked import checked_model
 from ..model.model import Model
 from ..model.state import Quantity
@@ -92,8 +93,8 @@ def identify(
     IdentificationError
         An argument or the data are wrong; the message gives field, value and remedy.
     ModelError
-        The model lacks a function, has a fixed base, uses polar coordinates or computes with
-        float.
+        The model lacks a function, has a fixed base or several chains, uses polar coordinates or
+        computes with float.
     ExtraMissing
         A C3D file is read without the extra "c3d".
 
@@ -159,8 +160,11 @@ def check_model(model: Any, estimate: Any) -> None:
 
 
 def refuse_unlike(model: Model, who: str) -> None:
-    """ModelError if a model has a fixed base, polar coordinates, or computes with float."""
+    """ModelError if a model has a fixed base, several chains or polar coordinates, or computes with
+    float.
+    """
     model.refuse_fixed(who)
+    refuse_several(model, who, "leave the other chains out of the scene", ModelError)
     if model.manifest["scene"].get("coordinates") == "polar":
         raise ModelError(f'{who}: {model.name} has coordinates = "polar": generate it with "bend"')
     if model.manifest["real"] != "double":
