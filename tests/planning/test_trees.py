@@ -14,6 +14,7 @@ from serpentail.planning.problem import checked_goal
 from serpentail.scenes.plan import plan_arguments, planned
 from tests.support import zoo
 from tests.support.rows import row
+from tests.support.scenes import SCENES
 from tests.support.tumbling import integrated, start
 
 FIN = {"kind": "articulated", "drive": "passive", "stiffness": 1e-4, "damping": 3e-6}
@@ -132,3 +133,19 @@ def test_a_gecko_rights_itself_by_its_tail_and_its_legs():
     assert st.summary(plan.model, motion)["tilt_end_deg"] < 0.01
     assert motion.q[-1, 9:] == pytest.approx(0, abs=1e-3)
     assert np.abs(motion.q[:, 9:]).max() < np.radians(30) * 1.002
+
+
+@pytest.mark.slow  # it makes its model
+def test_a_phase_plans_the_flight_of_a_tree_to_its_landing(tmp_path):
+    text = (SCENES / "gecko_legs_righting.toml").read_text()
+    model, plan = text[: text.index("[plan]")], text[text.index("[plan.goal]") :]
+    start = "[simulate.start]\nheight = 1\nroll = '180 deg'\n"
+    phase = "[[phase]]\nname = 'air'\nduration = 0.5\n[phase.plan]\nsmoothing = 1e-6\n"
+    words = ["contacts = ['torso']\n", model, start, phase, plan.replace("[plan", "[phase.plan")]
+    (tmp_path / "gecko.toml").write_text("".join(words))
+    motion = st.scenario(tmp_path / "gecko.toml").simulate(output_step=1e-4)
+    told, touch = motion.info["phases"][0]["plan"], motion.events[0]["time"]
+    assert told["success"] and touch - 0.01 < told["duration_s"] < touch
+    q = motion.at(told["duration_s"]).q
+    assert st.pitch_roll_yaw(q)[:2] == pytest.approx([0, 0], abs=np.radians(0.5))
+    assert q[15:] == pytest.approx(0, abs=0.02)
