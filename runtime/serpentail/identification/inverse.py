@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import BSpline
-from scipy.linalg import solve
+from scipy.linalg import solveh_banded
 
 from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_Q, TAIL_V, VELOCITY
 
@@ -152,9 +152,12 @@ def smoothed(
     W = (half[:, None] * weights).ravel()
     penalty = (each.T * W) @ each * (2 * np.pi * cutoff) ** (-2 * ROUGH)
 
-    # normal equations
-    square, right = (B.T * spans) @ B + penalty, (B.T * spans) @ values
-    spline = BSpline(knots, solve(square, right, assume_a="pos"), DEGREE)
+    # normal equations, whose matrix is banded
+    square = (B.T * spans) @ B + penalty
+    banded = np.zeros((DEGREE + 1, count))
+    for k in range(DEGREE + 1):
+        banded[k, : count - k] = np.diag(square, -k)
+    spline = BSpline(knots, solveh_banded(banded, (B.T * spans) @ values, lower=True), DEGREE)
     return spline(times), spline.derivative(1)(times), spline.derivative(2)(times)
 
 
