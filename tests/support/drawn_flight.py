@@ -31,7 +31,7 @@ class Drawn:
 
     def __post_init__(self):
         sizes = {"segments": self.segments, "links": self.links}
-        sizes |= {"total": self.segments * self.links, "nt": 2 * self.segments}
+        sizes["total"] = self.segments * self.links
         self.manifest = {"dimensions": sizes, "scene": {"coordinates": "joint"}}
         self.kinds = (self.kind,) * self.segments
         self.layout = layout_of(self.manifest, self.kinds)

@@ -151,10 +151,8 @@ def _shapes(name: str, scene: Mapping[str, Any], own: Mapping[str, Any]) -> bool
         if name.startswith(f"{chain}_") and name not in NAMES and isinstance(table, Mapping):
             full = {name_in(chain, n): n for n in NAMES}.get(name, name)
             return _shapes(full, table, {f"tail_{key}": key for key in table} | dict(table))
-    if name in ("mount_angles", "gravity_vector", "joint_ratios") or name in (
-        *PASSIVE_NAMES,
-        *AIR_NAMES,
-    ):
+    axes = ("mount_angles", "gravity_vector")
+    if name in (*axes, "joint_ratios", *PASSIVE_NAMES, *AIR_NAMES):
         return name not in own
     if name not in PIECES or name in own:
         return False

@@ -56,8 +56,6 @@ def layout_of(manifest: Mapping[str, Any], kinds: tuple[str, ...]) -> Layout:
     """Return the layout of a model whose segments are of these kinds."""
     fixed = manifest["scene"].get("base") == "fixed"
     layout = Layout(len(kinds), fixed, (), kinds.count(HINGE))
-    given = layout.nt - manifest["dimensions"].get("nt", layout.nt)
-    layout = replace(layout, given=given)
     polar = manifest["scene"]["coordinates"] == "polar"
     chains, first = [], 0
     for entry in entries(manifest):
@@ -89,7 +87,8 @@ def layout_of(manifest: Mapping[str, Any], kinds: tuple[str, ...]) -> Layout:
         )
         first = stop
     tendons = names_of_tendons(manifest["scene"].get("tendon", {}))
-    return Layout(len(kinds), fixed, tuple(chains), layout.hinges, tendons, given)
+    given = sum(len(chain.given) for chain in chains)
+    return replace(layout, chains=tuple(chains), tendons=tendons, given=given)
 
 
 def values_of(chain: ChainLayout, values: Mapping[str, Any]) -> dict[str, Any]:

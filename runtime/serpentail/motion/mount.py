@@ -13,10 +13,11 @@ from ..model.model import Model
 def mount_wrenches(model: Model, motion: Any) -> tuple[Array, Array]:
     """Return force (K, 3), N, and moment (K, 3), N m, of the tail at its mount, torso axes."""
     pose, contact = pose_of(motion.q, model.layout), motion.contact
+    given = motion.given
     if contact is None:
-        v_dot = model.forward_dynamics(motion.q, motion.v, motion.tau, None, *motion.given)
-        return model.mount_wrench(motion.q, motion.v, v_dot, *motion.given)
-    R, points = rotation_matrix(pose[:, QUATERNION]), model.tail_points(motion.q, *motion.given)
+        v_dot = model.forward_dynamics(motion.q, motion.v, motion.tau, None, *given)
+        return model.mount_wrench(motion.q, motion.v, v_dot, *given)
+    R, points = rotation_matrix(pose[:, QUATERNION]), model.tail_points(motion.q, *given)
 
     # the ground pushes on the torso, by massless legs too, and on a chain's points but the first
     f_ext = np.zeros((len(pose), 6 + points[0].size))
@@ -31,8 +32,8 @@ def mount_wrenches(model: Model, motion: Any) -> tuple[Array, Array]:
         f_ext[:, VELOCITY] += part.forces.sum(axis=1)
         moment = np.cross(arms, part.forces).sum(axis=1)
         f_ext[:, 3:6] += np.einsum("kji,kj->ki", R, moment)
-    v_dot = model.forward_dynamics(motion.q, motion.v, motion.tau, f_ext, *motion.given)
-    force, moment = model.mount_wrench(motion.q, motion.v, v_dot, *motion.given)
+    v_dot = model.forward_dynamics(motion.q, motion.v, motion.tau, f_ext, *given)
+    force, moment = model.mount_wrench(motion.q, motion.v, v_dot, *given)
 
     # the torso holds what pushes on the tail
     own = model.layout.chains[0].points
