@@ -145,7 +145,7 @@ def needed(scene: Scene) -> list[str]:
     parts = {
         "rollout": called,
         "implicit": ["implicit_factor", "implicit_solve"],
-        "gradients": ["rates_vjp", *margins, *transposed],
+        "gradients": ["rates_vjp", "rates_jvp", *margins, *transposed],
     }
     wanted = {*names, *(part for name in names for part in parts.get(name, ()))}
     return [name for name in CATALOGUE if name in wanted]

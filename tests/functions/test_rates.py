@@ -59,6 +59,9 @@ def test_gradients_of_rates_are_those_of_casadi(name):
                 np.testing.assert_allclose(mine, part, rtol=0, atol=1e-11 * most + 1e-12)
             first += part.size
         assert first == ours.size
+        change = rng.normal(size=first)
+        along = w @ model.kernel("rates_jvp")(q, v, tau, bristles, legs, branches, change)
+        np.testing.assert_allclose(along, change @ ours, rtol=1e-10)
     assert touched
 
 

@@ -160,6 +160,8 @@ class _Reversal:
         """
         if self.matters(solve.matrix[0]):
             raise ValueError(f"{solve.matrix.name}: a factored matrix has no adjoints")
+        if not self.matters(solve.x):
+            return [solve], []
         back = replace(solve, x=self.of(solve.x))
         if not solve.pair:
             return [solve], [back]
@@ -172,9 +174,11 @@ class _Reversal:
         ]
         return [solve], [*swapped, replace(back, matrix=turned)]
 
-    def guard(self, guard: ir.Guard, loops: Loops) -> BothWays:
-        """Return a guard, which has no reverse."""
+    def guard(self, guard: ir.Guard | ir.Factor, loops: Loops) -> BothWays:
+        """Return a guard, which has no reverse, or a factorisation: see solve."""
         return [guard], []
+
+    factor = guard
 
     def fill(self, fill: ir.Fill, loops: Loops) -> BothWays:
         """Return a fill and its reverse."""

@@ -22,6 +22,12 @@ SIGNATURES = (
         (Argument("gradient", ("causes",), "gradient by q (tangent space), v, tau, bristles, legs, "
              "parameters"),),
         SIMULATION, called=True),
+    Signature("rates_jvp",
+        "derivative of v_dot and of the rates of the bristles along a change of all causes",
+        (Q, V, TAU, BRISTLES, LEGS, BRANCHES,
+         Argument("direction", ("causes",), "change, ordered as the gradient of rates_vjp")),
+        (Argument("change", ("rates",), "change of v_dot, then of the bristles' rates"),),
+        SIMULATION, called=True),
     Signature("margins",
         "what changes sign where the force of a point has a kink: where it touches, ceases to "
         "press, begins to slide",

@@ -11,6 +11,7 @@ from serpentail_scene.signatures.arguments import BRISTLES, LEGS, MULTIPLIER, V_
 from serpentail_scene.signatures.gradients import BRANCHES
 
 from ...autodiff.reverse import adjoint_program
+from ...ir.dataflow import inlined
 from ...ir.program import Array
 from ...mechanics import contact, rotations
 from ...mechanics import rotation_derivatives as turns
@@ -143,14 +144,35 @@ def assemble_solve_transposed(draft: Draft, arrays: dict[str, Array]) -> None:
     """implicit_solve is linear in its right-hand side: its reverse is the transpose."""
     function = signed({"implicit_solve": assemble_solve})["implicit_solve"].of(draft.tail)
     sides, unknowns = ([a.name for a in each] for each in (function.inputs[1:], function.outputs))
-    inner = adjoint_program(assemble(function, draft.tail), sides, unknowns)
+    transposed(draft, function, sides, {name: arrays[name] for name in (*sides, *unknowns)}, arrays)
+
+
+def assemble_rates_jvp(draft: Draft, arrays: dict[str, Array]) -> None:
+    """rates_vjp is linear in its weights: its reverse is the derivative along a change."""
+    function = signed({"rates_vjp": assemble_rates_vjp})["rates_vjp"].of(draft.tail)
+    pair = {"weights": arrays["change"], "gradient": arrays["direction"]}
+    transposed(draft, function, ["weights"], pair, arrays)
+
+
+def transposed(
+    draft: Draft,
+    function: Function,
+    sides: list[str],
+    pairs: dict[str, Array],
+    arrays: dict[str, Array],
+) -> None:
+    """Call the transpose of a function that is linear in some inputs, its sides."""
+    program = inlined(assemble(function, draft.tail))
+    inner = adjoint_program(program, sides, [name for name in pairs if name not in sides])
+    bound = {f"b_{name}": array for name, array in pairs.items()}
+    bound |= {a.name: arrays[a.name] for a in inner.of_role("input") if a.name not in bound and a.name not in sides}
     used = tuple(a for a in inner.arrays if a.name not in sides)
-    bound = {f"b_{name}": arrays[name] for name in (*sides, *unknowns)}
-    draft.call(replace(inner, arrays=used), factors=arrays["factors"], **bound)
+    draft.call(replace(inner, arrays=used), **bound)
 
 
 ASSEMBLIES = {
     "rates_vjp": assemble_rates_vjp,
+    "rates_jvp": assemble_rates_jvp,
     "margins": assemble_margins,
     "margins_vjp": assemble_margins_vjp,
     "implicit_solve_transposed": assemble_solve_transposed,
