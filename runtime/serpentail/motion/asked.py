@@ -1,5 +1,6 @@
 """What a motion is asked for: its states at any time, numbers by name, and its summary."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -142,10 +143,49 @@ class Asked:
         with every other kink of the forces. A model that lacks the C for this gets it: that takes
         as long as compiling the model.
         """
+        return self._run("vjp").vjp(q, v, bristles)
+
+    def jvp(
+        self,
+        q0: ArrayLike | None = None,
+        v0: ArrayLike | None = None,
+        bristles0: ArrayLike | None = None,
+        parameters: Mapping[str, ArrayLike] | None = None,
+    ) -> Any:
+        """Return the change of the end of a run for a small change of its start and of parameters.
+
+        Parameters
+        ----------
+        q0, v0 : array_like, shape (nv,), optional
+            Change of q0, in its tangent space, and of v0, SI; default zeros.
+        bristles0 : array_like, shape (K, 2), optional
+            Change of the friction springs at the start (m); default zeros.
+        parameters : mapping, optional
+            The change of each named parameter, SI, which changes as by ``Model.with_parameters``.
+
+        Returns
+        -------
+        Change
+            Change of the last q, in its tangent space, of the last v, and of the bristles; to first
+            order, so that it may be of any size. It agrees with ``vjp`` to rounding.
+
+        Raises
+        ------
+        SimulationError, ValueError
+            As of ``vjp``.
+
+        Examples
+        --------
+        >>> run.jvp(parameters={"mu": 1.0}).v  # doctest: +SKIP
+        """
+        return self._run("jvp").jvp((q0, v0, bristles0), parameters or {})
+
+    def _run(self, field: str) -> Any:
+        """Return what makes the run again; ValueError if it has no derivatives."""
         again: Any = vars(self).get(AGAIN)
         if not hasattr(again, "vjp"):
-            raise ValueError("vjp: only motions of simulate, from one start, have derivatives")
-        return again.vjp(q, v, bristles)
+            raise ValueError(f"{field}: only motions of simulate, from one start, have derivatives")
+        return again
 
     def summary(self, errors: bool = False) -> "Summary":
         """Return the numbers of the motion by name, such as apex, landing, forces and work.

@@ -1,10 +1,12 @@
 """Makes one run, and makes it again: less exactly, or with samples at other times."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..basics.errors import SimulationError
 from ..basics.progress import Stage
@@ -14,7 +16,7 @@ from .callback import Watch, Watched
 from .controllers.actuation import RunActuations
 from .controllers.controller import Controller, parts_of, phases_of
 from .energies import trajectory_or_error
-from .gradients.gradient import Gradient, refuse, vjp
+from .gradients.gradient import Change, Gradient, jvp, refuse, vjp
 from .gradients.tape import Tape
 from .ground import GroundSettings
 from .methods import SCIPY, IntegrationMethod
@@ -112,6 +114,10 @@ class RunAgain:
     def vjp(self, *parts: Any) -> Gradient:
         """Return a gradient; see ``Trajectory.vjp``."""
         return vjp(self, parts)
+
+    def jvp(self, parts: tuple[Any, Any, Any], parameters: Mapping[str, ArrayLike]) -> Change:
+        """Return a change; see ``Trajectory.jvp``."""
+        return jvp(self, parts, parameters)
 
     def runs(self, start: Start, ground: GroundSettings, method: IntegrationMethod) -> RunSet:
         """Return a run to make, with the same controller."""

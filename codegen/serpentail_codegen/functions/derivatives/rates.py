@@ -165,7 +165,11 @@ def transposed(
     program = inlined(assemble(function, draft.tail))
     inner = adjoint_program(program, sides, [name for name in pairs if name not in sides])
     bound = {f"b_{name}": array for name, array in pairs.items()}
-    bound |= {a.name: arrays[a.name] for a in inner.of_role("input") if a.name not in bound and a.name not in sides}
+    bound |= {
+        a.name: arrays[a.name]
+        for a in inner.of_role("input")
+        if a.name not in bound and a.name not in sides
+    }
     used = tuple(a for a in inner.arrays if a.name not in sides)
     draft.call(replace(inner, arrays=used), **bound)
 

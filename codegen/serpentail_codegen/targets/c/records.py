@@ -175,8 +175,9 @@ TAPE = fields("""
     real *untils: [room] ends of the smooth parts (s)
     int *kinds: [room] what moves a node: 0 those around it, 1 its own time, 2 a touch, 3 the
       landing
-    real *state: [STATE] gradient by the end, then by the start
-    real *by_parameters: [PARAMETERS] gradient by the parameters
+    real *state: [STATE] gradient by the end, then by the start; or change of the start, then of
+        the end
+    real *by_parameters: [PARAMETERS] gradient by the parameters, or their change
     real *by_times: [room] gradients by the times of nodes
     long row: rows so far
     real *rows: [7 room][ROW] t, until, tail rates; gradients by torques and legs there
@@ -192,7 +193,7 @@ TIES = fields("""
 """)
 LANDINGS = fields("""
     real landed_at: time at which the legs' landing begins (s)
-    real by_landing: gradient by this time
+    real by_landing: gradient by this time, or its change
 """)
 
 

@@ -79,7 +79,7 @@ def simulation_context(
     size = tail.nq + tail.nv + 2 * has.contacts + ledger
     slots = SLOTS[has.contacts > 0]
     states = slots * size + tail.nt + table + (12 + 2 * LOOKS) * has.contacts + 4
-    inner, backward = max(works.values()), (9 * size + tail.causes) * has.gradients
+    inner, backward = max(works.values()), (9 * size + 2 * tail.causes) * has.gradients
     resolution, level, felt = RESOLUTION[scene.real]
     return {
         **{name: name + ("f" if single else "") for name in ("pow", "fabs", "ceil")},

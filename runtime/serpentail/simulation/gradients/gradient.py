@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -127,6 +127,21 @@ class Gradient:
         return gradient.along(late, early)
 
 
+@dataclass(frozen=True, eq=False)
+class Change:
+    """How the end of a run changes: q (nv,) in its tangent space, v (nv,) and bristles (K, 2), SI.
+
+    ``exists`` and ``doubts`` are those of Gradient.
+    """
+
+    q: np.ndarray
+    v: np.ndarray
+    bristles: np.ndarray
+    exists: bool
+    doubts: tuple[str, ...]
+    __repr__ = brief
+
+
 def directions(model: Model, name: str) -> np.ndarray:
     """Return how the numbers of the parameter struct (n,) change with those of a parameter (k,)."""
     one_of("parameter", name, [*model.parameters], SimulationError)
@@ -182,7 +197,7 @@ def vjp(again: RunAgain, parts: tuple[Any, Any, Any]) -> Gradient:
     # a turn moves the numbers of a quaternion by E turn / 2, and E^T E is 1
     numbers = 2 * _turns(end) @ dq[OMEGA]
     weights = np.concatenate([dq[POSITION], numbers, dq[OMEGA.stop :], v, bristles])
-    swept = tape.swept(weights)
+    swept = tape.swept("vjp", weights)
     dq, v, bristles = np.split(swept.state, np.cumsum([model.nq, model.nv]))
     turn = _turns(start).T @ dq[QUATERNION] / 2
 
@@ -202,6 +217,28 @@ def vjp(again: RunAgain, parts: tuple[Any, Any, Any]) -> Gradient:
         doubts=doubts,
         condition=condition,
     )
+
+
+def jvp(
+    again: RunAgain, parts: tuple[Any, Any, Any], parameters: Mapping[str, ArrayLike]
+) -> Change:
+    """Return the change of the end of a run, for one of q0, v0 and bristles, and of parameters."""
+    tape, model, points = again.tape, again.tape.model, again.ground.points
+    start, end = (tape.nodes["states"][k][QUATERNION] for k in (0, -1))
+    sizes = {"q0": model.nv, "v0": model.nv, "bristles0": 2 * points}
+    dq, v, bristles = map(_numbers, sizes, parts, sizes.values())
+    moved = np.zeros(len(model.parameter_vector))
+    for name, value in parameters.items():
+        by = directions(model, name)
+        moved += by @ _numbers(f"parameters.{name}", value, by.shape[1])
+    turn = _turns(start) @ dq[OMEGA] / 2
+    change = np.concatenate([dq[POSITION], turn, dq[OMEGA.stop :], v, bristles])
+    dq, v, bristles = np.split(
+        tape.swept("jvp", change, moved).state, np.cumsum([model.nq, model.nv])
+    )
+    q = np.concatenate([dq[POSITION], 2 * _turns(end).T @ dq[QUATERNION], dq[QUATERNION.stop :]])
+    doubts = tape.moves.grazes + tape.moves.doubts
+    return Change(q, v, bristles.reshape(-1, 2), not tape.moves.grazes, doubts)
 
 
 def _turns(quaternion: np.ndarray) -> np.ndarray:

@@ -90,12 +90,15 @@ class Tape:
     def _function(self, name: str) -> Callable[..., int]:
         return self.run.function(name, ctypes.c_void_p)
 
-    def swept(self, state: np.ndarray) -> Swept:
-        """Carry a gradient by the end (nq + nv + 2 points,) to the start."""
+    def swept(self, way: str, state: np.ndarray, parameters: np.ndarray | None = None) -> Swept:
+        """Carry a gradient by the end (nq + nv + 2 points,) to the start, way "vjp"; or a change of
+        the start and of parameters, as in the struct, to the end, way "jvp".
+        """
         record, moves, count = self.record, self.moves, len(self.times)
         columns = 2 + 2 * self.model.layout.nt + 9 * bool(self.ground.legs)
         found = {"state": state.copy(), "by_times": np.zeros(count)}
-        found |= {"by_parameters": np.zeros(len(self.model.parameter_vector))}
+        none = np.zeros(len(self.model.parameter_vector))
+        found |= {"by_parameters": none if parameters is None else parameters}
         found |= {"rows": np.zeros((ROWS * count, columns))}
         given = {"kinds": moves.kinds}
         if self.ground.points:
@@ -105,6 +108,6 @@ class Tape:
         record.row, record.largest = 0, 0.0
         if self.ground.legs:
             record.landed_at, record.by_landing = self.landed_at, 0.0
-        if status := self._function("rollout_vjp")(self.run.address, ctypes.addressof(record)):
-            raise SimulationError(f"vjp: step {record.step} cannot be made again: {status}")
+        if status := self._function(f"rollout_{way}")(self.run.address, ctypes.addressof(record)):
+            raise SimulationError(f"{way}: step {record.step} cannot be made again: {status}")
         return Swept(**found | {"rows": found["rows"][: record.row]}, largest=record.largest)
