@@ -9,7 +9,7 @@ from tests.support.rows import row
 
 HELD = np.radians([230.0, -20.0])  # of the legs
 LEGS = st.Legs.fixed(*HELD)
-SPAN, DAMPED = 0.03, st.Damping(1e-3)
+SPAN, DAMPED, TAU = 0.03, st.Damping(1e-3), [[0.0, 0.01], [0.02, -0.01]]
 EXACT = {"method": "tsit5", "rtol": 1e-12, "output_step": SPAN}
 
 
@@ -86,6 +86,24 @@ def test_by_parameters_and_damping(of_a_drop):
             np.testing.assert_allclose(of_a_drop.by(name), slope(value, 2e-5) / at, rtol=2e-4)
     expected = slope(lambda e: ended(q, v, controller=st.Damping(1e-3 + e)), 1e-5)
     np.testing.assert_allclose(of_a_drop.by(lambda x: st.Damping(x[0]), 1e-3), expected, rtol=1e-4)
+
+
+def test_changes_are_the_transpose_of_gradients():
+    """Through touches, kinks and a landing; the gradients are compared with differences."""
+    (q, v), rng = dropped(), np.random.default_rng(3)
+    move = {"gamma": 4.1, "delta": -0.45, "duration": 0.011, "at": "touch_down"}
+    driven = {"legs": st.Legs.moves(*HELD, [move]), "controller": st.TorqueTable([0, 0.02], TAU)}
+    for how in ({}, driven, {"method": "auto", "rtol": 1e-5}):
+        run = landed(q, v, **{"method": "switching", "rtol": 1e-6} | how)
+        weights, change = ([*rng.normal(size=(2, 8)), rng.normal(size=(6, 2))] for _ in range(2))
+        own = {name: rng.normal() * rat().parameters[name] for name in ("mu", "K_n", "tail_length")}
+        found, by = run.jvp(*change, own), run.vjp(*weights)
+        ends = zip(weights, (found.q, found.v, found.bristles), strict=True)
+        starts = [np.vdot(*pair) for pair in zip(change, (by.q0, by.v0, by.bristles0), strict=True)]
+        starts += [by.by(name)[0] * size for name, size in own.items()]
+        with row(how):
+            total = sum(np.vdot(*pair) for pair in ends)
+            assert abs(total - sum(starts)) < 1e-10 * np.abs(starts).max() and found.exists
 
 
 def test_by_legs_and_torques():
@@ -194,6 +212,8 @@ def test_refusals():
         run.vjp(v=[1.0])
     with pytest.raises(st.SimulationError, match=r"^parameter: value 'mew'"):
         run.vjp(v=np.eye(8)[0]).by("mew")
+    with pytest.raises(st.SimulationError, match=r"^parameters.mu: value .*1 finite numbers"):
+        run.jvp(parameters={"mu": [1.0, 2.0]})
     with pytest.raises(st.SimulationError, match=r"^loss: value nan"):
         st.gradient(rat(), lambda q, v: np.nan, q, v, 0.01, legs=LEGS)
     with pytest.raises(ValueError, match=r"^vjp: only motions of simulate"):
