@@ -47,6 +47,20 @@ def product_matrix(quaternion: Array) -> Array:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
+def in_tangent(q: Array, x: Array, factor: float) -> Array:
+    """Return a change (nq,) of q in its tangent space (nv,), factor 2; or a gradient, factor 1/2."""
+    turn = factor * product_matrix(q[QUATERNION]).T @ x[QUATERNION]
+    return np.concatenate([x[POSITION], turn, x[TAIL_Q]])
+
+
+def in_numbers(q: Array, x: Array, factor: float) -> Array:
+    """Return the reverse of ``in_tangent`` at a unit quaternion: a change with factor 1/2, or a
+    gradient with 2.
+    """
+    numbers = factor * product_matrix(q[QUATERNION]) @ x[OMEGA]
+    return np.concatenate([x[POSITION], numbers, x[TAIL_V]])
+
+
 def jacobians_of_tail(nt: int, of_v_dot: tuple[Array, Array, Array]) -> tuple[Array, Array]:
     """Return the Jacobians of ``jacobians`` for a tail on a fixed base: q_dot is v."""
     by_q, by_v, by_tau = of_v_dot

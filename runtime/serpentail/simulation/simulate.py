@@ -210,6 +210,24 @@ def simulate(
     return motion
 
 
+def run_of(
+    model: Model,
+    q0: Any,
+    v0: Any = None,
+    t_span: Any = SPAN,
+    *,
+    controller: Any = None,
+    method: str = "auto",
+    **settings: Any,
+) -> RunAgain:
+    """Return all that a run is made of, without making it; arguments and errors of ``simulate``."""
+    checked_model(model, SimulationError).need("rollout")
+    state, t_span = parted(model, q0, v0, t_span)
+    start = Start.checked(model, state, t_span, settings.pop("output_step", None))
+    runs = prepared(model, start, controller, method, settings)
+    return RunAgain(start, runs.ground, controller, runs.method)
+
+
 def _doubt(start: Start) -> None:
     """Warn the caller of ``simulate`` of a tail that starts at degrees."""
     if start.model.manifest["scene"]["coordinates"] != "polar":

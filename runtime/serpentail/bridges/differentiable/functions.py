@@ -1,5 +1,6 @@
 """What the functions for JAX and for PyTorch have in common: their arguments and x_dot."""
 
+from collections.abc import Mapping
 from types import ModuleType
 from typing import Any
 
@@ -7,9 +8,12 @@ import numpy
 
 from serpentail_scene.layout import OMEGA, QUATERNION, TAIL_V, VELOCITY
 
-from ...basics.errors import StateError
+from ...basics.checks import one_of
+from ...basics.errors import SimulationError, StateError
 from ...model.model import Model
+from ...model.state import SPAN
 from ...model.state_space import RATE
+from .runs import DifferentiableRun
 
 # the functions of a model that compute the Jacobians of a function by its arguments in order, and
 # how many of the arguments each of them takes; that by q is by its tangent
@@ -47,6 +51,45 @@ class DifferentiableFunctions:
         rates = v if self.model.fixed else self._q_dot(q, v)
         v_dot = self._evaluated("forward_dynamics", [q, v, u])
         return self.namespace.concatenate([rates, v_dot], axis=-1)
+
+    def simulate(
+        self,
+        q0: Any,
+        v0: Any,
+        t_span: Any = SPAN,
+        *,
+        parameters: Mapping[str, Any] | None = None,
+        on_doubt: str = "nan",
+        **settings: Any,
+    ) -> tuple[Any, Any]:
+        """q (nq,) and v (nv,) at the end of a run, which have gradients; see ``st.simulate``.
+
+        Parameters
+        ----------
+        q0, v0, t_span, **settings
+            As of ``st.simulate``. ``legs`` and ``controller`` may be pairs of a function, and the
+            numbers (n,) that it makes them of: then these have gradients, too.
+        parameters : mapping, optional
+            Parameters of the model that have other values, with gradients.
+        on_doubt : str, default "nan"
+            What gradients are where none exists: "nan", or the "value" of one side.
+
+        Raises
+        ------
+        SimulationError, StateError, ModelError
+            As of ``st.simulate`` and ``Trajectory.vjp``, when the run is made; JAX wraps them.
+        """
+        one_of("on_doubt", on_doubt, ("nan", "value"), SimulationError)
+        pairs = {name: each for name, each in settings.items() if isinstance(each, tuple)}
+        given = {"q0": q0, "v0": v0, **(parameters or {})} | {n: x for n, (_, x) in pairs.items()}
+        makers = {name: make for name, (make, _) in pairs.items()}
+        names = tuple(parameters or {})
+        run = DifferentiableRun(self.model, t_span, names, makers, settings, on_doubt == "nan")
+        return self._ended(run, [self._array("simulate", n, x) for n, x in given.items()])
+
+    def _ended(self, run: DifferentiableRun, numbers: list[Any]) -> tuple[Any, Any]:
+        """Return q and v at the end of a run of numbers, which have gradients."""
+        raise NotImplementedError
 
     def _array(self, function: str, field: str, value: Any) -> Any:
         """Return an argument as an array of the model's type; StateError if it cannot be one."""

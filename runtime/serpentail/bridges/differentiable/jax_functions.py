@@ -13,6 +13,7 @@ from ...basics.errors import StateError
 from ...model.model import Model
 from .functions import JACOBIANS, DifferentiableFunctions
 from .jax_calls import TARGET, library, registered
+from .runs import DifferentiableRun
 
 Array = Any  # a jax.Array, or anything that JAX converts to one
 
@@ -70,6 +71,20 @@ class JaxFunctions(DifferentiableFunctions):
             vmap_method="broadcast_all",
         )
         return call(*arrays, name=registered(self.model, name))
+
+    def _ended(self, run: DifferentiableRun, numbers: list[Array]) -> tuple[Array, Array]:
+        """Return q and v at the end of a run of numbers, which have gradients."""
+
+        def called(function: Callable[..., Any], like: list[Array], *given: Array) -> Any:
+            shapes = tuple(jax.ShapeDtypeStruct(x.shape, x.dtype) for x in like)
+            return jax.pure_callback(function, shapes, *given, vmap_method="sequential")
+
+        end = jax.custom_vjp(lambda *given: called(run.end, numbers[:2], *given))
+        end.defvjp(
+            lambda *given: (end(*given), given),
+            lambda given, weights: called(run.gradient, given, *weights, *given),
+        )
+        return end(*numbers)
 
     def _array(self, function: str, field: str, value: Array) -> Array:
         """Return an argument as an array of the model's type; StateError if it cannot be one."""

@@ -12,6 +12,7 @@ from serpentail_scene.layout import OMEGA, POSITION, QUATERNION, TAIL_V
 from ...basics.errors import StateError
 from ...model.model import Model
 from .functions import JACOBIANS, DifferentiableFunctions
+from .runs import DifferentiableRun
 
 models: WeakValueDictionary[str, Model] = WeakValueDictionary()  # by the keys that operators take
 
@@ -35,9 +36,28 @@ class TorchFunctions(DifferentiableFunctions):
             raise StateError(f"{function}: {field}: type {value.dtype}: needs real numbers")
         return value.to(self._dtype)
 
+    def _ended(self, run: DifferentiableRun, numbers: list[Tensor]) -> tuple[Tensor, Tensor]:
+        """Return q and v at the end of a run of numbers, which have gradients."""
+        return End.apply(run, *numbers)
+
     def _evaluated(self, function: str, arrays: list[Tensor]) -> Tensor:
         """Return the output of a function, which has derivatives."""
         return torch.ops.serpentail.function(*arrays, self._key, function)
+
+
+class End(torch.autograd.Function):
+    """The end of a run, whose gradient makes the run again."""
+
+    @staticmethod
+    def forward(ctx: Any, run: DifferentiableRun, *numbers: Tensor) -> tuple[Tensor, ...]:  # type: ignore[override]
+        ctx.run = run
+        ctx.save_for_backward(*numbers)
+        return tuple(map(torch.from_numpy, run.end(*(x.numpy() for x in numbers))))
+
+    @staticmethod
+    def backward(ctx: Any, *weights: Tensor) -> tuple[Tensor | None, ...]:  # type: ignore[override]
+        arrays = (x.detach().numpy() for x in (*weights, *ctx.saved_tensors))
+        return None, *map(torch.from_numpy, ctx.run.gradient(*arrays))
 
 
 def _numbers(arrays: tuple[Tensor, ...], key: str, name: str) -> tuple[Tensor, ...]:

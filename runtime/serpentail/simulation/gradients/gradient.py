@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from serpentail_scene.layout import OMEGA, POSITION, QUATERNION
-
 from ...basics.checks import one_of, refusal
 from ...basics.errors import SimulationError
 from ...basics.short_repr import brief
 from ...model.model import Model
 from ...model.parameters import flat
+from ...model.state_space import in_numbers, in_tangent
 from ..controllers.controller import parts_of
 from ..controllers.schedules import Legs
 from .curves import CurveGradient, curve_gradient
@@ -189,28 +188,18 @@ def _numbers(name: str, value: ArrayLike | None, size: int) -> np.ndarray:
 
 def vjp(again: RunAgain, parts: tuple[Any, Any, Any]) -> Gradient:
     """Return the gradient of a weighted sum of the end of a run: weights of q, v and bristles."""
-    tape, model, points = again.tape, again.tape.model, again.ground.points
-    start, end = (tape.nodes["states"][k][QUATERNION] for k in (0, -1))
-    sizes = {"q": model.nv, "v": model.nv, "bristles": 2 * points}
-    dq, v, bristles = map(_numbers, sizes, parts, sizes.values())
-
-    # a turn moves the numbers of a quaternion by E turn / 2, and E^T E is 1
-    numbers = 2 * _turns(end) @ dq[OMEGA]
-    weights = np.concatenate([dq[POSITION], numbers, dq[OMEGA.stop :], v, bristles])
+    tape, points = again.tape, again.ground.points
+    dq, *others = _parts(again, parts, ("q", "v", "bristles"))
+    weights = np.concatenate([in_numbers(tape.end[0], dq, 2), *others])
     swept = tape.swept("vjp", weights)
-    dq, v, bristles = np.split(swept.state, np.cumsum([model.nq, model.nv]))
-    turn = _turns(start).T @ dq[QUATERNION] / 2
-
     size, doubts = np.abs(weights[: -2 * points or None]).max(), tape.moves.grazes
     condition = float(swept.largest / size) if size else 1.0
     doubts += tape.moves.doubts
     if condition > USELESS:
         doubts += (f"condition {condition:.1g}: the motion is so sensitive that nothing follows",)
     return Gradient(
-        model,
-        np.concatenate([dq[POSITION], turn, dq[QUATERNION.stop :]]),
-        v,
-        bristles.reshape(-1, 2),
+        tape.model,
+        *_parted(tape, 0, swept.state, 0.5),
         swept.by_parameters,
         **_by_tables(again, tape, swept),
         exists=not tape.moves.grazes,
@@ -223,28 +212,27 @@ def jvp(
     again: RunAgain, parts: tuple[Any, Any, Any], parameters: Mapping[str, ArrayLike]
 ) -> Change:
     """Return the change of the end of a run, for one of q0, v0 and bristles, and of parameters."""
-    tape, model, points = again.tape, again.tape.model, again.ground.points
-    start, end = (tape.nodes["states"][k][QUATERNION] for k in (0, -1))
-    sizes = {"q0": model.nv, "v0": model.nv, "bristles0": 2 * points}
-    dq, v, bristles = map(_numbers, sizes, parts, sizes.values())
+    tape, model = again.tape, again.tape.model
+    dq, *others = _parts(again, parts, ("q0", "v0", "bristles0"))
     moved = np.zeros(len(model.parameter_vector))
     for name, value in parameters.items():
         by = directions(model, name)
         moved += by @ _numbers(f"parameters.{name}", value, by.shape[1])
-    turn = _turns(start) @ dq[OMEGA] / 2
-    change = np.concatenate([dq[POSITION], turn, dq[OMEGA.stop :], v, bristles])
-    dq, v, bristles = np.split(
-        tape.swept("jvp", change, moved).state, np.cumsum([model.nq, model.nv])
-    )
-    q = np.concatenate([dq[POSITION], 2 * _turns(end).T @ dq[QUATERNION], dq[QUATERNION.stop :]])
-    doubts = tape.moves.grazes + tape.moves.doubts
-    return Change(q, v, bristles.reshape(-1, 2), not tape.moves.grazes, doubts)
+    change = np.concatenate([in_numbers(tape.nodes["states"][0], dq, 0.5), *others])
+    end = _parted(tape, -1, tape.swept("jvp", change, moved).state, 2)
+    return Change(*end, not tape.moves.grazes, tape.moves.grazes + tape.moves.doubts)
 
 
-def _turns(quaternion: np.ndarray) -> np.ndarray:
-    """Return E (4, 3): a unit quaternion moves by E turn / 2 when the torso turns in body axes."""
-    w, x, y, z = quaternion
-    return np.array([[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]])
+def _parts(again: RunAgain, parts: tuple[Any, Any, Any], names: tuple[str, ...]) -> Any:
+    """Return checked parts by q in its tangent space, v and bristles."""
+    nv = again.start.model.nv
+    return map(_numbers, names, parts, (nv, nv, 2 * again.ground.points))
+
+
+def _parted(tape: Tape, node: int, state: np.ndarray, factor: float) -> Any:
+    """Return the parts of what was swept to a node: by q in its tangent space, v and bristles."""
+    dq, v, bristles = np.split(state, np.cumsum([tape.model.nq, tape.model.nv]))
+    return in_tangent(tape.nodes["states"][node], dq, factor), v, bristles.reshape(-1, 2)
 
 
 def _by_tables(again: RunAgain, tape: Tape, swept: Swept) -> dict[str, Any]:
