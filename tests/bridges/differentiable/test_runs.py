@@ -32,18 +32,15 @@ def test_gradients_of_ends(name):
     functions, given = tool.functions(rat()), starts()
     found = tool.jacobians(lambda *arrays: total(functions, *arrays), given)
     for k, at in enumerate(given):
-        for place in np.ndindex(at.shape):
-            unit = np.zeros(at.shape)
-            unit[place] = max(1e-3, abs(at[place]))
+        way = np.random.default_rng(k).normal(size=at.shape) * np.maximum(1e-3, abs(at))
 
-            def moved(e, k=k, unit=unit):
-                values = [x + e * unit if i == k else x for i, x in enumerate(given)]
-                return float(total(functions, *tool.arrays(values), **EXACT))
+        def moved(e, k=k, way=way):
+            values = [x + e * way if i == k else x for i, x in enumerate(given)]
+            return float(total(functions, *tool.arrays(values), **EXACT))
 
-            with row(k, place):
-                most = np.abs(np.asarray(found[k])).max() * unit[place]
-                ours = found[k][place] * unit[place]
-                np.testing.assert_allclose(ours, slope(moved, 2e-4), atol=3e-4 * most + 1e-9)
+        with row(k):
+            ours = np.vdot(np.asarray(found[k]), way)
+            np.testing.assert_allclose(ours, slope(moved, 2e-4), rtol=2e-4)
 
 
 @pytest.mark.parametrize("name", TOOLS)
@@ -61,8 +58,8 @@ def test_where_a_point_grazes_gradients_are_nan(name):
         assert np.isfinite(np.asarray(found)).all() == known
     with pytest.raises(st.SimulationError, match=r"^on_doubt: value 'zero'"):
         ended(*tool.arrays([q]), on_doubt="zero")
-    with pytest.raises(Exception, match="step: "):
-        ended(*tool.arrays([q]), method="rk4", step=-1)
+    with pytest.raises(Exception, match="rk4 has no setting 'rtol'"):
+        ended(*tool.arrays([q]), method="rk4")
 
 
 def test_runs_under_transformations_of_jax():

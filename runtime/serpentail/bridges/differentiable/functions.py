@@ -21,6 +21,7 @@ JACOBIANS = {
     "forward_dynamics": (("forward_dynamics_derivatives", 3),),
     "inverse_dynamics": (("inverse_dynamics_derivatives", 3), ("mass_matrix", 1)),
 }
+MADE = ("legs", "controller")  # settings that may be made of numbers
 
 
 class DifferentiableFunctions:
@@ -80,7 +81,7 @@ class DifferentiableFunctions:
             As of ``st.simulate`` and ``Trajectory.vjp``, when the run is made; JAX wraps them.
         """
         one_of("on_doubt", on_doubt, ("nan", "value"), SimulationError)
-        pairs = {name: each for name, each in settings.items() if isinstance(each, tuple)}
+        pairs = {n: settings.pop(n) for n in MADE if isinstance(settings.get(n), tuple)}
         given = {"q0": q0, "v0": v0, **(parameters or {})} | {n: x for n, (_, x) in pairs.items()}
         makers = {name: make for name, (make, _) in pairs.items()}
         names = tuple(parameters or {})

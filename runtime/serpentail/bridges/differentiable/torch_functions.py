@@ -52,12 +52,12 @@ class End(torch.autograd.Function):
     def forward(ctx: Any, run: DifferentiableRun, *numbers: Tensor) -> tuple[Tensor, ...]:  # type: ignore[override]
         ctx.run = run
         ctx.save_for_backward(*numbers)
-        return tuple(map(torch.from_numpy, run.end(*(x.numpy() for x in numbers))))
+        return tuple(map(torch.tensor, run.end(*(x.numpy() for x in numbers))))
 
     @staticmethod
     def backward(ctx: Any, *weights: Tensor) -> tuple[Tensor | None, ...]:  # type: ignore[override]
         arrays = (x.detach().numpy() for x in (*weights, *ctx.saved_tensors))
-        return None, *map(torch.from_numpy, ctx.run.gradient(*arrays))
+        return None, *map(torch.tensor, ctx.run.gradient(*arrays))
 
 
 def _numbers(arrays: tuple[Tensor, ...], key: str, name: str) -> tuple[Tensor, ...]:
