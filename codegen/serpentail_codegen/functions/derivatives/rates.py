@@ -19,7 +19,7 @@ from ..contact import contact_load, gather_contact_loads, gather_points, press
 from ..draft import Draft
 from ..dynamics import assemble_forward_dynamics
 from ..factored import factored_dynamics
-from ..function import Function, assemble, signed
+from ..function import Assembly, Function, assemble, signed
 from ..implicit.solve import assemble_solve
 from ..layout import block
 from ..sweeps.pieces import attitude
@@ -140,44 +140,33 @@ def assemble_margins_vjp(draft: Draft, arrays: dict[str, Array]) -> None:
     gathered(draft, arrays["gradient"], adjoints(draft, function, "margins", arrays | given))
 
 
-def assemble_solve_transposed(draft: Draft, arrays: dict[str, Array]) -> None:
-    """implicit_solve is linear in its right-hand side: its reverse is the transpose."""
-    function = signed({"implicit_solve": assemble_solve})["implicit_solve"].of(draft.tail)
-    sides, unknowns = ([a.name for a in each] for each in (function.inputs[1:], function.outputs))
-    transposed(draft, function, sides, {name: arrays[name] for name in (*sides, *unknowns)}, arrays)
+def transposed(name: str, assembly: Assembly, sides: tuple[str, ...], **names: str) -> Assembly:
+    """Return the assembly of the transpose of a function that is linear in its sides: its reverse.
 
+    names: those of arguments that have others here.
+    """
 
-def assemble_rates_jvp(draft: Draft, arrays: dict[str, Array]) -> None:
-    """rates_vjp is linear in its weights: its reverse is the derivative along a change."""
-    function = signed({"rates_vjp": assemble_rates_vjp})["rates_vjp"].of(draft.tail)
-    pair = {"weights": arrays["change"], "gradient": arrays["direction"]}
-    transposed(draft, function, ["weights"], pair, arrays)
+    def assemble_transpose(draft: Draft, arrays: dict[str, Array]) -> None:
+        function = signed({name: assembly})[name].of(draft.tail)
+        program, given = assemble(function, draft.tail), [a.name for a in function.outputs]
+        wanted = [a.name for a in function.inputs if a.name in sides]
+        inner = adjoint_program(inlined(program), wanted, given)
+        inner = replace(inner, arrays=tuple(a for a in inner.arrays if a.name not in sides))
+        bound = (*inner.of_role("input"), *inner.of_role("output"))
+        own = {a.name: a.name.removeprefix("b_") for a in bound}
+        draft.call(inner, **{each: arrays[names.get(last, last)] for each, last in own.items()})
 
-
-def transposed(
-    draft: Draft,
-    function: Function,
-    sides: list[str],
-    pairs: dict[str, Array],
-    arrays: dict[str, Array],
-) -> None:
-    """Call the transpose of a function that is linear in some inputs, its sides."""
-    program = inlined(assemble(function, draft.tail))
-    inner = adjoint_program(program, sides, [name for name in pairs if name not in sides])
-    bound = {f"b_{name}": array for name, array in pairs.items()}
-    bound |= {
-        a.name: arrays[a.name]
-        for a in inner.of_role("input")
-        if a.name not in bound and a.name not in sides
-    }
-    used = tuple(a for a in inner.arrays if a.name not in sides)
-    draft.call(replace(inner, arrays=used), **bound)
+    return assemble_transpose
 
 
 ASSEMBLIES = {
     "rates_vjp": assemble_rates_vjp,
-    "rates_jvp": assemble_rates_jvp,
+    "rates_jvp": transposed(
+        "rates_vjp", assemble_rates_vjp, ("weights",), weights="change", gradient="direction"
+    ),
     "margins": assemble_margins,
     "margins_vjp": assemble_margins_vjp,
-    "implicit_solve_transposed": assemble_solve_transposed,
+    "implicit_solve_transposed": transposed(
+        "implicit_solve", assemble_solve, ("r_q", "r_v", "r_u")
+    ),
 }
