@@ -48,15 +48,13 @@ def product_matrix(quaternion: Array) -> Array:
 
 
 def in_tangent(q: Array, x: Array, factor: float) -> Array:
-    """Return a change (nq,) of q in its tangent space (nv,), factor 2; or a gradient, factor 1/2."""
+    """Return a change of a unit q in its tangent space, factor 2, or a gradient, factor 1/2."""
     turn = factor * product_matrix(q[QUATERNION]).T @ x[QUATERNION]
     return np.concatenate([x[POSITION], turn, x[TAIL_Q]])
 
 
 def in_numbers(q: Array, x: Array, factor: float) -> Array:
-    """Return the reverse of ``in_tangent`` at a unit quaternion: a change with factor 1/2, or a
-    gradient with 2.
-    """
+    """Return the reverse of ``in_tangent``: of a change with factor 1/2, or a gradient with 2."""
     numbers = factor * product_matrix(q[QUATERNION]) @ x[OMEGA]
     return np.concatenate([x[POSITION], numbers, x[TAIL_V]])
 

@@ -152,7 +152,7 @@ class Asked:
         bristles0: ArrayLike | None = None,
         parameters: Mapping[str, ArrayLike] | None = None,
     ) -> Any:
-        """Return the change of the end of a run for a small change of its start and of parameters.
+        """Return how the end of a run changes with its start and parameters; errors as of ``vjp``.
 
         Parameters
         ----------
@@ -161,22 +161,12 @@ class Asked:
         bristles0 : array_like, shape (K, 2), optional
             Change of the friction springs at the start (m); default zeros.
         parameters : mapping, optional
-            The change of each named parameter, SI, which changes as by ``Model.with_parameters``.
+            Changes of named parameters (SI), as by ``Model.with_parameters``.
 
         Returns
         -------
         Change
-            Change of the last q, in its tangent space, of the last v, and of the bristles; to first
-            order, so that it may be of any size. It agrees with ``vjp`` to rounding.
-
-        Raises
-        ------
-        SimulationError, ValueError
-            As of ``vjp``.
-
-        Examples
-        --------
-        >>> run.jvp(parameters={"mu": 1.0}).v  # doctest: +SKIP
+            Change of the end, to first order. It agrees with ``vjp`` to rounding.
         """
         return self._run("jvp").jvp((q0, v0, bristles0), parameters or {})
 

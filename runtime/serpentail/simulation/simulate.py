@@ -213,18 +213,17 @@ def simulate(
 def run_of(
     model: Model,
     q0: Any,
-    v0: Any = None,
-    t_span: Any = SPAN,
-    *,
+    v0: Any,
+    t_span: Any,
     controller: Any = None,
     method: str = "auto",
-    **settings: Any,
+    **how: Any,
 ) -> RunAgain:
-    """Return all that a run is made of, without making it; arguments and errors of ``simulate``."""
+    """Return all that a run of ``simulate`` is made of, without making it."""
     checked_model(model, SimulationError).need("rollout")
     state, t_span = parted(model, q0, v0, t_span)
-    start = Start.checked(model, state, t_span, settings.pop("output_step", None))
-    runs = prepared(model, start, controller, method, settings)
+    start = Start.checked(model, state, t_span, how.pop("output_step", None))
+    runs = prepared(model, start, controller, method, how)
     return RunAgain(start, runs.ground, controller, runs.method)
 
 

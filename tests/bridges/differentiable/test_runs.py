@@ -58,6 +58,8 @@ def test_where_a_point_grazes_gradients_are_nan(name):
         assert np.isfinite(np.asarray(found)).all() == known
     with pytest.raises(st.SimulationError, match=r"^on_doubt: value 'zero'"):
         ended(*tool.arrays([q]), on_doubt="zero")
+    with pytest.raises(st.StateError, match=r"^simulate: q0 has shape \(2, 9\)"):
+        ended(*tool.arrays([np.stack([q, q])]))
     with pytest.raises(Exception, match="rk4 has no setting 'rtol'"):
         ended(*tool.arrays([q]), method="rk4")
 

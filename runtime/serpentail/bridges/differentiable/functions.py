@@ -63,7 +63,9 @@ class DifferentiableFunctions:
         on_doubt: str = "nan",
         **settings: Any,
     ) -> tuple[Any, Any]:
-        """q (nq,) and v (nv,) at the end of a run, which have gradients; see ``st.simulate``.
+        """q (nq,) and v (nv,) at the end of a run, which have gradients.
+
+        Errors are those of ``st.simulate`` and ``Trajectory.vjp``, when it is made; JAX wraps them.
 
         Parameters
         ----------
@@ -74,19 +76,19 @@ class DifferentiableFunctions:
             Parameters of the model that have other values, with gradients.
         on_doubt : str, default "nan"
             What gradients are where none exists: "nan", or the "value" of one side.
-
-        Raises
-        ------
-        SimulationError, StateError, ModelError
-            As of ``st.simulate`` and ``Trajectory.vjp``, when the run is made; JAX wraps them.
         """
         one_of("on_doubt", on_doubt, ("nan", "value"), SimulationError)
         pairs = {n: settings.pop(n) for n in MADE if isinstance(settings.get(n), tuple)}
+        ways = dict.fromkeys(parameters or {}) | {name: make for name, (make, _) in pairs.items()}
         given = {"q0": q0, "v0": v0, **(parameters or {})} | {n: x for n, (_, x) in pairs.items()}
-        makers = {name: make for name, (make, _) in pairs.items()}
-        names = tuple(parameters or {})
-        run = DifferentiableRun(self.model, t_span, names, makers, settings, on_doubt == "nan")
-        return self._ended(run, [self._array("simulate", n, x) for n, x in given.items()])
+        arrays = {name: self._array("simulate", name, x) for name, x in given.items()}
+        for name, size in {"q0": self.model.nq, "v0": self.model.nv}.items():
+            if (shape := tuple(arrays[name].shape)) != (size,):
+                raise StateError(
+                    f"simulate: {name} has shape {shape}, not ({size},): map over rows"
+                )
+        run = DifferentiableRun(self.model, t_span, ways, settings, on_doubt == "nan")
+        return self._ended(run, [*arrays.values()])
 
     def _ended(self, run: DifferentiableRun, numbers: list[Any]) -> tuple[Any, Any]:
         """Return q and v at the end of a run of numbers, which have gradients."""

@@ -18,15 +18,13 @@ Arrays = tuple[np.ndarray, ...]
 
 @dataclass(frozen=True, eq=False)
 class DifferentiableRun:
-    """A run of arrays: q0, v0, parameters by their names, and numbers of which settings are made.
-
-    nan: whether gradients are nan where there is none, or those of one side.
+    """A run of arrays: q0, v0, and what enters by these ways: a parameter, or numbers of which a
+    function makes a setting. nan: whether gradients are nan where there is none.
     """
 
     model: Model
     t_span: Any
-    names: tuple[str, ...]
-    makers: Mapping[str, Callable[[np.ndarray], Any]]
+    ways: Mapping[str, Callable[[np.ndarray], Any] | None]
     settings: Mapping[str, Any]
     nan: bool
 
@@ -38,20 +36,22 @@ class DifferentiableRun:
     def gradient(self, by_q: Any, by_v: Any, *arrays: Any) -> Arrays:
         """Return the gradient by each array of a sum of q and v at the end with these weights."""
         run: RunAgain = self._made(run_of, arrays)
-        q0 = np.asarray(arrays[0])
+        q0, _, *others = map(np.asarray, arrays)
         by = run.vjp(in_tangent(run.tape.end[0], np.asarray(by_q), 0.5), by_v, None)
 
         # nothing changes along a quaternion, of any norm
         found = [in_numbers(q0, by.q0, 2 / (q0[QUATERNION] ** 2).sum()), by.v0]
-        found += [by.by(name) for name in self.names]
-        made = zip(self.makers.values(), arrays[2 + len(self.names) :], strict=True)
-        found += [by.by(make, np.asarray(x)) for make, x in made]
+        ways = zip(self.ways.items(), others, strict=True)
+        found += [by.by(make or name, x) for (name, make), x in ways]
         scale = 1.0 if by.exists or not self.nan else np.nan
         return tuple(scale * x.reshape(np.shape(y)) for x, y in zip(found, arrays, strict=True))
 
     def _made(self, make: Callable[..., Any], arrays: Arrays) -> Any:
         q0, v0, *others = map(np.asarray, arrays)
-        own = {name: x.tolist() for name, x in zip(self.names, others, strict=False)}
-        made = zip(self.makers.items(), others[len(own) :], strict=True)
-        settings = dict(self.settings) | {name: each(x) for (name, each), x in made}
+        own, settings = {}, dict(self.settings)
+        for (name, way), x in zip(self.ways.items(), others, strict=True):
+            if way is None:
+                own[name] = x.tolist()
+            else:
+                settings[name] = way(x)
         return make(self.model.with_parameters(**own), q0, v0, self.t_span, **settings)

@@ -46,16 +46,18 @@ class TorchFunctions(DifferentiableFunctions):
 
 
 class End(torch.autograd.Function):
-    """The end of a run, whose gradient makes the run again."""
+    """The end of a run."""
 
     @staticmethod
-    def forward(ctx: Any, run: DifferentiableRun, *numbers: Tensor) -> tuple[Tensor, ...]:  # type: ignore[override]
+    def forward(ctx: Any, run: DifferentiableRun, *numbers: Tensor) -> tuple[Tensor, ...]:
+        """Return q and v."""
         ctx.run = run
         ctx.save_for_backward(*numbers)
         return tuple(map(torch.tensor, run.end(*(x.numpy() for x in numbers))))
 
     @staticmethod
-    def backward(ctx: Any, *weights: Tensor) -> tuple[Tensor | None, ...]:  # type: ignore[override]
+    def backward(ctx: Any, *weights: Tensor) -> tuple[Tensor | None, ...]:
+        """Return gradients by the numbers; the run is made again."""
         arrays = (x.detach().numpy() for x in (*weights, *ctx.saved_tensors))
         return None, *map(torch.tensor, ctx.run.gradient(*arrays))
 

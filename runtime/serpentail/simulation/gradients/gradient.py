@@ -128,9 +128,8 @@ class Gradient:
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """How the end of a run changes: q (nv,) in its tangent space, v (nv,) and bristles (K, 2), SI.
-
-    ``exists`` and ``doubts`` are those of Gradient.
+    """How the end of a run changes: q (nv,) in its tangent space, v (nv,) and bristles (K, 2), SI;
+    exists and doubts as of Gradient.
     """
 
     q: np.ndarray
@@ -197,9 +196,12 @@ def vjp(again: RunAgain, parts: tuple[Any, Any, Any]) -> Gradient:
     doubts += tape.moves.doubts
     if condition > USELESS:
         doubts += (f"condition {condition:.1g}: the motion is so sensitive that nothing follows",)
+    q0, v0, bristles0 = _parted(tape, 0, swept.state, 0.5)
     return Gradient(
         tape.model,
-        *_parted(tape, 0, swept.state, 0.5),
+        q0,
+        v0,
+        bristles0,
         swept.by_parameters,
         **_by_tables(again, tape, swept),
         exists=not tape.moves.grazes,
@@ -219,8 +221,9 @@ def jvp(
         by = directions(model, name)
         moved += by @ _numbers(f"parameters.{name}", value, by.shape[1])
     change = np.concatenate([in_numbers(tape.nodes["states"][0], dq, 0.5), *others])
-    end = _parted(tape, -1, tape.swept("jvp", change, moved).state, 2)
-    return Change(*end, not tape.moves.grazes, tape.moves.grazes + tape.moves.doubts)
+    q, v, bristles = _parted(tape, -1, tape.swept("jvp", change, moved).state, 2)
+    grazes, doubts = tape.moves.grazes, tape.moves.doubts
+    return Change(q, v, bristles, not grazes, grazes + doubts)
 
 
 def _parts(again: RunAgain, parts: tuple[Any, Any, Any], names: tuple[str, ...]) -> Any:
