@@ -48,6 +48,6 @@ SIGNATURES = (
          bristle_numbers("r_u", "gradient by the right-hand side for the bristles")),
         SIMULATION, called=True),
     Signature("gradients",
-        "gradients of whole simulations in C, which `vjp` of a trajectory runs",
+        "gradients of whole simulations in C, which `vjp` and `jvp` of a trajectory run",
         (), (), SIMULATION),
 )

@@ -16,7 +16,7 @@ def jax_functions(model: Model) -> "JaxFunctions":
     """Return functions of a model for JAX, with exact derivatives.
 
     They are ``forward_dynamics``, ``inverse_dynamics`` and ``x_dot``, run on the CPU, and work
-    inside jit, vmap, jvp, grad and scan.
+    inside jit, vmap, jvp, grad and scan. ``simulate`` makes a run, with gradients of its end.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def torch_functions(model: Model) -> "TorchFunctions":
     """Return functions of a model for PyTorch, with exact derivatives.
 
     They are ``forward_dynamics``, ``inverse_dynamics`` and ``x_dot``: custom operators on CPU
-    tensors, which autograd differentiates.
+    tensors, which autograd differentiates; and ``simulate``, with gradients of the end of a run.
 
     Parameters
     ----------
