@@ -210,23 +210,6 @@ def simulate(
     return motion
 
 
-def run_of(
-    model: Model,
-    q0: Any,
-    v0: Any,
-    t_span: Any,
-    controller: Any = None,
-    method: str = "auto",
-    **how: Any,
-) -> RunAgain:
-    """Return all that a run of ``simulate`` is made of, without making it."""
-    checked_model(model, SimulationError).need("rollout")
-    state, t_span = parted(model, q0, v0, t_span)
-    start = Start.checked(model, state, t_span, how.pop("output_step", None))
-    runs = prepared(model, start, controller, method, how)
-    return RunAgain(start, runs.ground, controller, runs.method)
-
-
 def _doubt(start: Start) -> None:
     """Warn the caller of ``simulate`` of a tail that starts at degrees."""
     if start.model.manifest["scene"]["coordinates"] != "polar":

@@ -10,8 +10,8 @@ from serpentail_scene.layout import QUATERNION
 
 from ...model.model import Model
 from ...model.state_space import in_numbers, in_tangent
-from ...simulation.one_run import RunAgain
-from ...simulation.simulate import run_of, simulate
+from ...motion.trajectory import Trajectory
+from ...simulation.simulate import simulate
 
 Arrays = tuple[np.ndarray, ...]
 
@@ -30,14 +30,13 @@ class DifferentiableRun:
 
     def end(self, *arrays: Any) -> Arrays:
         """Return q (nq,) and v (nv,) at the end."""
-        motion = self._made(simulate, arrays)
-        return motion.q[-1], motion.v[-1]
+        run = self._made(arrays)
+        return run.q[-1], run.v[-1]
 
     def gradient(self, by_q: Any, by_v: Any, *arrays: Any) -> Arrays:
         """Return the gradient by each array of a sum of q and v at the end with these weights."""
-        run: RunAgain = self._made(run_of, arrays)
-        q0, _, *others = map(np.asarray, arrays)
-        by = run.vjp(in_tangent(run.tape.end[0], np.asarray(by_q), 0.5), by_v, None)
+        run, (q0, _, *others) = self._made(arrays), map(np.asarray, arrays)
+        by = run.vjp(in_tangent(run.q[-1], np.asarray(by_q), 0.5), by_v)
 
         # nothing changes along a quaternion, of any norm
         found = [in_numbers(q0, by.q0, 2 / (q0[QUATERNION] ** 2).sum()), by.v0]
@@ -46,7 +45,7 @@ class DifferentiableRun:
         scale = 1.0 if by.exists or not self.nan else np.nan
         return tuple(scale * x.reshape(np.shape(y)) for x, y in zip(found, arrays, strict=True))
 
-    def _made(self, make: Callable[..., Any], arrays: Arrays) -> Any:
+    def _made(self, arrays: Arrays) -> Trajectory:
         q0, v0, *others = map(np.asarray, arrays)
         own, settings = {}, dict(self.settings)
         for (name, way), x in zip(self.ways.items(), others, strict=True):
@@ -54,4 +53,4 @@ class DifferentiableRun:
                 own[name] = x.tolist()
             else:
                 settings[name] = way(x)
-        return make(self.model.with_parameters(**own), q0, v0, self.t_span, **settings)
+        return simulate(self.model.with_parameters(**own), q0, v0, self.t_span, **settings)

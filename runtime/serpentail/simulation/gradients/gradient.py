@@ -189,7 +189,7 @@ def vjp(again: RunAgain, parts: tuple[Any, Any, Any]) -> Gradient:
     """Return the gradient of a weighted sum of the end of a run: weights of q, v and bristles."""
     tape, points = again.tape, again.ground.points
     dq, *others = _parts(again, parts, ("q", "v", "bristles"))
-    weights = np.concatenate([in_numbers(tape.end[0], dq, 2), *others])
+    weights = np.concatenate([in_numbers(tape.nodes["states"][-1], dq, 2), *others])
     swept = tape.swept("vjp", weights)
     size, doubts = np.abs(weights[: -2 * points or None]).max(), tape.moves.grazes
     condition = float(swept.largest / size) if size else 1.0

@@ -9,7 +9,7 @@ from ...basics.errors import SimulationError
 from ...model.model import Model
 from ...model.state import SPAN, Quantity, Span
 from ..settings import RunSettings
-from ..simulate import run_of
+from ..simulate import simulate
 from .gradient import Gradient
 
 STEP = 1e-6  # of central differences of a loss, over the size of what it is moved by
@@ -38,7 +38,7 @@ def gradient(
     Returns
     -------
     value : float
-        The loss of the run that is differentiated, at a 20th of the tolerance.
+        The loss.
     gradient : Gradient
         Its gradient by start, parameters, damping, torques and legs; see ``Trajectory.vjp``.
 
@@ -53,15 +53,15 @@ def gradient(
     >>> value, by = st.gradient(model, height, q0, v0, 0.05, legs=legs)  # doctest: +SKIP
     >>> by.v0[2], by.by("mu")  # doctest: +SKIP
     """
-    run = run_of(model, q0, v0, t_span, **settings)
-    q, v = run.tape.end
+    motion = simulate(model, q0, v0, t_span, **settings)
+    q, v = motion.q[-1], motion.v[-1]
     weights = np.zeros((2, model.nv))
     for k, row in enumerate(np.eye(model.nv)):
         step = STEP * max(1.0, abs(v[k]))
         turned = [_number(loss, model.integrate(q, row, h), v) for h in (STEP, -STEP)]
         moved = [_number(loss, q, v + h * row) for h in (step, -step)]
         weights[:, k] = (turned[0] - turned[1]) / (2 * STEP), (moved[0] - moved[1]) / (2 * step)
-    return _number(loss, q, v), run.vjp(*weights, None)
+    return _number(loss, q, v), motion.vjp(*weights)
 
 
 def _number(loss: Callable[[np.ndarray, np.ndarray], float], q: Any, v: np.ndarray) -> float:

@@ -66,12 +66,6 @@ class Tape:
         """Times of the nodes (s)."""
         return self.nodes["times"][:, 0]
 
-    @property
-    def end(self) -> tuple[np.ndarray, np.ndarray]:
-        """q (nq,) and v (nv,) at the end."""
-        y, nq = self.nodes["states"][-1], self.model.nq
-        return y[:nq], y[nq : nq + self.model.nv]
-
     def _write(self) -> None:
         """Make the run, and note its nodes."""
         size = self.model.nq + self.model.nv + 2 * self.ground.points
