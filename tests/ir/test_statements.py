@@ -28,7 +28,7 @@ from tests.support.rows import row
 
 ROW = 8  # numbers that store a row of a small matrix
 DIFFERENTIATED = {ir.Apply, ir.Copy, ir.Fill, ir.Guard, ir.Loop}
-REVERSED = {ir.Solve}  # also, but not carried along
+REVERSED = {ir.Factor, ir.Solve}  # also, but not carried along
 TREES = {ir.Loop, ir.When, ir.Call}  # asked of what is in them
 MATRICES = {ir.Factor, ir.Solve}
 
@@ -140,6 +140,16 @@ def test_each_is_differentiated_or_refused_by_its_name():
                 else:
                     with pytest.raises((TypeError, ValueError), match=f"{kind.__name__}|is overwr"):
                         derive(program, ("a",), *more)
+
+
+def test_a_factorisation_whose_matrix_matters_has_no_reverse():
+    b = Builder("factors", "One matrix.")
+    a, x, A = b.array("a", 2, role="input"), b.array("x", 2, role="output"), b.array("A", 4 * ROW)
+    b.copy(A.part(0, 2), a[0])
+    b.factor(A, 2)
+    b.copy(x[0], A.part(0, 2))
+    with pytest.raises(ValueError, match=r"^Factor: A has no adjoints"):
+        adjoint_program(b.finish(), ("a",), ("x",))
 
 
 # Conditions

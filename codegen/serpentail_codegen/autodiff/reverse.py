@@ -174,11 +174,15 @@ class _Reversal:
         ]
         return [solve], [*swapped, replace(back, matrix=turned)]
 
-    def guard(self, guard: ir.Guard | ir.Factor, loops: Loops) -> BothWays:
-        """Return a guard, which has no reverse, or a factorisation: see solve."""
-        return [guard], []
+    def factor(self, factor: ir.Factor, loops: Loops) -> BothWays:
+        """Return the factorisation of a matrix that has no adjoints."""
+        if self.matters(factor.matrix[0]):
+            raise ValueError(f"Factor: {factor.matrix.name} has no adjoints")
+        return [factor], []
 
-    factor = guard
+    def guard(self, guard: ir.Guard, loops: Loops) -> BothWays:
+        """Return a guard, which has no reverse."""
+        return [guard], []
 
     def fill(self, fill: ir.Fill, loops: Loops) -> BothWays:
         """Return a fill and its reverse."""
