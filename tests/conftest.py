@@ -1,5 +1,6 @@
 """Options of the test run, how it compiles its models, and what it could not test."""
 
+import gc
 import os
 import re
 import signal
@@ -40,6 +41,12 @@ def pytest_configure(config):
 def pytest_sessionstart(session):
     """Compile what makes calls, before a test tries what happens where that cannot be had."""
     extension()
+
+
+def pytest_collection_finish(session):
+    """Search for cycles less often, and not in what was imported: a tenth of a run's time."""
+    gc.freeze()
+    gc.set_threshold(20_000, 20, 50)
 
 
 @pytest.fixture

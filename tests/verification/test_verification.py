@@ -22,7 +22,9 @@ from tests.support.rows import row
 from tests.verification import verify_model
 
 SOUND = ("m1_n1", "ratios", "arcs1", "elastic", "single_ground", "baked")
-OTHERS = [name for name in zoo.ZOO if name not in (*SOUND, "polar")]  # polar ones have no states
+OTHERS = [  # polar ones have no states
+    pytest.param(n, marks=pytest.mark.slow) for n in zoo.ZOO if n not in (*SOUND, "polar")
+]
 KINDS = ("double", "articulated", "contact", "passive", "air", "tendons")
 REASONS = {f"only for {kind} models" for kind in KINDS}
 REASONS |= {"no even m or n of links", "only for a torso that moves", verify_model.PLAIN}
@@ -35,15 +37,13 @@ OTHER_NUMBERS = {  # of a large animal, and of one without weight
 }
 
 
-@pytest.mark.parametrize("names", [SOUND, pytest.param(OTHERS, marks=pytest.mark.slow)])
-def test_sound_models_pass(names):
+@pytest.mark.parametrize("name", [*SOUND, *OTHERS])
+def test_sound_models_pass(name):
     """Everything was checked but what cannot be, and nothing failed."""
-    for name in names:
-        with row(name):
-            checks = verify_model.verify(zoo.folder(name))
-            assert [c for c in checks if not c.passed] == []
-            reasons = {c.omitted for c in checks if c.omitted} - REASONS
-            assert all(missing_in(zoo.model(name), reason) for reason in reasons)
+    checks = verify_model.verify(zoo.folder(name))
+    assert [c for c in checks if not c.passed] == []
+    reasons = {c.omitted for c in checks if c.omitted} - REASONS
+    assert all(missing_in(zoo.model(name), reason) for reason in reasons)
 
 
 def missing_in(model, reason):
