@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.linalg import block_diag
 
 from serpentail import StateError
 from serpentail.basics.attitude import quaternion_rate
@@ -74,20 +75,18 @@ def worst(found, expected, rows, columns):
     return max(errors)
 
 
-def along(model, name, arguments):
-    """Complex steps along every number of x and tau: output -> (length, directions)."""
-    nest = nest_of(model, name)
-    x, tau = arguments["x"], arguments["tau"]
-    unit = np.eye(len(x) + len(tau))
-    steps = {"x": unit[: len(x)], "tau": unit[len(x) :]}
+def along(model, name, arguments, ways):
+    """Complex steps along columns of x and tau: output -> (length, directions)."""
+    nest, nx = nest_of(model, name), len(arguments["x"])
+    steps = {"x": ways[:nx], "tau": ways[nx:]}
     scalars = {}
     for array in (*nest.of_role("parameters"), *nest.of_role("input")):
         values = {**parameters_of(model), **arguments}[array.name]
-        step = steps.get(array.name, np.zeros((len(values), len(unit))))
+        step = steps.get(array.name, np.zeros((len(values), ways.shape[1])))
         scalars[array.name] = list(np.asarray(values)[:, None] + 1j * STEP * step)
     # every direction is a run of its own: wide arrays have lanes of their own
-    found = {a.name: np.zeros((a.length, len(unit))) for a in nest.of_role("output")}
-    for k in range(len(unit)):
+    found = {a.name: np.zeros((a.length, ways.shape[1])) for a in nest.of_role("output")}
+    for k in range(ways.shape[1]):
         run = Run(nest, COMPLEX, {n: [s[k] for s in rows] for n, rows in scalars.items()})
         for output, values in found.items():
             values[:, k] = np.array([np.imag(s) for s in run.values[output]]) / STEP
@@ -126,17 +125,21 @@ def test_rates_are_those_of_full_dynamics_at_that_momentum(name):
 
 @every_model
 def test_derivatives_are_those_of_a_complex_step(name):
-    model = model_of(name)
+    """Along a random direction in each block of x and tau."""
+    model, rng = model_of(name), np.random.default_rng(42)
     nt, air = model.nv - 6, [3] * (drift_of(model) // 3)
     by, of = blocks(4, nt, nt, *air, nt), blocks(4, nt, nt, *air, 3)
+    each = blocks(*np.ones(len(by), int))
     for at, (q, _, _), arguments in [*calls(model)][::2]:
         y, J, H = all_three(model, arguments)[2]
         limit = ROUNDING * equilibrated_condition(model.mass_matrix(q))
-        steps = along(model, "airborne_rates_derivatives", arguments)["J"]
-        expected = np.einsum("r,rck->ck", arguments["weights"], steps.reshape(len(y), *H.shape))
+        ways = block_diag(*(rng.normal(size=(b.stop - b.start, 1)) for b in by))
+        steps = along(model, "airborne_rates_derivatives", arguments, ways)["J"]
+        expected = np.einsum("r,rck->ck", arguments["weights"], steps.reshape(len(y), len(H), -1))
+        slopes = along(model, "airborne_rates", arguments, ways)["y"]
         with row(at):
-            assert worst(J, along(model, "airborne_rates", arguments)["y"], of, by) <= limit
-            assert worst(H, expected, by, by) <= limit
+            assert worst(J @ ways, slopes, of, each) <= limit
+            assert worst(H @ ways, expected, by, each) <= limit
             np.testing.assert_array_equal(H, H.T)
             # torques enter with coordinates alone
             assert not np.delete(H[-nt:], np.r_[4 : 4 + nt], axis=1).any()

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from serpentail.verification.report import laws
 from serpentail_codegen.functions.catalogue import function_of
 from serpentail_codegen.functions.function import assemble
 from serpentail_codegen.pipeline import tail_of
@@ -114,68 +113,6 @@ def test_loads_do_their_work(name):
     power = f_ext[:3] @ way[:3] + f_ext[3:6] @ way[3:6]
     power += np.sum(f_ext[6:].reshape(-1, 3) * (ahead - behind)) / (2 * step)
     assert way @ force == pytest.approx(power, rel=1e-8)
-
-
-@pytest.mark.parametrize("name", ["tree", "limbs"])
-def test_derivatives_are_those_of_the_functions(name):
-    """Along one direction by differences; products with Jacobians to rounding."""
-    model, step, rng = zoo.model(name), 1e-6, np.random.default_rng(5)
-    q, v, v_dot, tau = next(own_tails.states(model.nq, 1))
-    q[3:7] /= np.linalg.norm(q[3:7])
-    dq, dv, weights = rng.normal(size=(3, model.nv))
-    dtau = 1e-4 * rng.normal(size=model.nv - 6)
-
-    def change(f):
-        moved = [(model.integrate(q, dq, h), v + h * dv, h * dtau) for h in (-step, step)]
-        low, high = (np.concatenate([np.ravel(x) for x in f(*at)]) for at in moved)
-        return (high - low) / (2 * step)
-
-    forward = model.forward_dynamics_derivatives(q, v, tau)
-    along = sum(J @ d for J, d in zip(forward, (dq, dv, dtau), strict=True))
-    inverse = (*model.inverse_dynamics_derivatives(q, v, v_dot), model.mass_matrix(q))
-    potential = model.energy_derivatives(q, v)
-    by_q, by_v, turn_q, turn_v = model.momentum_derivatives(q, v)
-    cases = {
-        "forward": (lambda q, v, t: [model.forward_dynamics(q, v, tau + t)], along),
-        "inverse": (
-            lambda q, v, _: [model.inverse_dynamics(q, v, v_dot)],
-            inverse[0] @ dq + inverse[1] @ dv,
-        ),
-        "energy": (
-            lambda q, v, _: model.energy(q, v),
-            np.array([potential[0] @ dq + potential[1] @ dv, potential[2] @ dq]),
-        ),
-        "momentum": (
-            lambda q, v, _: model.momentum(q, v),
-            np.concatenate([by_q @ dq + by_v @ dv, turn_q @ dq + turn_v @ dv]),
-        ),
-    }
-    for what, (f, found) in cases.items():
-        with row(what):
-            expected = change(f)
-            assert np.abs(found - expected).max() < 1e-7 * np.abs(expected).max()
-
-    jvp = model.forward_dynamics_jvp(q, v, tau, dq, dv, dtau)
-    assert block_error(jvp, along) < 1e-12
-    both = zip(model.forward_dynamics_vjp(q, v, tau, weights), forward, strict=True)
-    others = zip(model.inverse_dynamics_vjp(q, v, v_dot, weights), inverse, strict=True)
-    for found, J in (*both, *others):
-        assert np.abs(found - weights @ J).max() < 1e-12 * np.abs(weights @ J).max()
-
-
-@pytest.mark.parametrize("name", ["tree", "limbs"])
-def test_torques_of_pfl_give_the_accelerations(name):
-    model = zoo.model(name)
-    q, v, v_dot, _ = next(own_tails.states(model.nq, 1))
-    torques = model.pfl(q, v, v_dot[6:])
-    found = model.forward_dynamics(q, v, torques)[6:]
-    assert np.abs(found - v_dot[6:]).max() < 1e-9 * np.abs(v_dot).max()
-
-
-@pytest.mark.parametrize("name", ["tree", "limbs"])
-def test_every_law_holds(name):
-    wrong = [check for check in laws(zoo.model(name)) if not check.passed]
-    assert not wrong
 
 
 # ---- random trees -------------------------------------------------------------------------------
