@@ -197,7 +197,7 @@ def test_each_leg_has_its_own_angles():
     values, rates, _ = curve.at(0.25)
     np.testing.assert_allclose(values, [3.5, -0.3, 3.5, -0.4])
     np.testing.assert_allclose(rates, [0, -0.4, 0, 0])
-    assert KICK.curve.kinks(2) == pytest.approx([0.4, 0.4 + (CROUCH - STRETCH) / 70])
+    assert KICK.curve.kinks() == pytest.approx([0.4, 0.4 + (CROUCH - STRETCH) / 70])
 
 
 G, MU, STOP = 9.8, 0.5, 1 / (2 * 0.5 * 9.8)  # m/s^2, and 102 mm from 1 m/s

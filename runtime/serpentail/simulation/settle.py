@@ -7,7 +7,7 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..basics.checks import number, whole_number
+from ..basics.checks import number, numbers_in, refusal, whole_number
 from ..basics.errors import SimulationError, StateError
 from ..model.model import Model
 from ..model.state import Quantity, State
@@ -69,13 +69,13 @@ def settle(
     if isinstance(q0, State):
         refuse_moving("q0", q0)
         q0 = q0.q
-    if np.ndim(q0) != 1:
-        raise StateError(
-            f"q0 has shape {np.shape(q0)}, not ({model.nq},): settle one start state after another"
-        )
+    start = numbers_in(q0)
+    if start is None or start.ndim != 1:
+        needs = f"one configuration ({model.nq},), or a State: settle one after another"
+        raise refusal("q0", q0, needs, StateError)
     duration = check_settling(model, rounds, duration)
     at = number("at", at, SimulationError, unit="s")
-    q, v = np.asarray(q0), np.zeros(model.nv)
+    q, v = start, np.zeros(model.nv)
     given: dict[str, Any] = {"output_step": duration, "t_span": (at - duration, at), **settings}
     if isinstance(given.get("legs"), Legs):
         given["legs"] = given["legs"].before_landing()

@@ -48,10 +48,10 @@ class Actuation:
         stops = {*self._kinks(begins, span)}
         members: dict[str, Any] = {}
         if isinstance(legs, Piecewise):
-            stops |= {*legs.kinks(3).tolist()}
+            stops |= {*legs.kinks().tolist()}
             members["given"] = self._table(legs)
         elif legs is not None:
-            stops |= {*legs.curve.kinks(2).tolist()}
+            stops |= {*legs.curve.kinks().tolist()}
             members["legs"] = self._table(legs.curve)
             if legs.landing is not None:
                 members["landing"] = self._table(legs.landing)

@@ -64,9 +64,9 @@ class Parts:
         """Return the times at which these torques have a jump or a kink."""
         times: list[float] = []
         for curve in (self.torques, self.tensions):
-            times += [] if curve is None else curve.kinks(2).tolist()
+            times += [] if curve is None else curve.kinks().tolist()
         if self.pfl is not None:
-            times += self.pfl.curve.kinks(3).tolist()
+            times += self.pfl.curve.kinks().tolist()
         return times
 
     def ticks(self, start: float, end: float) -> list[float]:

@@ -95,12 +95,14 @@ class Piecewise:
         return value, np.where(held, 0.0, rate), np.where(held, 0.0, acceleration)
 
     @np.errstate(over="ignore", invalid="ignore")  # a run refuses numbers that are not finite
-    def kinks(self, orders: int) -> np.ndarray:
-        """Return the times at which a derivative of order below ``orders`` jumps, and both ends."""
+    def kinks(self) -> np.ndarray:
+        """Return the times at which a derivative of any order jumps: a step that passes one that is
+        as smooth as the method's order may still miss what is short between two of them.
+        """
         if self.never_changes:
             return self.times[:0]
         jumps = np.zeros(len(self.times), bool)
-        for order in range(orders):
+        for order in range(self.coefficients.shape[-1]):
             c = _derived(self.coefficients, order)
             widths = np.diff(self.times)[:, None]
             # each piece at both its ends, and the values held outside
