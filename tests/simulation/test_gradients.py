@@ -178,6 +178,26 @@ def test_flights():
     np.testing.assert_allclose(fall.by(make, [1e-3, -2e-3])[0], expected, rtol=1e-4)
 
 
+def test_in_air_and_with_motors():
+    """By velocities and the wind, of a tail in air; and runs that motors limit have none."""
+    model, start = zoo.model("taped_air"), zoo.model("taped_air").state(velocity=[1, -2, 1], bend=0.3)
+    fly = lambda e=0.0, wind=0.0: st.simulate(  # noqa: E731
+        model.with_parameters(wind=np.array(model.parameters["wind"]) + [0, wind, 0]),
+        start.q,
+        start.v + e * np.arange(8),
+        SPAN,
+        rtol=1e-9,
+    )
+    found = fly().vjp(v=np.eye(8)[7])
+    expected = slope(lambda e: fly(e).v[-1][7], 1e-3)
+    np.testing.assert_allclose(found.v0 @ np.arange(8), expected, rtol=1e-6)
+    expected = slope(lambda e: fly(wind=e).v[-1][7], 1e-2)
+    np.testing.assert_allclose(found.by("wind")[1], expected, rtol=1e-4)
+    driven, law = zoo.model("motors"), st.TorqueTable([0.0], [[1.0, 0.0]])
+    with pytest.raises(st.SimulationError, match=r"^motors.* has no derivatives"):
+        st.simulate(driven, driven.state(), SPAN, controller=law).vjp(v=np.eye(8)[0])
+
+
 def test_a_graze_has_no_derivative_and_says_when():
     """A run that ends while a point has just touched."""
     q, v = dropped()

@@ -31,6 +31,7 @@ LANDING = [*FLYING, "contact_points", "leg_points", "contact_dynamics", "pfl", "
 STANDING = ["mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics", "energy"]
 STANDING += ["momentum", "contact_points", "contact_dynamics", "rollout", "implicit"]
 TAPED = [*STANDING, "gradients"]
+TAPED_AIR = ["rollout", "energy", "momentum", "gradients"]
 # what differs from coordinate to coordinate shows an exchange of two of them
 ELASTIC = {
     "tail_stiffness": [0.004, 0.006, 0.005, 0.003],
@@ -157,6 +158,7 @@ ZOO: dict[str, dict[str, Any]] = {
     # whose runs have gradients, which other models get when they are asked for them
     "taped": _links(1, 3, contacts=["feet"], functions=TAPED),
     "taped_m2_n2": _links(2, 2, functions=TAPED, **GROUND, parameters={"tail_damping": 1e-3}),
+    "taped_air": _links(1, 1, functions=TAPED_AIR, parameters=AIR | widths(1)),
     # it lacks all that a test wants to miss
     "bare": _links(1, 1, functions=["forward_dynamics"]),
 }

@@ -26,7 +26,9 @@ def airspeed(draft: Draft, state: State, R: Ref | None) -> Ref | None:
     if not draft.tail.widths or R is None:
         return None
     reads = {"R": R, "p_dot": state.velocity}
-    return draft.store(air.relative_velocity, reads, u=3)["u"]
+    u = draft.vector("u_in_air", 3)
+    draft.step(air.relative_velocity, reads, u=u)
+    return u
 
 
 def core_airspeed(draft: Draft, state: State) -> Ref | None:

@@ -15,6 +15,7 @@ from ...ir.dataflow import inlined
 from ...ir.program import Array
 from ...mechanics import contact, rotations
 from ...mechanics import rotation_derivatives as turns
+from ..air import in_air
 from ..contact import contact_load, gather_contact_loads, gather_points, press
 from ..draft import Draft
 from ..dynamics import assemble_forward_dynamics
@@ -36,7 +37,11 @@ FIXED = ("v_dot", "multiplier", "slips", "branches")  # arguments of P that are 
 def assemble_power(draft: Draft, arrays: dict[str, Array]) -> None:
     """P - slips^T (rates of the bristles)."""
     tail, power, multiplier = draft.tail, arrays["power"][0], arrays["multiplier"]
-    segments = assemble_virtual_power(draft, arrays)
+    moving = {}
+    if tail.widths:  # in torso axes, so that the velocity against the air turns with the torso
+        R = attitude(draft, draft.state(arrays["q"], arrays["v"]))
+        moving["v"] = in_air(draft, arrays["q"], arrays["v"], R)
+    segments = assemble_virtual_power(draft, arrays | moving)
     if not tail.contacts:
         return
 
