@@ -102,6 +102,11 @@ def dimensions(unit: str) -> tuple[float, float, float]:
     return powers[0], powers[1], powers[2]
 
 
+def words_of(unit: str | Sequence[str]) -> str:
+    """Return what a message says of a unit after a number."""
+    return ", without a unit" if unit == "1" else f", in {unit}"
+
+
 def choices(unit: str) -> str:
     """Return what may be written in a field of a unit."""
     return f"{', '.join(MEASURES[plain(unit)][1])} or a plain number in {unit}"

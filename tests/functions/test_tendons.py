@@ -110,6 +110,7 @@ def test_what_tendons_cannot_be_is_refused():
         (("links", 3), {"offset": [0, 0], "tension": 5}, "offset", [0, 0]),
         (("links", 3), ok | {"to": 2}, "to", 2),
         (("links", 3), ok | {"tension": -1}, "tension", -1),
+        (("links", 3), {"count": 10**9, "radius": 1, "tension": 5}, "count", 10**9),
         (("links", 3), ok | {"end_offset": [0.002, 0]}, "root", None),
         (("links", 3), ok | {"radius": 0.004}, "count", None),
         (("samples", 3), ok | {"guides": 0.5}, "guides", 0.5),

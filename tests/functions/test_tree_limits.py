@@ -77,9 +77,7 @@ def test_it_does_not_matter_which_chain_is_the_tail():
 
 
 def test_prescribed_legs_without_mass_are_those_of_the_paper():
-    """Points, forces and v_dot of a kick, its motion, and what the drives do; a heel that never
-    turns is where the paper's A is.
-    """
+    """Points, forces, v_dot, motion and work of a kick; a heel that never turns is the paper's A."""
     paper, names = zoo.model("ground"), ("L_h2d", "L_d2k", "L_k2a", "L_a2m", "L_m2t")
     h2d, d2k, k2a, a2m, m2t = (float(paper.parameters[name]) for name in names)
     bones = {"hip": h2d + k2a, "knee": d2k, "heel": a2m, "ankle": m2t}
@@ -235,6 +233,7 @@ def test_a_flight_with_prescribed_legs_keeps_its_books(tmp_path):
         "hind_right": lambda: st.simulate(rat, start, prescribed=moves({"hind": [0]})),
         "prescribed: value None": lambda: st.simulate(rat, start),
         "q0": lambda: st.simulate(rat, *both, prescribed=legs),
+        "plan": lambda: st.plan(rat, start=start, duration=0.1),
         "step": lambda: rat.step(start.q, start.v, [0, 0], 1e-3),
         "export": lambda: st.export(rat, "mjcf", tmp_path / "rat.xml"),
         "Pfl": lambda: st.simulate(rat, start, prescribed=legs, controller=st.Pfl(rat, run)),

@@ -38,6 +38,7 @@ def test_wrong_chains_are_refused():
         ("chain.a.mass", -1, {"a": PLAIN | {"mass": -1}}),
         ("chain.a.length", "3 kg", {"a": PLAIN | {"length": "3 kg"}}),
         ("chain.a.kind", "limbs", {"a": PLAIN | {"kind": "limbs"}}),
+        ("chain.a.kind", None, {"a": {}}),
         ("chain.a.segments", 1, {"a": PLAIN | {"kind": "limb"}}),
         ("chain.a.joints", [BONE], {"a": PLAIN | {"joints": [BONE]}}),
         ("chain.a.drive", "prescribe", {"a": PLAIN | {"drive": "prescribe"}}),

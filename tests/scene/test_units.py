@@ -116,7 +116,7 @@ def test_a_wrong_unit_is_refused_with_those_that_fit(refuse_rows):
         ("torso_mass", "-1 g", "above 0, in kg"),
         ("delta_m", "3 mm", "rad, deg"),
         ("K_n", "3 N/m", "N/m1.5, kN/m1.5"),
-        ("mu", "1 m", "in 1 "),
+        ("mu", "1 m", "without a unit"),
     ]
     for field, text, words in rows:
         scene = f'contacts = ["feet"]\n{VALID}[parameters]\n{field} = "{text}"\n'

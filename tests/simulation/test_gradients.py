@@ -180,9 +180,12 @@ def test_flights():
 
 def test_in_air_and_with_motors():
     """By velocities and the wind, of a tail in air; and runs that motors limit have none."""
-    model, start = zoo.model("taped_air"), zoo.model("taped_air").state(velocity=[1, -2, 1], bend=0.3)
+    model, start = (
+        zoo.model("taped_air"),
+        zoo.model("taped_air").state(velocity=[1, -2, 1], bend=0.3),
+    )
     fly = lambda e=0.0, wind=0.0: st.simulate(  # noqa: E731
-        model.with_parameters(wind=np.array(model.parameters["wind"]) + [0, wind, 0]),
+        model.with_parameters(wind=np.add(model.parameters["wind"], [0, wind, 0])),
         start.q,
         start.v + e * np.arange(8),
         SPAN,

@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from serpentail_scene.drives import DRIVE, DRIVES, drives_of
-from serpentail_scene.keys import CHAIN, NAME, OF_LIMB
+from serpentail_scene.keys import CHAIN, KINDS, NAME, OF_LIMB
 from serpentail_scene.parameters import AIR_NAMES, NAMED, NAMES, key_in_chain, name_in
+from serpentail_scene.rules import one_of
 from serpentail_scene.signatures.table import ALL, OF_GIVEN, OF_TREES
 
 from .checks import MOST_SEGMENTS, MOST_STRAIGHT, plain, segments_in
@@ -107,7 +108,10 @@ def _key_problems(place: str, table: Mapping[str, Any]) -> list[Problem]:
 
 def _chain(name: str, table: Mapping[str, Any], own: Mapping[str, Any], parse: Parse) -> Chain:
     """Return a chain, read as a tail without torso; what a chain must say has no default."""
-    if table.get("kind") == "limb":
+    if table.get("kind") not in (*KINDS, "limb"):
+        needs = f"needs {one_of((*KINDS, 'limb')).text}"
+        raise SceneError([Problem("kind", table.get("kind"), needs)])
+    if table["kind"] == "limb":
         named = {OF_CHAINS[n.removeprefix(f"{name}_")].name: value for n, value in own.items()}
         return Chain(name, table.get("pair") is True, limb(name, table, named))
     keys = {key: table[key] for key in CHAIN if key in table and key not in ("on", "pair", "drive")}

@@ -16,6 +16,7 @@ from serpentail_scene.parameters import (
 from serpentail_scene.purposes import ADDED
 from serpentail_scene.rules import COUNT
 from serpentail_scene.signatures.table import AIRBORNE, ALL, DERIVATIVES, FIXED, NEEDS
+from serpentail_scene.units import words_of
 
 from .problems import Problem, suggest
 
@@ -57,7 +58,7 @@ def number_problem(parameter: Parameter, value: object) -> Problem:
             of = f"end of the {parameter.size - 1} links or arcs, the root's first"
         shape, hint = f"{shape} or one for all", f"(one for each {of})"
     words = f", {parameter.rule.words}" if parameter.rule.words else ""
-    remedy = f"needs {shape}{words}, in {parameter.unit} {hint}"
+    remedy = f"needs {shape}{words}{words_of(parameter.unit)} {hint}"
     return Problem(f"parameters.{parameter.name}", value, remedy)
 
 

@@ -1,6 +1,7 @@
 """Reads the table of a chain that is a limb: its `joints`, each a hinge with a body or without."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 from serpentail_scene.drives import DRIVE
@@ -15,7 +16,11 @@ from .scene import Scene
 from .segment_tables import numbers_of
 from .variant import Shape
 
-WORDS = {"name": NAME, "axis": one_of("xyz"), "drive": DRIVE}
+WORDS = {
+    "name": replace(NAME, text=NAME.text.partition(", that")[0]),
+    "axis": one_of("xyz"),
+    "drive": DRIVE,
+}
 NEEDS = {  # keys of a hinge that mean nothing without another one
     **dict.fromkeys(("length", "tip", "center", "inertia", "radius"), "mass"),
     **{"rest": "stiffness", "stop_stiffness": "stops", "stop_width": "stops"},

@@ -5,7 +5,7 @@ from typing import Any
 
 from serpentail_scene.keys import SEGMENT, Key
 from serpentail_scene.rules import COUNT
-from serpentail_scene.units import in_unit
+from serpentail_scene.units import in_unit, words_of
 
 from .checks import MOST_LINKS
 from .problems import Problem, suggest
@@ -92,7 +92,7 @@ def numbers_of(
         each = f", {key.size} for each of {links} links" if key.each_link else ""
         words = "a finite number" if count == 1 else f"{count} finite numbers{each}"
         words += f", {key.rule.words}" if key.rule.words else ""
-        problems.append(Problem(f"{place}.{name}", value, f"needs {words}, in {key.unit}"))
+        problems.append(Problem(f"{place}.{name}", value, f"needs {words}{words_of(key.unit)}"))
     return numbers_by_name
 
 

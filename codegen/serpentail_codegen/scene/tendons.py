@@ -8,7 +8,7 @@ from typing import Any
 from serpentail_scene.keys import NAME, TENDON, TENDON_COUNTS, names_of_tendons
 from serpentail_scene.rules import COUNT
 
-from .checks import parameters_in, segments_in
+from .checks import MOST_SEGMENTS, parameters_in, segments_in
 from .problems import Problem
 from .segment_tables import Numbers, numbers_of
 from .tail_tables import TailDescription
@@ -72,8 +72,9 @@ def _problems(
     for key in (*start, "tension", *["root"] * guided):
         if key not in table:
             yield Problem(f"{place}.{key}", None, f"needs {NEEDED[key]}")
-    if COUNT.holds(to := table.get("to", 1)) and to > segments:
-        yield Problem(f"{place}.to", to, f"the tail has {segments} segments")
+    for key, most in {"to": segments, "count": MOST_SEGMENTS}.items():
+        if COUNT.holds(number := table.get(key, 1)) and number > most:
+            yield Problem(f"{place}.{key}", number, f"needs {most} or less")
     remedies = {"offset": "radius gives it: remove one of the two"} if len(start) > 1 else {}
     if own.get("offset") == (0.0, 0.0):
         remedies["offset"] = "a tendon on the axis of the tail has no lever: give an offset"

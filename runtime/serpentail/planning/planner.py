@@ -10,6 +10,7 @@ from serpentail_scene.messages import nearest
 from ..basics import extras
 from ..basics.checks import Refusals
 from ..basics.errors import PlanningError
+from ..model.chains import refuse_given
 from ..model.checked import checked_model
 from ..model.model import Model
 from ..model.state import Quantities, Quantity, State
@@ -140,6 +141,7 @@ def plan(  # noqa: PLR0913 - the public face names all that it takes
     """
     extras.needed("casadi", "plan")
     checked_model(model, PlanningError).refuse_fixed("plan")
+    refuse_given(model, "plan")
     refused = Refusals(PlanningError)
     known: dict[str, Any] = {name: old[name] for name in old if name in PLACES}
     for name in known:

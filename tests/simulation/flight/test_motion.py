@@ -131,7 +131,10 @@ def test_a_smooth_and_short_torque_is_not_stepped_over():
     model, d = zoo.model("m1_n3"), 1e-3
     bump = np.zeros((3, 2, 5))
     bump[1, 0, 2:] = np.array([d**2, -2 * d, 1]) * 1e-6 * 30 / d**5  # impulse 1e-6 N m s
-    times = np.array([0, 0.1, 0.1 + d, 0.2])
+    times = [0, 0.1, 0.1 + d, 0.2]
+    for wrong, powers in ((times[::-1], bump), (times[:3], bump), (times, bump[0]), ([], bump)):
+        with pytest.raises(st.SimulationError, match=r"^Piecewise: (times|coefficients)"):
+            st.Piecewise(wrong, powers)
     law = st.TorqueCurve(st.Piecewise(times, bump))
     run = st.simulate(model, model.state(), 0.1 + d, controller=law, output_step=0.1 + d)
     expected = np.linalg.solve(model.mass_matrix(run.q[0]), np.eye(8)[6] * 1e-6)

@@ -31,11 +31,27 @@ class Piecewise:
         Increasing times (s) at which the pieces begin and end.
     coefficients : ndarray, shape (pieces, channels, degree + 1)
         Coefficients of the powers of ``t - times[k]``, constants first.
+
+    Raises
+    ------
+    SimulationError
+        The times do not increase, or the coefficients are not those of their pieces.
     """
 
     times: np.ndarray
     coefficients: np.ndarray
     __repr__ = brief
+
+    def __post_init__(self) -> None:
+        times, coefficients = np.asarray(self.times, float), np.asarray(self.coefficients, float)
+        if times.ndim != 1 or len(times) < 2 or not (np.diff(times) > 0).all():
+            raise refusal("Piecewise: times", self.times, "increasing times, in s", SimulationError)
+        if coefficients.ndim != 3 or len(coefficients) != len(times) - 1:
+            needs = f"an array ({len(times) - 1}, channels, degree + 1)"
+            found = coefficients.shape
+            raise refusal("Piecewise: coefficients: shape", found, needs, SimulationError)
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "coefficients", coefficients)
 
     @property
     def channels(self) -> int:
