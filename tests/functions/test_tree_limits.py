@@ -77,7 +77,7 @@ def test_it_does_not_matter_which_chain_is_the_tail():
 
 
 def test_prescribed_legs_without_mass_are_those_of_the_paper():
-    """Points, forces, v_dot, motion and work of a kick; a heel that never turns is the paper's A."""
+    """Points, forces, v_dot, motion and work of a kick; a heel that never turns is at A."""
     paper, names = zoo.model("ground"), ("L_h2d", "L_d2k", "L_k2a", "L_a2m", "L_m2t")
     h2d, d2k, k2a, a2m, m2t = (float(paper.parameters[name]) for name in names)
     bones = {"hip": h2d + k2a, "knee": d2k, "heel": a2m, "ankle": m2t}
