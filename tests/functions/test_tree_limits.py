@@ -223,6 +223,7 @@ def test_a_flight_with_prescribed_legs_keeps_its_books(tmp_path):
     momentum = total_mass(rat.parameters) * rat.center_of_mass(run.q, run.v, *run.given)[1]
     np.testing.assert_allclose(momentum, run.linear_momentum, atol=1e-14)
     assert (st.Trajectory.load(run.save(tmp_path / "run")).given[0] == run.given[0]).all()
+    assert "has prescribed joints" in run.view(tmp_path / "page.html", live=True).read_text()
     table, moves = {"hind": [0, 0, 0]}, st.Prescribed.moves
     both = np.array([start.q] * 2), np.array([start.v] * 2), 0.1
     wrong = {

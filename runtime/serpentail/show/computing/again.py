@@ -61,6 +61,7 @@ def computed_again(model: Model, motion: Trajectory, most: int) -> dict[str, Any
         'the model needs real = "double" and baked = false': unfit,
         f"{method} is a method of Python: take one in C, such as tsit5": method in SCIPY,
         "gravity_vector: pages know gravity along -z alone": "gravity_vector" in model.parameters,
+        "it has prescribed joints, whose table pages do not know": model.layout.given > 0,
         "it ends at an event: leave out stop_at": again.ground.stop_at,
         f"it has {rows} samples: a longer output_step gives {most} or fewer": rows > most,
         "its controller is a function: only Damping, torques over time and Pfl are C": any(

@@ -126,6 +126,8 @@ class Piecewise:
             held = [starts[:1], ends[-1:]] if order == 0 else np.zeros((2, 1, self.channels))
             left, right = np.vstack([held[0], ends]), np.vstack([starts, held[1]])
             jumps |= (np.abs(left - right) > JUMP_TOLERANCE * sizes.max(initial=0)).any(axis=1)
+            if jumps.all():
+                break
         return self.times[jumps]
 
 
