@@ -282,5 +282,6 @@ def test_wrong_starts_on_the_ground_are_named():
         st.simulate(rat(), q, v, legs=LEGS, t_span=0.002, method="rk4", parameters=heavy)
     with pytest.raises(st.SimulationError, match=r"bristles0 .*\(2, 9, 2\).*\(9, 2\)"):
         st.simulate(rat(), q, v, legs=LEGS, bristles0=np.zeros((2, 9, 2)))
-    with pytest.raises(st.StateError, match="one start state after another"):
-        st.settle(rat(), q, legs=LEGS)
+    for wrong in (q, (q[0], v[0])):
+        with pytest.raises(st.StateError, match="one start state after another"):
+            st.settle(rat(), wrong, legs=LEGS)

@@ -71,7 +71,7 @@ def settle(
         q0 = q0.q
     start = numbers_in(q0)
     if start is None or start.ndim != 1:
-        needs = f"one configuration ({model.nq},), or a State: settle one after another"
+        needs = f"one configuration ({model.nq},): settle one start state after another"
         raise refusal("q0", q0, needs, StateError)
     duration = check_settling(model, rounds, duration)
     at = number("at", at, SimulationError, unit="s")
