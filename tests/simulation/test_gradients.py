@@ -184,13 +184,11 @@ def test_in_air_and_with_motors():
         zoo.model("taped_air"),
         zoo.model("taped_air").state(velocity=[1, -2, 1], bend=0.3),
     )
-    fly = lambda e=0.0, wind=0.0: st.simulate(  # noqa: E731
-        model.with_parameters(wind=np.add(model.parameters["wind"], [0, wind, 0])),
-        start.q,
-        start.v + e * np.arange(8),
-        SPAN,
-        rtol=1e-9,
-    )
+
+    def fly(e=0.0, wind=0.0):
+        own = model.with_parameters(wind=np.add(model.parameters["wind"], [0, wind, 0]))
+        return st.simulate(own, start.q, start.v + e * np.arange(8), SPAN, rtol=1e-9)
+
     found = fly().vjp(v=np.eye(8)[7])
     expected = slope(lambda e: fly(e).v[-1][7], 1e-3)
     np.testing.assert_allclose(found.v0 @ np.arange(8), expected, rtol=1e-6)

@@ -62,12 +62,8 @@ class Parts:
 
     def kinks(self) -> list[float]:
         """Return the times at which these torques have a jump or a kink."""
-        times: list[float] = []
-        for curve in (self.torques, self.tensions):
-            times += [] if curve is None else curve.kinks().tolist()
-        if self.pfl is not None:
-            times += self.pfl.curve.kinks().tolist()
-        return times
+        curves = self.torques, self.tensions, None if self.pfl is None else self.pfl.curve
+        return [t for curve in curves if curve is not None for t in curve.kinks().tolist()]
 
     def ticks(self, start: float, end: float) -> list[float]:
         """Return the times (s) from start to end at which the controller needs a step to end."""

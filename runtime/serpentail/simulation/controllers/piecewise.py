@@ -48,8 +48,7 @@ class Piecewise:
             raise refusal("Piecewise: times", self.times, "increasing times, in s", SimulationError)
         if coefficients.ndim != 3 or len(coefficients) != len(times) - 1:
             needs = f"an array ({len(times) - 1}, channels, degree + 1)"
-            found = coefficients.shape
-            raise refusal("Piecewise: coefficients: shape", found, needs, SimulationError)
+            raise refusal("Piecewise: coefficients", coefficients.shape, needs, SimulationError)
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "coefficients", coefficients)
 
@@ -112,9 +111,7 @@ class Piecewise:
 
     @np.errstate(over="ignore", invalid="ignore")  # a run refuses numbers that are not finite
     def kinks(self) -> np.ndarray:
-        """Return the times at which a derivative of any order jumps: a step that passes one that is
-        as smooth as the method's order may still miss what is short between two of them.
-        """
+        """Return the times at which any derivative jumps: longer steps miss what is short."""
         if self.never_changes:
             return self.times[:0]
         jumps = np.zeros(len(self.times), bool)
