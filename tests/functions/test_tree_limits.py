@@ -18,6 +18,7 @@ from tests.references.metrics import (
     mass_matrix_error,
 )
 from tests.support import own_tails, zoo
+from tests.support.bodies import FIN
 from tests.support.models import folder_of
 from tests.support.rows import row
 from tests.support.scenes import SCENES
@@ -242,6 +243,17 @@ def test_a_flight_with_prescribed_legs_keeps_its_books(tmp_path):
     for field, call in wrong.items():
         with row(field), pytest.raises(st.SerpentailError, match=re.escape(field)):
             call()
+
+
+def test_prescribed_arcs_land_and_keep_their_books():
+    """A mirrored pair that pushes off by bending: the ground acts on its drives, too."""
+    keys = {"parameters": {}, "contacts": ["fin", "torso"], "functions": [*RUNS, "implicit"]}
+    fins = built("fins", chain={"fin": FIN | {"drive": "prescribed"}}, **keys)
+    move = {"at": 0.01, "duration": 0.05, "fin": [1.5, 0.9]}
+    start, moves = fins.state(height=0.015), st.Prescribed.moves({"fin": [0, 0]}, [move])
+    run = st.simulate(fins, start, 0.08, prescribed=moves, rtol=1e-7)
+    assert run.contact.of("fin_left").total.max() > weight_of(fins.parameters)
+    assert run.info["imbalance"]["relative"] < 1e-6 and run.info["work_J"]["prescribed"] > 0.02
 
 
 # ---- the gecko -----------------------------------------------------------------------------------

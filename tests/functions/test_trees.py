@@ -1,5 +1,8 @@
 """Models of several chains: against sets of bodies in 60 digits, and against Pinocchio."""
 
+from dataclasses import replace
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -15,9 +18,11 @@ from tests.references.metrics import (
     equilibrated_condition,
     force_error,
     mass_matrix_error,
+    near,
 )
 from tests.references.passive import PassiveTail
 from tests.support import own_tails, zoo
+from tests.support.bodies import FIN, OWN_LINKS
 from tests.support.program_runs import FLOATS, interpreted
 from tests.support.rows import row
 
@@ -188,35 +193,49 @@ def random_tree(seed, prescribed):
     return scene, Animal(segments=segments, chains=tuple(bodies), **values)
 
 
-def check_against_pinocchio(seed, prescribed=False):
-    """H, H v_dot + C, v_dot and torques of drives, by programs, are those of a tree of hinges."""
-    scene, animal = random_tree(seed, prescribed)
-    from tests.references.pinocchio_tree import PinocchioTree
-
-    tree, tail = PinocchioTree(animal), tail_of(scene)
-    q, v, v_dot, tau = next(own_tails.states(7 + tree.G.shape[1], 1))
+def check_against(reference, scene, dynamics):
+    """H, H v_dot + C, v_dot, torques of drives, energy, momentum and points, by programs, are those
+    of a reference whose coordinates are all free; ``dynamics(q, v, v_dot)`` are its H and force.
+    """
+    tail = tail_of(scene)
     moved = [c.prescribed for c in tail.chains for _ in range(c.width * c.segments)]
+    q, v, v_dot, tau = next(own_tails.states(7 + len(moved), 1))
     free, tau = ~np.array([False] * 6 + moved), tau[~np.array(moved)]
-    H, force = tree.mass_matrix(q)[free][:, free], tree.inverse_dynamics(q, v, v_dot)
-    bias = tree.inverse_dynamics(q, v, np.where(free, 0, v_dot))[free]
+    H, force = dynamics(q, v, v_dot)[:2]
+    expected = {"energy": reference.energy(q, v), "momentum": reference.momentum(q, v)}
+    expected["tail_points"] = reference.tail_points(q)
     given = {"given": np.concatenate([q[1:][~free], v[~free], v_dot[~free]])} if any(moved) else {}
     force, q = np.concatenate([force[free], force[~free]]), np.concatenate([q[:1], q[1:][free]])
-    v, v_dot = v[free], v_dot[free]
+    H, v, v_dot = H[free][:, free], v[free], v_dot[free]
 
     def result(name, **arguments):
         program = assemble(function_of(name, tail), tail)
         values = {a.name: scene.parameters[a.name] for a in program.of_role("parameters")}
         inputs = {n: [x] if isinstance(x, float) else list(x) for n, x in values.items()}
-        inputs |= {n: list(map(float, x)) for n, x in (arguments | given).items()}
+        known = {"q": q, "v": v} | arguments | given
+        names = {a.name for a in program.of_role("input")}
+        inputs |= {n: list(map(float, x)) for n, x in known.items() if n in names}
         return np.concatenate(list(interpreted(program, inputs, FLOATS).values()))
 
-    assert mass_matrix_error(result("mass_matrix", q=q).reshape(H.shape), H) < 1e-13
-    found, n = result("inverse_dynamics", q=q, v=v, v_dot=v_dot), tail.nv
+    for name, numbers in expected.items():
+        with row(name):
+            near(result(name), np.ravel(numbers), 1e-13)
+    assert mass_matrix_error(result("mass_matrix").reshape(H.shape), H) < 1e-13
+    found, n = result("inverse_dynamics", v_dot=v_dot), tail.nv
     assert force_error(found[:n], force[:n], H) < 1e-13
     assert np.abs(found - force).max() < 1e-12 * np.abs(force).max()
-    expected = accelerated(H, np.concatenate([np.zeros(6), tau]) - bias)
-    error = block_error(result("forward_dynamics", q=q, v=v, tau=tau), expected)
+    expected = accelerated(H, np.concatenate([np.zeros(6), tau]) - force[:n] + H @ v_dot)
+    error = block_error(result("forward_dynamics", tau=tau), expected)
     assert error < 2e-12 + FORWARD * equilibrated_condition(H)  # Pinocchio rounds, too
+
+
+def check_against_pinocchio(seed, prescribed=False):
+    """The programs of a random tree are those of a tree of hinges."""
+    scene, animal = random_tree(seed, prescribed)
+    from tests.references.pinocchio_tree import PinocchioTree
+
+    tree = PinocchioTree(animal)
+    check_against(tree, scene, lambda q, *v: (tree.mass_matrix(q), tree.inverse_dynamics(q, *v)))
 
 
 @pytest.mark.parametrize("prescribed", [False, True])
@@ -232,3 +251,12 @@ def test_200_random_trees_are_those_of_pinocchio():
     for seed in range(3, 203):
         with row(seed):
             check_against_pinocchio(seed, seed % 2 > 0)
+
+
+def test_prescribed_arcs_are_sets_of_bodies():
+    """A mirrored pair of arcs that follow a motion, in 60 digits."""
+    fin, place = FIN | {"drive": "prescribed"}, (tuple(FIN["mount"]), tuple(FIN["mount_angles"]))
+    keys = zoo.ZOO["own_links"] | {"segments": OWN_LINKS[1:2], "chain": {"fin": fin}}
+    fins = [Chain(own_tails.ARC_BODIES[:1], *place, mirrored=side) for side in (False, True)]
+    animal = replace(LIMBS, chains=tuple(fins))
+    check_against(animal, parse_scene(keys, "fins"), partial(own_tails.dynamics, animal))

@@ -46,7 +46,7 @@ class PinocchioTree:
                     body = pin.Inertia(hinge.mass, center, np.diag(hinge.inertia))
                     self.model.appendBodyToJoint(joint, body, STILL)
                     place = pin.SE3(np.eye(3), F @ np.array(hinge.tip))
-                    if hinge.mass:
+                    if hinge.mass or segment is hinge:
                         self._add_point(joint, place)
                 count += width
         self.G = np.eye(count)[columns]
