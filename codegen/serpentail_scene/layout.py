@@ -105,6 +105,11 @@ class Layout(Sizes):
         return tuple(chain.from_iterable(c.driven for c in self.chains)) or (True,) * self.nt
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the tail coordinates; empty if the layout does not know its chains."""
+        return tuple(chain.from_iterable(c.names for c in self.chains))
+
+    @property
     def owners(self) -> list[str]:
         """What the names of the parameters of each tail coordinate begin with; see ``chains``."""
         return [c.owner for c in self.chains for _ in c.names]

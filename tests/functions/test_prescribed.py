@@ -87,8 +87,9 @@ def test_a_flight_with_prescribed_legs_keeps_its_books(tmp_path):
     assert np.ptp(run.angular_momentum, axis=0).max() < 1e-7 * np.abs(run.angular_momentum).max()
     momentum = total_mass(rat.parameters) * rat.center_of_mass(run.q, run.v, *run.given)[1]
     np.testing.assert_allclose(momentum, run.linear_momentum, atol=1e-14)
-    assert (st.Trajectory.load(run.save(tmp_path / "run")).given[0] == run.given[0]).all()
     assert "has prescribed joints" in run.view(tmp_path / "page.html", live=True).read_text()
+    read = st.Trajectory.load(run.save(tmp_path / "run"))
+    assert (read.given[0] == run.given[0]).all() and read.names == run.names
     table, moves = {"hind": [0, 0, 0]}, st.Prescribed.moves
     both = np.array([start.q] * 2), np.array([start.v] * 2), 0.1
     wrong = {

@@ -74,12 +74,17 @@ def test_tendons_of_arcs_are_parallel_to_the_centre_line():
     np.testing.assert_allclose(B, np.column_stack([z, -x, z, -x]), rtol=1e-15)
 
 
-def test_a_run_by_tensions_is_the_run_by_their_torques():
+def test_a_run_by_tensions_is_the_run_by_their_torques(tmp_path):
     model, pulls = zoo.model("tendons"), [[3.0, 0.0, 1.0], [0.0, 0.5, 0.0]]
     law = st.TensionTable([0.0, 0.05], pulls)
     start = {"q0": model.state().q, "v0": np.zeros(model.nv), "t_span": 0.05, "rtol": 1e-10}
     run = st.simulate(model, **start, controller=law)
     np.testing.assert_allclose(run.tensions[[0, -1]], pulls, atol=1e-12)
+    assert (st.Trajectory.load(run.save(tmp_path / "run")).tensions == run.tensions).all()
+    parts = [st.Phase("free", 0.01, controller=None), st.Phase("pull", 0.05, controller=law)]
+    both = st.Sequence(model, parts).simulate(model.state()).trajectory
+    assert not both.tensions[both.t < 0.01].any()
+    np.testing.assert_allclose(both.tensions[-1], pulls[1], atol=1e-12)
 
     def torques(t, q, v):
         return model.tendon_torques(q, pulls[0] + t / 0.05 * np.diff(pulls, axis=0)[0])

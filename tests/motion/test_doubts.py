@@ -1,5 +1,6 @@
 """What cannot be true of an animal is told with its value, against geometry by brute force."""
 
+import dataclasses
 import pickle
 import re
 from itertools import pairwise
@@ -92,6 +93,10 @@ def test_a_tenth_of_the_torso_s_length_is_allowed_and_more_where_it_has_contact_
     ):
         told = made(model, -0.1).warnings
         assert [each.split(":")[0] for each in told] == words
+    motion = made(zoo.model("tree_ground"), -0.1)  # each chain for itself
+    told = dataclasses.replace(motion, contact=motion.contact.of("leg_right")).warnings
+    words = ["torso", "tail", "leg_left", "fin_right", "fin_left", "arm"]
+    assert [each.split(":")[0] for each in told[:6]] == words and 'add "leg" to' in told[2]
 
 
 def through(points, parts=4000):

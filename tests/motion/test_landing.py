@@ -7,6 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import serpentail as st
+from serpentail.model.weight import weight_of
+from tests.support import zoo
 from tests.support.rows import row
 
 from .conftest import at_height, made, motion, told
@@ -15,8 +17,8 @@ LANDS, ROWS = 0.5, 1001  # s of 1
 WEIGHT = 1.0705  # N
 
 
-def fallen(model, rotations, share=1.0, speed=0.0):
-    """A motion of 1 s that falls, lands at 0.5 s, and turns as told; at the end its feet carry a
+def fallen(model, rotations, share=1.0, speed=0.0, group="feet"):
+    """A motion of 1 s that falls, lands at 0.5 s, and turns as told; at the end a group carries a
     share of its weight, and it falls with a speed (m/s).
     """
     t = np.linspace(0, 1, ROWS)
@@ -24,8 +26,10 @@ def fallen(model, rotations, share=1.0, speed=0.0):
     q[:, 2] += np.maximum(LANDS - t, 0)
     q[:, 3:7] = np.roll(rotations(t).as_quat(), 1, axis=1)
     forces = np.zeros((ROWS, sum(model.contacts.values()), 3))
-    forces[-1, 0, 2] = share * WEIGHT
-    motion = made(model, q, t=t, forces=forces, events=[("touch_down", "feet", LANDS)])
+    groups = [*model.contacts]
+    first = sum(model.contacts[name] for name in groups[: groups.index(group)])
+    forces[-1, first, 2] = share * WEIGHT
+    motion = made(model, q, t=t, forces=forces, events=[("touch_down", group, LANDS)])
     v = motion.v.copy()
     v[-1, 2] = -speed
     return dataclasses.replace(motion, v=v)
@@ -69,6 +73,17 @@ def test_who_does_not_stand_has_not_landed(rat):
         with row(share, speed, up):
             assert of["least_upright_landing"] == pytest.approx(up)
             assert of["landed"] is of["standing_end"] is stands
+
+
+def test_a_tree_stands_on_its_limbs_alone():
+    tree = zoo.model("tree_ground")
+    for group in tree.contacts:
+        of = told(
+            fallen(tree, roll(lambda s: 0 * s), weight_of(tree.parameters) / WEIGHT, 0, group)
+        )
+        with row(group):
+            assert of["landing_group"] == group
+            assert of["landed"] is of["standing_end"] is group.startswith(("leg", "arm"))
 
 
 def test_the_turn_is_the_integral_of_the_horizontal_angular_velocity(rat):

@@ -91,6 +91,11 @@ def layout_of(manifest: Mapping[str, Any], kinds: tuple[str, ...]) -> Layout:
     return replace(layout, chains=tuple(chains), tendons=tendons, given=given)
 
 
+def limbs_of(model: "Model") -> list[str]:
+    """Return the names of the chains of hinges."""
+    return [c.name for c in model.layout.chains if HINGE in model.kinds[c.segments]]
+
+
 def values_of(chain: ChainLayout, values: Mapping[str, Any]) -> dict[str, Any]:
     """Return the parameters of a chain under the names of the tail's."""
     names = {name_in(chain.owner, name): name for name in NAMES}

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from serpentail_scene.layout import Layout
-
-if TYPE_CHECKING:
-    from .model import Model
 
 TORSO_Q = dict.fromkeys(("x", "y", "z"), "m") | dict.fromkeys(("qw", "qx", "qy", "qz"), "1")
 TORSO_V = dict.fromkeys(("vx", "vy", "vz"), "m/s")
@@ -29,12 +26,12 @@ class Names:
     tail: tuple[str, ...]
 
     @classmethod
-    def of(cls, layout: Layout, model: Model | None) -> Names:
-        """Return the names of a layout; of a motion without model, whose tail is of no kind."""
+    def of(cls, layout: Layout, own: Sequence[str]) -> Names:
+        """Return the names of a layout with its tail's ``own``, if these are as many; else such as
+        those of a motion without model, whose tail is of no kind.
+        """
         each = (f"{name}_{i + 1}" for i in range(layout.segments) for name in WITHOUT_MODEL)
-        tail = tuple(each)[: layout.nt]
-        if model is not None:
-            tail = tuple(name for chain in model.layout.chains for name in chain.names)
+        tail = tuple(own) if len(own) == layout.nt else tuple(each)[: layout.nt]
         torso_q, torso_v = ({}, {}) if layout.fixed else (TORSO_Q, TORSO_V)
         return cls(
             torso_q | dict.fromkeys(tail, "rad"),

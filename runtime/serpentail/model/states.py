@@ -32,7 +32,7 @@ class ModelStates:
     @lazy_property
     def names(self) -> Names:
         """Name and unit of each number of q, v and tau."""
-        return Names.of(self.layout, cast("Model", self))
+        return Names.of(self.layout, self.layout.names)
 
     @property
     def coordinates(self) -> list[str]:

@@ -20,6 +20,7 @@ from .contact import Contact
 SUFFIX = ".npz"
 T = TypeVar("T")
 CONTACT = "contact_"  # before the names of a contact's arrays in a file
+NAMES = "coordinates"  # in info: names of those of several chains
 MOST_EXPANSION = 100  # times the file: ours is not compressed, a motion in one that is fits, too
 
 
@@ -107,10 +108,13 @@ def _parsed(fields: dict[str, Any]) -> dict[str, Any]:
 
 
 def origin(model: Model) -> dict[str, Any]:
-    """Return name, hashes and parameters of a model, ready for JSON."""
+    """Return name, hashes and parameters of a model, ready for JSON; of several chains the names
+    of their coordinates.
+    """
+    several = len(model.layout.chains) > 1
     return {
         "model": model.name,
         "content_hash": model.manifest["content_hash"],
         "manifest_hash": model.checked.manifest_hash,
         "parameters": json_ready(model.parameters),
-    }
+    } | ({NAMES: list(model.names.tail)} if several else {})

@@ -11,7 +11,9 @@ from ..basics.checks import measured
 from ..model.model import Model
 from ..model.names import Names
 from ..model.state import State, named
+from .archive import NAMES
 from .derived import AGAIN
+from .given import tensions_at
 from .mount import mount_wrenches
 from .resample import inside, states_between
 from .validation import layout_of, real
@@ -27,13 +29,15 @@ class Asked:
     q: Array
     v: Array
     tau: Array
+    info: dict[str, Any]
     contact: Any
     model: Model | None
 
     @property
     def names(self) -> Names:
         """Name and unit of each number of q, v and tau."""
-        return Names.of(layout_of(self.q, self.v), self.model)
+        own = self.model.layout.names if self.model else self.info.get(NAMES, ())
+        return Names.of(layout_of(self.q, self.v), own)
 
     def __len__(self) -> int:
         return len(self.t)
@@ -97,11 +101,10 @@ class Asked:
 
     @property
     def tensions(self) -> Array:
-        """Tensions (K, tendons) of the tendons, N, in a run of ``simulate`` by a table or curve of
-        tensions; ``Plan.tension`` has those of a plan. ValueError is raised for other motions.
+        """Tensions (K, tendons) of the tendons, N, in a run by a table or curve of tensions;
+        ``Plan.tension`` has those of a plan. ValueError is raised for other motions.
         """
-        again: Any = vars(self).get(AGAIN)
-        found = again.tensions(self.t) if hasattr(again, "tensions") else None
+        found = tensions_at(self.info, self.t)
         if found is None:
             raise ValueError("tensions: this motion was not simulated with tensions: use tau")
         return found

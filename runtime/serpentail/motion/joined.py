@@ -2,11 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
 
 from ..basics.attitude import Array
+from .given import TENSIONS
 from .trajectory import ARRAYS, Trajectory
 
 COUNTS = ("steps", "rejected", "evaluations", "factorisations", "unfelt", "seconds", "cpu_seconds")
@@ -29,7 +31,11 @@ def joined(parts: Sequence[Trajectory]) -> Trajectory:
             name: _end_to_end([each[name] for each in contacts]) for name in contact.arrays
         }
         contact = replace(contact, **points)
-    return replace(parts[0], **arrays, info=_info([part.info for part in parts]), contact=contact)
+    info = _info([part.info for part in parts])
+    if any(TENSIONS in part.info for part in parts):
+        phases = [p.info.get(TENSIONS, [{"begin": float(p.t[0])}]) for p in parts]
+        info[TENSIONS] = [*chain.from_iterable(phases)]
+    return replace(parts[0], **arrays, info=info, contact=contact)
 
 
 @dataclass(frozen=True, eq=False)

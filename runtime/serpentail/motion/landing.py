@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from serpentail_scene.layout import OMEGA, QUATERNION, VELOCITY
 
 from ..basics.attitude import Array, rotation_matrix
+from ..model.chains import limbs_of
 from ..model.model import Model
 from ..model.weight import weight_of
-from .ground import feet
+from .ground import feet as feet_of
 from .resample import smooth
 from .trajectory import Trajectory
 
@@ -120,7 +121,7 @@ class Landing:
         """For each foot the samples (K,) at which the ground pushes it."""
         return {
             name: np.asarray((forces[..., 2] > 0).any(axis=1))
-            for name, forces in feet(self.motion).items()
+            for name, forces in feet_of(self.motion).items()
         }
 
     # The flight about the apex, by its samples alone: at its ends a blow may change what follows.
@@ -184,11 +185,12 @@ class Landing:
 
     @cached_property
     def standing(self) -> bool | None:
-        """Whether it ends upright, at rest and on its feet."""
+        """Whether it ends upright, at rest and on its feet, which are the points of limbs."""
         motion = self.motion
-        if motion.contact is None or "feet" not in motion.contact.groups:
+        feet = [name for name in self.groups if name == "feet" or name in limbs_of(self.model)]
+        if motion.contact is None or not feet:
             return None
-        carried = motion.contact.of("feet").forces[-1, :, 2].sum()
+        carried = sum(motion.contact.of(name).forces[-1, :, 2].sum() for name in feet)
         slow = np.linalg.norm(motion.v[-1, VELOCITY]) < MAX_SPEED
         heavy = carried > MIN_SHARE * weight_of(self.model.parameters)
         return bool(upright(motion) > MIN_UPRIGHT and slow and heavy)

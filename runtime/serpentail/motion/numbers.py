@@ -143,7 +143,7 @@ NUMBERS = (
     Number(
         "standing_end", "",
         f"stands at the end: upright_end above {MIN_UPRIGHT}, B slower than {MAX_SPEED} m/s, more "
-        f"than {MIN_SHARE} of the weight on the feet",
+        f"than {MIN_SHARE} of the weight on the feet, or on limbs",
         lambda run: run.landing.standing,
     ),
     Number("landed", "", "stands at the end, and least_upright_landing is above 0",

@@ -4,6 +4,7 @@ Found in the samples when somebody asks, never while a run is simulated.
 """
 
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -77,9 +78,10 @@ def _in_the_ground(model: Model, motion: "Trajectory") -> list[str]:
     if motion.contact is None:
         return []
     allowed, warnings = DEEP * 2 * float(semi_axes(model).max()), []
+    keys = {chain.name: chain.owner or chain.name for chain in model.layout.chains}
     for part, (depth, time) in _depths(model, motion).items():
         if depth > allowed:
-            remedy = WORDS["knees" if part == "legs" else "add"].format(part=part)
+            remedy = WORDS["knees" if part == "legs" else "add"].format(part=keys.get(part, part))
             lengths = {"depth": 1e3 * depth, "allowed": 1e3 * allowed}
             warnings.append(WORDS["buried"].format(part=part, time=time, remedy=remedy, **lengths))
     return warnings
@@ -89,14 +91,13 @@ def _depths(model: Model, motion: "Trajectory") -> dict[str, Moment]:
     """Return the largest depth (m) of each part without contact, and its time."""
     contact = motion.contact
     assert contact is not None
-    q, axes, depths, given = motion.q, semi_axes(model), {}, motion.given
+    q, axes, depths = motion.q, semi_axes(model), {}
     if "torso" not in contact.groups:
         depths["torso"] = _largest(motion, lambda rows: _depth_of_torso(q[rows], axes))
-    if "tail" not in contact.groups and "tail_points" in model.kernels:
-        depths["tail"] = _largest(
-            motion,
-            lambda rows: -model.tail_points(q[rows], *(x[rows] for x in given))[..., 2].min(axis=1),
-        )
+    for chain in model.layout.chains if "tail_points" in model.kernels else ():
+        if chain.name not in contact.groups:
+            depth = partial(_depth_of_chain, model, motion, chain.points)
+            depths[chain.name] = _largest(motion, depth)
     legs = contact.legs
     if legs is not None and "leg_points" in model.kernels:
         depths["legs"] = _largest(
@@ -104,6 +105,12 @@ def _depths(model: Model, motion: "Trajectory") -> dict[str, Moment]:
             lambda rows: -model.leg_points(q[rows], legs[rows])[..., :KNEES, 2].min(axis=(1, 2)),
         )
     return depths
+
+
+def _depth_of_chain(model: Model, motion: "Trajectory", points: slice, rows: slice) -> Array:
+    """Depth (K,) in m of the lowest point of a chain in some samples."""
+    given = (each[rows] for each in motion.given)
+    return -model.tail_points(motion.q[rows], *given)[:, points, 2].min(axis=1)
 
 
 def _depth_of_torso(q: Array, axes: Array) -> Array:

@@ -122,9 +122,9 @@ class Trajectory(Asked, Exports, Showable):
     def events(self) -> list[dict[str, Any]]:
         """Touch-downs and take-offs in the order of time.
 
-        Each is a dict of "time" (s), "group" ("feet", "tail" or "torso") and "kind" ("touch_down"
-        or "take_off"). ValueError is raised for a motion on the ground by one of SciPy's methods,
-        which detect no events.
+        Each is a dict of "time" (s), "group" ("feet", "tail", "torso" or a chain) and "kind"
+        ("touch_down" or "take_off"). ValueError is raised for a motion on the ground by one of
+        SciPy's methods, which detect no events.
         """
         if self.contact is not None and "events" not in self.info:
             method = self.info.get("method", "how it was made")

@@ -15,6 +15,8 @@ from ..basics.checks import finite_array, shown
 LISTS: dict[str, tuple[type, tuple[str, ...]]] = {
     "warnings": (str, ()),
     "doubts": (str, ()),
+    "coordinates": (str, ()),
+    "tensions": (dict, ("begin",)),
     "events": (dict, ("time", "group", "kind")),
     "phases": (dict, ()),
 }

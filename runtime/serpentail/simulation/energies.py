@@ -115,7 +115,7 @@ class Energies:
         samples = self.samples
         info = samples.info | origin(self.model)
         if (curve := self.ground.given) is not None:
-            info[PRESCRIBED] = {name: array.tolist() for name, array in vars(curve).items()}
+            info[PRESCRIBED] = curve.as_lists()
         if samples.failure is not None:
             return info | {"failure": str(samples.failure) or INTERRUPTED}
         if not samples.ledger.size:  # a part of a run

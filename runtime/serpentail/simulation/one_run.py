@@ -14,7 +14,7 @@ from ..model.lazy import lazy_property
 from ..motion.trajectory import Trajectory
 from .callback import Watch, Watched
 from .controllers.actuation import RunActuations
-from .controllers.controller import Controller, parts_of, phases_of
+from .controllers.controller import Controller
 from .energies import trajectory_or_error
 from .gradients.gradient import Change, Gradient, jvp, refuse, vjp
 from .gradients.tape import Tape
@@ -91,19 +91,6 @@ class RunAgain:
             raise samples.failure
         rows = np.minimum(np.searchsorted(samples.t, wanted), len(samples.t) - 1)
         return samples.q[rows], samples.v[rows]
-
-    def tensions(self, times: np.ndarray) -> np.ndarray | None:
-        """Return the tensions (n, tendons), N, at times (n,) of the run; None if none act."""
-        found = None
-        for begin, law in phases_of(self.controller):
-            pulls = parts_of(law, self.start.model.layout.nt).since(begin).tensions
-            if pulls is not None:
-                own = pulls.at(times)[0]
-                found = np.zeros_like(own) if found is None else found
-                found[times >= begin] = own[times >= begin]
-            elif found is not None:
-                found[times >= begin] = 0.0
-        return found
 
     @lazy_property
     def tape(self) -> Tape:

@@ -105,6 +105,12 @@ def test_a_flight_has_ground_if_it_stays_above_it_and_no_legs(tmp_path, flight):
     np.testing.assert_allclose(inertia, parameters["torso_inertia"], rtol=1e-12)
     assert data["length"] == pytest.approx(parameters["tail_length"] + 2 * squares[1] ** 0.5)
     assert run["points"] == flight.model.tail_points(flight.q).shape[1]
+    for name, tail in ("tree", [0, 3]), ("limbs", [0]):  # curves of chains by their names
+        tree = zoo.model(name)
+        run = st.simulate(tree, tree.state(height=1), 0.01)
+        data, found = single_run(run.view(tmp_path / "run.html"))
+        curves = [each["label"] for plot in data["plots"][2:4] for each in plot["curves"]]
+        assert curves == [*tree.names.tail] * 2 and found["bases"] == tail
     single = flight.resample([0.0]).view(tmp_path / "run.html")
     assert single_run(single)[1]["rows"] == 1
 

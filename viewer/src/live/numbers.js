@@ -53,10 +53,13 @@ function landingOf(facts, landing) {
     return all + Math.atan2(sine, a * x + b * y + c * z);
   }, 0);
   const least = Math.min(...ups.map((up) => up[2]));
-  if (!live.groups.feet) return { least, turned };
+  const limbs = live.chains.filter(({ limb }) => limb).map(({ name }) => name);
+  const feet = ["feet", ...limbs].filter((name) => live.groups[name]);
+  if (!feet.length) return { least, turned };
   const { MIN_UPRIGHT, MAX_SPEED, MIN_SHARE } = live.limits;
   const slow = norm(...three(v, rows - 1)) < MAX_SPEED;
-  const carried = facts.force(rows - 1, facts.span("feet"))[2] > MIN_SHARE * facts.weight;
+  const forces = feet.map((name) => facts.force(rows - 1, facts.span(name))[2]);
+  const carried = sum(forces) > MIN_SHARE * facts.weight;
   return { least, turned, landed: ups.at(-1)[2] > MIN_UPRIGHT && slow && carried && least > 0 };
 }
 

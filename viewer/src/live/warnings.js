@@ -88,14 +88,17 @@ function buried(facts) {
   const lowest = (array, k, points) => Math.max(...points.map((i) => -of(array, k, 3 * i + 2)));
   const depths = {
     torso: (k) => norm(...facts.up(k).map((x, i) => axes[i] * x)) - facts.place(k)[2],
-    tail: (k) => lowest(tail, k, range(tail.width / 3)),
+    ...Object.fromEntries(live.chains.map(({ name, points: [start, stop] }) => {
+      return [name, (k) => lowest(tail, k, range(stop - start).map((i) => start + i))];
+    })),
     legs: legs && ((k) => lowest(legs, k, range(legs.width / 3).filter((i) => i % LEG < KNEES))),
   };
+  const keys = Object.fromEntries(live.chains.map(({ name, owner }) => [name, owner || name]));
   const allowed = live.limits.DEEP * 2 * Math.max(...axes);
   return Object.entries(depths).flatMap(([part, f]) => {
     const [depth, k] = f && !live.groups[part] ? largest(facts.rows, f) : [0];
     if (!(depth > allowed)) return [];
-    const remedy = filled(live.words[part === "legs" ? "knees" : "add"], { part });
+    const remedy = filled(live.words[part === "legs" ? "knees" : "add"], { part: keys[part] ?? part });
     const lengths = { depth: 1e3 * depth, allowed: 1e3 * allowed, time: facts.t[k] };
     return [filled(live.words.buried, { part, remedy, ...lengths })];
   });

@@ -8,11 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from serpentail_scene.layout import Layout
-
 from ...basics.attitude import Array
-from ...model.model import Model
-from ...model.names import Names
 from ...motion.contact import Contact
 from ...motion.trajectory import Trajectory
 from ...simulation.rollouts import Rollouts
@@ -72,17 +68,14 @@ def contents(motion: Trajectory | Rollouts) -> Contents:
     labels: dict[str, Any] = {"time": motion.t}
     if isinstance(motion, Rollouts):
         labels = {"run": np.arange(len(motion))} | labels
-        model: Model | None = motion.source.model
+        names = motion.source.model.names
         contact, touching = _contacts(motion)
     else:
-        model, contact = motion.model, motion.contact
+        names, contact = motion.names, motion.contact
         touching = {} if contact is None else contact.arrays
     leading = tuple(labels)
 
     # names of the numbers
-    layout = Layout.of_width(motion.q.shape[-1], motion.v.shape[-1])
-    assert layout is not None
-    names = Names.of(layout, model)
     labels |= {"coordinate": [*names.q], "rate": [*names.v], "axis": AXES}
     labels |= {"joint": [*names.tail]} if names.tail else {}
     groups = {} if contact is None else contact.groups

@@ -6,6 +6,7 @@ import numpy as np
 
 from ...basics.checks import refuse_not_finite
 from ...basics.errors import StateError
+from ...model.chains import limbs_of
 from ...model.library import WHY
 from ...model.model import Model
 from ...model.passive import BEHIND
@@ -109,7 +110,9 @@ def _data(model: Model, again: RunAgain, run: CompiledRun) -> dict[str, Any]:
         "firsts": model.layout.firsts,
         "chains": [
             {
+                "name": c.name,
                 "owner": c.owner,
+                "limb": c.name in limbs_of(model),
                 "first": c.tau.start,
                 "stop": c.tau.stop,
                 "points": [c.points.start, c.points.stop],

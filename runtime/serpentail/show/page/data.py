@@ -117,7 +117,7 @@ def _box(model: Model) -> list[float] | None:
 def _bases(model: Model) -> list[int]:
     """The tail's points where its segments begin, if these bend in pitch and yaw."""
     first = model.layout.chains[0]
-    if model.layout.hinges or model.manifest["scene"]["coordinates"] == "polar":
+    if model.manifest["scene"]["coordinates"] == "polar":
         return []
     counts = np.broadcast_to(model.manifest["dimensions"]["links"], model.segments)[first.segments]
     return [0, *np.cumsum(counts)[:-1].tolist()]
@@ -185,7 +185,7 @@ def _columns(array: str, motion: Trajectory) -> Sequence[str]:
     """The names of an array's columns; none if a motion does not have it."""
     if array in ("height", "tilt", "momentum"):
         return [] if motion.layout.fixed else "xyz" if array == "momentum" else [""]
-    if array in ("bends", "torque") and motion.layout.hinges:
+    if array in ("bends", "torque") and len(motion.layout.chains) > 1:
         return motion.names.tail
     if array in ("bends", "torque"):
         return [f"{bend} {i + 1}" for i in range(motion.segments) for bend in ("pitch", "yaw")]

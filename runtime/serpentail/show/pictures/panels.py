@@ -172,12 +172,12 @@ PANELS: dict[str, Callable[[Trajectory, Model | None], Panel]] = {
 def of_segments(motion: Trajectory) -> tuple[list[str], list[tuple[Any, str]], list[int]]:
     """Names and styles of tail coordinates, a colour a segment, yaw dashed; and their order.
 
-    Where some segments are hinges, a colour a coordinate.
+    Of several chains a colour a coordinate.
     """
     from matplotlib import colormaps
 
     segments = motion.segments
-    if motion.layout.hinges:
+    if len(motion.layout.chains) > 1:
         count = motion.layout.nt
         each = [(colour, "-") for colour in colormaps["viridis"](np.linspace(0, 0.85, count))]
         return [*motion.names.tail], each, [*range(count)]

@@ -9,6 +9,7 @@ from ...basics.checks import numbers_in, refusal
 from ...basics.errors import SimulationError
 from ...model.chains import refuse_driven
 from ...model.model import Model
+from ...motion.given import TENSIONS
 from ..records import CFunction, Records
 from ..start import Start
 from .controller import Controller, controllers_of, parts_of, phases_of
@@ -38,6 +39,7 @@ class Actuation:
         # phases, each by its parts
         phases = phases_of(controller)
         begins = [begin for begin, _ in phases]
+        self.begins = [max(begin, span[0]) for begin in begins]
         all_parts = [parts_of(each, self.nt).since(begin) for begin, each in phases]
         for each in all_parts:
             self._refuse_passive(each)
@@ -103,6 +105,10 @@ class Actuation:
         for parts in self.parts:
             if parts.state is not None:
                 info |= parts.state.info()
+        pulls = [parts.tensions.as_lists() if parts.tensions else {} for parts in self.parts]
+        if any(pulls):
+            phases = zip(self.begins, pulls, strict=True)
+            info[TENSIONS] = [{"begin": begin} | curve for begin, curve in phases]
         return info
 
     def _refuse_passive(self, parts: Parts) -> None:

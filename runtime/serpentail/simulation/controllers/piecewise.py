@@ -1,7 +1,7 @@
 """Piecewise polynomials of time, which the generated C can evaluate too."""
 
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -61,6 +61,10 @@ class Piecewise:
     def never_changes(self) -> bool:
         """Whether each channel is one constant."""
         return self.coefficients.shape[::2] == (1, 1)
+
+    def as_lists(self) -> dict[str, Any]:
+        """Return times and coefficients as lists, for JSON."""
+        return {name: array.tolist() for name, array in vars(self).items()}
 
     def later(self, delay: float) -> Self:
         """Return the same functions, delayed.
