@@ -14,6 +14,8 @@ from serpentail.optimal.violation import violation
 from serpentail.planning import continuation
 from serpentail.planning.attempts import Attempts
 from serpentail.planning.continuation import with_bound
+from serpentail.planning.magnitudes import checked_bounds
+from tests.support import zoo
 from tests.support.rows import row
 from tests.support.tumbling import DURATION, keyed, rat, start
 
@@ -161,6 +163,9 @@ def test_angles_are_within_half_a_turn_unless_start_or_goal_ask_for_more():
             else:
                 assert found[0] == pytest.approx(most)
                 assert np.abs(plan.trajectory.tail[:, 0]).max() <= 1.001 * most
+    model = zoo.model("ratios").with_parameters(joint_ratios=[1.0, 0.6, -0.5, -0.3])
+    angles = checked_bounds(model, st.Bounds()).angle  # of joints that turn by ratios
+    np.testing.assert_allclose(angles, np.pi / np.repeat([1.6, 0.8], 2))
 
 
 def bending(point):

@@ -52,7 +52,7 @@ def checked_duration(model: Model, duration: Any) -> tuple[float, float]:
 def checked_bounds(model: Model, bounds: Any) -> Bounds:
     """Return bounds of every tail coordinate, None for no bound; UnusualSize for odd ones.
 
-    A bound of angles of half a turn is that of each segment, which n joints share.
+    A bound of angles of half a turn is that of each segment, which its joints share.
     """
     if not isinstance(bounds, Bounds):
         raise PlanningError(f"bounds: value {shown(bounds)}: needs a serpentail.Bounds")
@@ -107,7 +107,7 @@ def _of_tendons(model: Model, bounds: Bounds) -> Bounds:
 
 def _half_turns(model: Model) -> np.ndarray:
     """Return the bound (nt,) of angles that bends each segment by half a turn."""
-    return np.repeat(np.pi / model.joints_each, model.layout.widths)
+    return np.repeat(np.pi / np.abs(model.turns_each), model.layout.widths)
 
 
 def _bound(model: Model, name: str, value: Any, usual: Any) -> np.ndarray | None:

@@ -48,7 +48,7 @@ class LearningTask:
                 f"contacts={list(self.contacts)}, or change `contacts` of the scene"
             )
         settings: dict[str, Any] = {
-            "angle": float(np.pi / np.max(model.joints_each)),
+            "angle": float(np.pi / np.max(np.abs(model.turns_each))),
             "start": None,
         }
         settings |= self.settings
