@@ -28,8 +28,8 @@ class NodeRecord(ctypes.Structure):
         ("given", _int),
         ("numbers", _pointer),
         *((name, _pointer) for name in ("values", "by_zeta", "twice", "units", "y_units")),
-        ("tendons", _int),
-        *((name, _pointer) for name in ("pull", "pull_slopes", "pull_twice")),
+        ("inputs", _int),
+        *((name, _pointer) for name in ("drive", "drive_slopes", "drive_twice")),
     )
 
 

@@ -76,7 +76,7 @@ def torque_expression(body: BodyFunctions, tail: "ca.SX", tension: "ca.SX") -> "
     return body.call("tendon_torques", ca.vertcat(ca.DM(IDENTITY_POSE), tail), tension)
 
 
-def pull_terms(model: Model, states: int) -> Terms:
+def drive_terms(model: Model, states: int) -> Terms:
     """Return (x, torques) as terms of a node's states x and tensions, or torques of motors."""
 
     def made() -> Terms:
@@ -87,7 +87,7 @@ def pull_terms(model: Model, states: int) -> Terms:
         torque = torque_expression(body, x[tail], tension)
         return terms_of(ca.vertcat(x, tension), ca.SX(0, 1), ca.vertcat(x, torque))
 
-    return memoised(("pull", model), made)
+    return memoised(("drive", model), made)
 
 
 def refuse_tendons(model: Model, what: str) -> None:

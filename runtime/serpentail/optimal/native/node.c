@@ -9,9 +9,9 @@
 /* Sizes, and where in the scratch is what. */
 typedef struct {
     int zeta, y, e, terms; /* of (x, omega, u, p), of terms */
-    int air, air_y, raw; /* of airborne zeta and y; of zeta with torques, not tensions */
+    int air, air_y, raw; /* of airborne zeta and y; of zeta with torques, not inputs */
     double *z, *tau, *air_out, *air_J, *air_H, *air_mu, *e_in, *out, *out_J, *out_H, *out_mu, *work;
-    double *raw_J, *raw_H, *half, *pull, *pull_J, *pull_mu;
+    double *raw_J, *raw_H, *half, *driven, *driven_J, *driven_mu;
 } Places;
 
 /* Length of the airborne state, with which x begins. */
@@ -27,7 +27,7 @@ static Places places_of(const Node *node, double *scratch)
     at.zeta = zeta_of(node);
     at.y = y_of_node(node);
     at.raw = m > 0 ? airborne_of(node) + m : 0;
-    at.air = node->tendons > 0 ? airborne_of(node) + node->tendons : at.raw;
+    at.air = node->inputs > 0 ? airborne_of(node) + node->inputs : at.raw;
     at.air_y = m > 0 ? airborne_of(node) + TURN : 0;
     at.e = at.zeta + (m > 0 ? TURN : 0);
     at.terms = (m > 0 ? 0 : node->states) + node->rows + 1;
@@ -45,11 +45,11 @@ static Places places_of(const Node *node, double *scratch)
     at.work = at.out_H + (size_t)at.e * at.e;
     at.raw_J = at.air_J;
     at.raw_H = at.air_H;
-    if (node->tendons > 0) {
-        at.pull = at.work;
-        at.pull_mu = at.pull + at.raw;
-        at.pull_J = at.pull_mu + at.raw;
-        at.half = at.pull_J + (size_t)at.raw * at.air;
+    if (node->inputs > 0) {
+        at.driven = at.work;
+        at.driven_mu = at.driven + at.raw;
+        at.driven_J = at.driven_mu + at.raw;
+        at.half = at.driven_J + (size_t)at.raw * at.air;
         at.raw_J = at.half + (size_t)at.raw * at.air;
         at.raw_H = at.raw_J + (size_t)at.air_y * at.raw;
         at.work = at.raw_H + (size_t)at.raw * at.raw;
@@ -73,14 +73,14 @@ static int finite(const double *values, size_t count)
     return 1;
 }
 
-/* (x, torques) of (x, tensions), 0 where all is finite; order 2: weighed by pull_mu, to air_H. */
-static int evaluate_pull(const Node *node, Places at, int order)
+/* (x, torques) of (x, inputs), 0 where all is finite; order 2: weighed by driven_mu, to air_H. */
+static int evaluate_drive(const Node *node, Places at, int order)
 {
-    const double *arg[8] = {at.z, at.pull_mu};
-    double *res[8] = {at.pull, at.pull_J, at.air_H};
-    return (order == 2 ? node->pull_twice : order == 1 ? node->pull_slopes : node->pull)(
+    const double *arg[8] = {at.z, at.driven_mu};
+    double *res[8] = {at.driven, at.driven_J, at.air_H};
+    return (order == 2 ? node->drive_twice : order == 1 ? node->drive_slopes : node->drive)(
                arg, res, NULL, NULL, 0)
-        || !finite(at.pull, (size_t)at.raw);
+        || !finite(at.driven, (size_t)at.raw);
 }
 
 /* zeta in SI; the torques in truth are tau - damping q_t_dot, in tau. */
@@ -98,10 +98,10 @@ static int in_si(const Node *node, Places at, const double *x, const double *u, 
     for (int j = 0; j < node->constants; j++) {
         z[states + controls + j] = node->units[states + controls + j] * p[j];
     }
-    if (node->tendons > 0 && evaluate_pull(node, at, slopes) != 0) {
+    if (node->inputs > 0 && evaluate_drive(node, at, slopes) != 0) {
         return 1;
     }
-    const double *given = (node->tendons > 0 ? at.pull : z) + airborne_of(node);
+    const double *given = (node->inputs > 0 ? at.driven : z) + airborne_of(node);
     for (int a = 0; a < m; a++) {
         tau[a] = given[a] - node->damping * z[ATTITUDE + m + a];
     }
@@ -168,7 +168,7 @@ static void damp_rows(const Node *node, double *H, int columns)
     }
 }
 
-/* Rows by (x, torques) as rows by (x, tensions): times P, the slopes of the former. */
+/* Rows by (x, torques) as rows by (x, inputs): times P, the slopes of the former. */
 static void chain_rows(const Node *node, Places at, const double *raw, int count, double *rows)
 {
     const int own = airborne_of(node);
@@ -176,12 +176,12 @@ static void chain_rows(const Node *node, Places at, const double *raw, int count
     for (int i = 0; i < count; i++, raw += at.raw, rows += at.air) {
         memcpy(rows, raw, (size_t)own * sizeof *rows);
         for (int k = own; k < at.raw; k++) {
-            add(at.air, raw[k], at.pull_J + (size_t)k * at.air, rows);
+            add(at.air, raw[k], at.driven_J + (size_t)k * at.air, rows);
         }
     }
 }
 
-/* J and H by (x, torques) as those by (x, tensions): J P, and P^T H P with the torques' own
+/* J and H by (x, torques) as those by (x, inputs): J P, and P^T H P with the torques' own
    curvature. */
 static int chain(const Node *node, Places at, int order)
 {
@@ -189,16 +189,16 @@ static int chain(const Node *node, Places at, int order)
     if (order < 2) {
         return 0;
     }
-    memset(at.pull_mu, 0, (size_t)at.raw * sizeof *at.pull_mu);
+    memset(at.driven_mu, 0, (size_t)at.raw * sizeof *at.driven_mu);
     for (int i = 0; i < at.air_y; i++) {
-        add(at.raw, at.air_mu[i], at.raw_J + (size_t)i * at.raw, at.pull_mu);
+        add(at.raw, at.air_mu[i], at.raw_J + (size_t)i * at.raw, at.driven_mu);
     }
-    if (evaluate_pull(node, at, 2) != 0) {
+    if (evaluate_drive(node, at, 2) != 0) {
         return 1;
     }
     chain_rows(node, at, at.raw_H, at.raw, at.half);
     for (int i = 0; i < at.raw * at.air; i++) {
-        add(at.air, at.pull_J[i], at.half + (size_t)(i / at.air) * at.air,
+        add(at.air, at.driven_J[i], at.half + (size_t)(i / at.air) * at.air,
             at.air_H + (size_t)(i % at.air) * at.air);
     }
     return 0;
@@ -347,7 +347,7 @@ int node_evaluate(const Node *node, const double *x, const double *u, const doub
             damp_columns(node, at.raw_H, at.raw, at.raw);
             damp_rows(node, at.raw_H, at.raw);
         }
-        if (node->tendons > 0 && order > 0 && chain(node, at, order) != 0) {
+        if (node->inputs > 0 && order > 0 && chain(node, at, order) != 0) {
             return 1;
         }
     }

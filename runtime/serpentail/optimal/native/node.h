@@ -47,8 +47,9 @@ typedef struct {
     Terms values, by_zeta, twice; /* NULL: no rows and no cost */
     const double *units;         /* (x, u, p) */
     const double *y_units;       /* (rates, rows, cost) */
-    int tendons;                 /* 0: the inputs after the airborne state are the torques; else */
-    Terms pull, pull_slopes, pull_twice; /* they are tensions, and this is (x, torques) of (x, T) */
+    int inputs;                  /* 0: the torques of all coordinates follow the airborne state; */
+    Terms drive, drive_slopes, drive_twice; /* else so many inputs do: tensions, or torques of */
+                                            /* motors; and this is (x, torques) of (x, inputs) */
 } Node;
 
 static inline int zeta_of(const Node *node)

@@ -13,7 +13,7 @@ from ...optimal.problem import OcpNode
 from ...optimal.terms import Terms, terms_of
 from ..air import DRIFT, in_air
 from ..problem import PlanningProblem
-from ..tendons import is_direct, pull_terms, torque_expression
+from ..tendons import drive_terms, is_direct, torque_expression
 from .body import BodyFunctions
 from .coordinates import IDENTITY_POSE, rotated
 from .point import PathPoint, point_of
@@ -185,9 +185,9 @@ class FlightDynamics:
                 "work": max(model.manifest["work"][name] for name in FUNCTIONS.values()),
             }
             if not is_direct(model):
-                pull = pull_terms(model, variables.size(variables.states)).functions.values()
-                airborne |= zip(("pull", "pull_slopes", "pull_twice"), pull, strict=True)
-                airborne["tendons"] = len(variables.units[variables.input])
+                drive = drive_terms(model, variables.size(variables.states)).functions.values()
+                airborne |= zip(("drive", "drive_slopes", "drive_twice"), drive, strict=True)
+                airborne["inputs"] = len(variables.units[variables.input])
             arrays = {"parameters": model.parameter_vector, "momentum": self.conserved[:3]}
         parts = (*variables.states, *variables.controls, *variables.constants)
         return OcpNode(
