@@ -98,7 +98,8 @@ function buried(facts) {
   return Object.entries(depths).flatMap(([part, f]) => {
     const [depth, k] = f && !live.groups[part] ? largest(facts.rows, f) : [0];
     if (!(depth > allowed)) return [];
-    const remedy = filled(live.words[part === "legs" ? "knees" : "add"], { part: keys[part] ?? part });
+    const words = live.words[part === "legs" ? "knees" : "add"];
+    const remedy = filled(words, { part: keys[part] ?? part });
     const lengths = { depth: 1e3 * depth, allowed: 1e3 * allowed, time: facts.t[k] };
     return [filled(live.words.buried, { part, remedy, ...lengths })];
   });
