@@ -238,7 +238,7 @@ SEGMENT = {**LENGTHS, **MASSES, **INERTIAS, "link_centers": Key("m", each_link=T
 JOINT = {
     "length": Key("m", POSITIVE),
     "tip": Key("m", size=3),
-    "mass": Key("kg", POSITIVE),
+    "mass": Key("kg", NOT_NEGATIVE),
     "center": Key("m", size=3),
     "inertia": Key("kg m^2", BODY_INERTIA, 3),
     "radius": Key("m", NOT_NEGATIVE),

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
-from serpentail_scene.drives import DRIVE
+from serpentail_scene.drives import DRIVE, drives_of
 from serpentail_scene.keys import JOINT, NAME
 from serpentail_scene.parameters import OUT_OF_REACH, ellipsoid
 from serpentail_scene.rules import one_of
@@ -50,6 +50,10 @@ def limb(name: str, table: Mapping[str, Any], named: Mapping[str, Any]) -> Scene
     if "mass" not in hinges[-1] and not problems:
         remedy = "at the end of a chain: its angle would have no inertia. Give a mass"
         problems.append(Problem(f"joints[{len(joints) - 1}].mass", None, remedy))
+    given = {*drives_of(table)} == {"prescribed"}
+    for k in [k for k, each in enumerate(hinges) if each.get("mass") == (0.0,) and not given]:
+        remedy = 'needs a mass above 0, in kg, or drive = "prescribed" for the whole limb'
+        problems.append(Problem(f"joints[{k}].mass", 0.0, remedy))
     if "mount" not in table and "tail_mount" not in named:
         problems.append(Problem("mount", None, "has no default: give it in m"))
     if problems:
@@ -70,6 +74,7 @@ def limb(name: str, table: Mapping[str, Any], named: Mapping[str, Any]) -> Scene
         ),
         links=sum("mass" in each for each in hinges),
         rotors=len(hinges) * rotors,
+        given=given,
         tilted="mount_angles" in values,
     )
     parameters = resolve_parameters(values, 1, kind, (), shape, len(hinges))

@@ -17,6 +17,7 @@ from serpentail_scene.parameters import (
     ellipsoid,
     parts_of,
 )
+from serpentail_scene.rules import NOT_NEGATIVE
 from serpentail_scene.units import in_unit
 
 from .checks import fits, number_problem, plain, unknown_keys
@@ -60,6 +61,10 @@ def parameters_of(
     candidates = [p for p in PARAMETERS if p.name not in foreign and p.needs in present]
     counted = [(p, shape.numbers_of(p.tail)) for p in candidates]
     parameters = tuple(replace(p, size=p.size * count) for p, count in counted if count)
+    if shape.given:
+        parameters = tuple(
+            replace(p, rule=NOT_NEGATIVE) if p.name == "link_masses" else p for p in parameters
+        )
     if kind == "mixed":
         parameters = tuple(replace(p, meaning=MEANINGS.get(p.name, p.meaning)) for p in parameters)
     air = tuple(

@@ -13,6 +13,7 @@ class Shape:
     links, arcs: how many have a mass, a length and an inertia of their own; 0: all are equal.
     ratios: joints of links, if they turn by unequal shares of their segment's angles.
     rotors: hinges of a limb, if some of them have a rotor.
+    given: the angles of a limb are prescribed, so that its bodies need no mass.
     tilted: the tail begins in axes of its own, not in those of the torso.
     fixed: the torso never moves.
     weightless: there is no gravity.
@@ -27,6 +28,7 @@ class Shape:
     arcs: int = 0
     ratios: int = 0
     rotors: int = 0
+    given: bool = False
     tilted: bool = False
     fixed: bool = False
     weightless: bool = False

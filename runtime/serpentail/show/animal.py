@@ -130,7 +130,7 @@ def _radii_of(model: Model, chain: ChainLayout) -> Array:
     p, points = values_of(chain, model.parameters), model.manifest["dimensions"]["links"]
     counts = np.broadcast_to(points, model.segments)[chain.segments]
     count = int(counts.sum())
-    usual, radii = usual_radius(p) if "tail_length" in p else 0.0, np.zeros(count)
+    usual, radii = usual_radius({**model.parameters, **p}), np.zeros(count)
     if not {"link_masses", "arc_masses"} & p.keys():
         return usual * (THICKER - np.arange(count) / (2 * count + 2))
     kinds = model.kinds[chain.segments]
@@ -140,7 +140,8 @@ def _radii_of(model: Model, chain: ChainLayout) -> Array:
         jointed = np.array(["mass" in joint for joint in joints])
     if "link_masses" in p:
         along, masses = np.reshape(p["link_inertias"], (-1, 3))[:, 1], np.array(p["link_masses"])
-        radii[jointed] = np.where(along > 0, np.sqrt(2 * along / masses), usual)
+        solid = (along > 0) & (masses > 0)
+        radii[jointed] = np.where(solid, np.sqrt(2 * along / np.where(solid, masses, 1)), usual)
     if "arc_masses" in p:
         sections = np.array(p["arc_masses"]) / p["arc_lengths"] / WATER
         arcs = np.array(kinds) == "continuum"
