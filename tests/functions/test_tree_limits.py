@@ -90,23 +90,6 @@ def test_legs_with_mass_push_with_less_than_20_body_weights():
                 np.testing.assert_allclose(found[k], part, atol=1e-9 * abs(part).max())
 
 
-def test_hinges_about_x_and_z_are_a_segment_of_one_link():
-    """A bare hinge and one with a link are a segment of one link: the same H, C and v_dot."""
-    place = {"mount": [0.01, 0.02, -0.003], "mount_angles": [0.4, -0.2, 1.3]}
-    link = {"length": 0.03, "mass": 2e-3, "inertia": [4e-8, 2e-9, 3.9e-8]}
-    joints = [{"name": "a"}, {"name": "b", "axis": "z", **link}]
-    limb = built("limb", chain={"leg": place | {"kind": "limb", "joints": joints}})
-    own = {**link, "link_inertia": link["inertia"], "links": 1}
-    del own["inertia"]
-    chain = built("one", chain={"leg": place | {"kind": "articulated", "segments": [own]}})
-    for q, v, _, tau in own_tails.states(limb.nq):
-        H = chain.mass_matrix(q)
-        assert mass_matrix_error(limb.mass_matrix(q), H) < 1e-14
-        assert force_error(limb.bias_force(q, v), chain.bias_force(q, v), H) < 1e-13
-        most, expected = FORWARD * equilibrated_condition(H), chain.forward_dynamics(q, v, tau)
-        assert block_error(limb.forward_dynamics(q, v, tau), expected) < most
-
-
 def test_a_reaction_wheel_turns_the_body_back():
     """By J / (J + I) of its own turn, if all lies on its axis; its rotor only resists the motor."""
     J, rotor, moments = 7e-8, 2e-7, [4e-8, 7e-8, 4e-8]
