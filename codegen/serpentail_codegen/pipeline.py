@@ -144,6 +144,7 @@ def needed(scene: Scene) -> list[str]:
     transposed = ["implicit_solve_transposed"] * ("implicit" in names)
     parts = {
         "rollout": called,
+        "loads": ["push_rates"],
         "implicit": ["implicit_factor", "implicit_solve"],
         "gradients": ["rates_vjp", "rates_jvp", *margins, *transposed],
     }

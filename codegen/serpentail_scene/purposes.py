@@ -53,7 +53,7 @@ def functions_of(tables: Mapping[str, Any]) -> Any:
     """
     chosen = tables.get("functions", ())
     if chosen == "all":
-        return possible(tables, {*ALL} - {"gradients"}, polar=False)
+        return possible(tables, {*ALL} - {"gradients", "loads"}, polar=False)
     if not isinstance(chosen, list | tuple) or ("functions" in tables and not chosen):
         return chosen
     added = [name[1:] for name in chosen if isinstance(name, str) and name.startswith(ADDED)]

@@ -27,6 +27,7 @@ _HOME = {
     "Piecewise": "simulation.controllers.piecewise",
     **dict.fromkeys(["Legs", "Reference"], "simulation.controllers.schedules"),
     "Prescribed": "simulation.controllers.prescribed",
+    "Load": "simulation.controllers.load",
     "Contact": "motion.contact",
     "Trajectory": "motion.trajectory",
     "summary": "motion.summary",

@@ -4,7 +4,7 @@ table.
 
 from serpentail_scene.signatures.table import SIGNATURES
 
-from . import air, contact, pfl, tendons
+from . import air, contact, pfl, pushes, tendons
 from .airborne import curvature as airborne
 from .derivatives import by_parameters, hessian, jacobians, rates
 from .derivatives.differentiated import FUNCTIONS
@@ -20,6 +20,7 @@ _FOUND = FUNCTIONS | signed(
     | tendons.ASSEMBLIES
     | contact.ASSEMBLIES
     | pfl.ASSEMBLIES
+    | pushes.ASSEMBLIES
     | {"implicit_factor": factor.assemble_factor, "implicit_solve": solve.assemble_solve}
     | airborne.ASSEMBLIES
     | rates.ASSEMBLIES

@@ -172,6 +172,11 @@ class Tail(Sizes):
         return LOAD + 3 * self.tail_points
 
     @property
+    def pushes(self) -> int:
+        """Length of push: 12 numbers of the torso, then a force at each tail point and foot point."""
+        return 12 + 3 * self.tail_points + 18 * bool(self.leg_numbers)
+
+    @property
     def parameter_numbers(self) -> int:
         """Number of values in the parameter struct of the C code."""
         return sum(p.size for p in struct_parameters(self))

@@ -23,6 +23,13 @@ def load_at_point(let, R: M33, P: V3, f_point: V3, F_beyond: V6) -> dict:
     return {"F_beyond": F_beyond + Matrix([force, P.cross(force)])}
 
 
+def moment_of_places(let, R: M33, places: M33) -> dict:
+    """Moment about B in torso axes of forces f at places r of the torso, by the sum of r f^T."""
+    turned = places * R  # r (R^T f)^T, whose skew part is r x R^T f
+    pairs = ((1, 2), (2, 0), (0, 1))
+    return {"moment": Matrix([turned[a, b] - turned[b, a] for a, b in pairs])}
+
+
 def joint_load(let, S: V12, F_beyond: V6) -> dict:
     """Generalised force of the tail loads on one joint: J^T f by its spatial columns (Eq. 10)."""
     force, moment = F_beyond[0:3, :], F_beyond[3:6, :]

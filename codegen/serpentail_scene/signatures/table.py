@@ -34,7 +34,7 @@ FIXED = (
     *("energy", "momentum", "tail_points", "center_of_mass"),
     *("inverse_dynamics_derivatives", "forward_dynamics_derivatives"),
     *("inverse_dynamics_parameter_derivatives", "forward_dynamics_parameter_derivatives"),
-    *("pfl", "implicit", "rollout", "mount_wrench", "tendon_lengths", "tendon_torques"),
+    *("pfl", "implicit", "rollout", "loads", "mount_wrench", "tendon_lengths", "tendon_torques"),
 )
 # of several chains
 OF_TREES = (
@@ -43,7 +43,7 @@ OF_TREES = (
     *("inverse_dynamics_derivatives", "forward_dynamics_derivatives", "energy_derivatives"),
     *("momentum_derivatives", "inverse_dynamics_vjp", "forward_dynamics_vjp"),
     *("inverse_dynamics_parameter_derivatives", "forward_dynamics_parameter_derivatives"),
-    *("forward_dynamics_jvp", "pfl", "implicit", "rollout", "mount_wrench"),
+    *("forward_dynamics_jvp", "pfl", "implicit", "rollout", "loads", "mount_wrench"),
     *("contact_points", "contact_dynamics", *AIRBORNE),
 )
 # of several chains of which some are prescribed

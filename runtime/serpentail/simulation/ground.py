@@ -14,6 +14,7 @@ from ..model.model import Model
 from ..model.parameters import RunParameters
 from ..model.weight import weight_of
 from ..motion.contact import Contact
+from .controllers.load import loads_of
 from .controllers.piecewise import Piecewise
 from .controllers.prescribed import curve_of
 from .controllers.schedules import Legs
@@ -36,7 +37,8 @@ DEEP = (
 class GroundSettings:
     """Checked settings of runs on the ground, bristles (k, points, 2); without contacts none.
 
-    given: angles of prescribed joints over time, if there are any, also in flight.
+    given: angles of prescribed joints over time, and loads: forces from outside, if there are any,
+    also in flight.
     """
 
     groups: dict[str, int] = field(default_factory=dict)
@@ -44,15 +46,17 @@ class GroundSettings:
     bristles: np.ndarray = field(default_factory=lambda: np.zeros((1, 0, 2)))
     stop_at: int = 0
     given: Piecewise | None = None
+    loads: Piecewise | None = None
 
     @classmethod
     def checked(
         cls, model: Model, start: Start, parameters: RunParameters, settings: dict
     ) -> "GroundSettings":
-        """Take legs, prescribed, bristles0 and stop_at out of settings; SimulationError if one is
+        """Take legs, prescribed, load, bristles0 and stop_at out of settings; SimulationError if one is
         wrong.
         """
         given = curve_of(model, start.many, settings.pop("prescribed", None))
+        loads = loads_of(model, settings.pop("load", None))
         choices = {name: settings.pop(name, None) for name in ("legs", "bristles0", "stop_at")}
         groups = model.contacts
         if not groups:
@@ -62,10 +66,10 @@ class GroundSettings:
                     raise SimulationError(
                         f"{name} {value!r}: {model.name} has no contacts: {remedy}"
                     )
-            return cls(given=given)
+            return cls(given=given, loads=loads)
         legs = _legs(groups, choices["legs"])
         bristles = _bristles(groups, start, choices["bristles0"])
-        ground = cls(groups, legs, bristles, _stops(groups, choices["stop_at"]), given)
+        ground = cls(groups, legs, bristles, _stops(groups, choices["stop_at"]), given, loads)
         ground.refuse_deep(model, start, parameters)
         return ground
 

@@ -6,6 +6,7 @@ from typing import Required, TypedDict
 from ..model.state import Quantities, Quantity
 from .callback import Watch
 from .controllers.controller import Controller
+from .controllers.load import Load
 from .controllers.prescribed import Prescribed
 from .controllers.schedules import Legs
 
@@ -25,6 +26,7 @@ class RunSettings(TypedDict, total=False):
     step: Quantity
     legs: Legs
     prescribed: Prescribed
+    load: Load | Sequence[Load]
     bristles0: Quantities
     stop_at: Sequence[tuple[str, str]]
     watch: Watch

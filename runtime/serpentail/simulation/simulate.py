@@ -129,6 +129,8 @@ def simulate(
         Leg angles over time; required if the model has feet.
     prescribed : Prescribed
         Angles of prescribed joints over time; required if the model has any. It takes one start.
+    load : Load or sequence of Load
+        Forces from outside, over time. A built model that lacks the C for them gets it.
     bristles0 : array_like, shape (points, 2), optional
         Stretch of the friction springs at the start (m), of models with contacts. Default:
         zero. For k starts also (k, points, 2).

@@ -22,7 +22,7 @@ def records(has: SimulationFeatures) -> dict[str, list[Field]]:
     found = {
         "piecewise": PIECEWISE,
         "controller": [*CONTROLLER[:2], *TENSIONS[: has.tendons], *PFL * has.pfl, *CONTROLLER[2:]],
-        "drive": DRIVE + LEGS * legs + GIVEN * bool(has.given),
+        "drive": DRIVE + LEGS * legs + GIVEN * bool(has.given) + LOADS * bool(has.loads),
         "run": [*START, *BRISTLES[:1] * ground, *SETTINGS, *touched, *KEPT]
         + CONTACT_KEPT * ground
         + LANDED * legs,
@@ -99,6 +99,9 @@ LEGS = fields("""
 """)
 GIVEN = fields("""
     const piecewise *given: a channel for each prescribed coordinate (rad)
+""")
+LOADS = fields("""
+    const piecewise *loads: forces from outside, a channel for each number of `push`; NULL: none
 """)
 START = fields("""
     const parameters *parameters: parameters of the model

@@ -29,15 +29,17 @@ class SimulationFeatures:
     air: bool
     gradients: bool  # derivatives of whole runs
     tendons: int
+    loads: int  # numbers of forces from outside, 0 without
 
     @property
     def ledger(self) -> tuple[tuple[str, int], ...]:
         """Return the sums that a run keeps, and how many numbers each has: works (J), impulses of
-        groups (N s), work and impulse of the air.
+        groups (N s), work and impulse of loads, of the air.
         """
         works = ["torques", "damping"] + ["ground"] * bool(self.contacts) + ["legs"] * self.legs
         works += ["prescribed"] * bool(self.given)
         sums = tuple((name, 1) for name in works) + tuple((name, 3) for name, _ in self.groups)
+        sums += (("loads", 1), ("loads", 3)) * bool(self.loads)
         return sums + (("air", 1), ("air", 3)) * self.air
 
     @property
@@ -85,4 +87,5 @@ def simulation_features(tail: Tail, names: Collection[str], factors: int) -> Sim
     """
     groups, legs = tuple(tail.groups.items()), "feet" in tail.contacts
     more = tail.given, tail.widths > 0, "rates_vjp" in names, tail.tendons
+    more = (*more, tail.pushes * ("push_rates" in names))
     return SimulationFeatures("pfl" in names, factors, tail.points, groups, legs, *more)

@@ -31,8 +31,9 @@ class Actuation:
         controller: Controller,
         span: tuple[float, float],
         legs: Schedule = None,
+        loads: Piecewise | None = None,
     ):
-        self.records = records
+        self.records, self.loads = records, loads
         self.error: BaseException | None = None
         self.ctrl_c = CtrlC()
         self.nt = self.model.layout.nt
@@ -58,6 +59,9 @@ class Actuation:
             if legs.landing is not None:
                 members["landing"] = self._table(legs.landing)
                 members["landing_from"] = legs.landing_from
+        if loads is not None:
+            stops |= {*loads.kinks(2).tolist()}
+            members["loads"] = self._table(loads)
         self.stops = records.array(sorted(stops))
         self.record = records.record(
             "drive",
@@ -76,8 +80,8 @@ class Actuation:
 
     @property
     def acts(self) -> bool:
-        """Whether any torque acts."""
-        return any(
+        """Whether any torque or force from outside acts."""
+        return self.loads is not None or any(
             getattr(parts, name) is not None
             for parts in self.parts
             for name in ("damping", "torques", "tensions", "pfl", "native", "user")
@@ -250,8 +254,15 @@ class RunActuations:
     drives: addresses of the C records of the runs' actuations.
     """
 
-    def __init__(self, records: Records, controller: object, start: Start, legs: Schedule = None):
-        self.records = records
+    def __init__(
+        self,
+        records: Records,
+        controller: object,
+        start: Start,
+        legs: Schedule = None,
+        loads: Piecewise | None = None,
+    ):
+        self.records, self.loads = records, loads
         self.span = start.start, start.end
         controllers = controllers_of(controller, start.runs if start.many else None)
         one_for_all = len(controllers) == 1 and start.runs > 1
@@ -277,7 +288,7 @@ class RunActuations:
     def _of(self, controller: Controller, legs: Schedule, k: int | None) -> Actuation:
         """Return the actuation of run k, or of all; SimulationError if it is impossible."""
         try:
-            return Actuation(self.records, controller, self.span, legs)
+            return Actuation(self.records, controller, self.span, legs, self.loads)
         except SimulationError as error:
             if k is None:
                 raise

@@ -166,6 +166,7 @@ def refuse(again: RunAgain) -> None:
         "controller: what is no Damping, TorqueTable or TorqueCurve": law is not None,
         "motors, which may limit a controller": again.controller is not None
         and any(name.startswith("motor_") for name in model.parameters),
+        "load: a force from outside": again.ground.loads is not None,
         "stop_at: the end of a run at an event": again.ground.stop_at > 0,
         'real = "float"': model.parameter_vector.dtype != np.float64,
         "a fixed base": model.fixed,

@@ -26,7 +26,8 @@ def fit_lanes(runs: RunSet) -> bool:
     """Tell whether runs can be made in lanes: flights under damping and torques."""
     if runs.method.name not in METHODS or "flights" not in runs.model.manifest:
         return False
-    if any(name.startswith("motor_") for name in runs.model.parameters):
+    motors = any(name.startswith("motor_") for name in runs.model.parameters)
+    if motors or runs.ground.loads is not None:
         return False
     parts = [parts for each in runs.actuations.distinct for parts in each.parts]
     return all(each.pfl is each.native is each.user is each.tensions is None for each in parts)
