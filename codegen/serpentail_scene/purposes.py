@@ -47,9 +47,9 @@ ADDED = "+"  # before a name in `functions`: besides those of the purposes
 def functions_of(tables: Mapping[str, Any]) -> Any:
     """Return the names of a scene's functions; what is wrong stays as it is, for the checks.
 
-    "all" means all that the scene can have but gradients, which are added to a model that is asked
-    for them; names without "+" exactly these; keys ``purpose`` and
-    names with "+" add to what the scene's tables need.
+    "all" means all that the scene can have but gradients and loads, which are added to a model that
+    is asked for them; names without "+" exactly these; keys ``purpose`` and names with "+" add to
+    what the scene's tables need.
     """
     chosen = tables.get("functions", ())
     if chosen == "all":
@@ -110,6 +110,7 @@ def needed_for(tables: Mapping[str, Any], purposes: Collection[str]) -> list[str
     acting = [tables.get("simulate"), *_entries(tables.get("phase"))]
     laws = [law for table in acting for law in _entries(_keys(table).get("controller"))]
     names |= {"pfl"} if any(_keys(law).get("kind") == "pfl" for law in laws) else set()
+    names |= {"loads"} if _entries(_keys(tables.get("simulate")).get("load")) else set()
     return possible(tables, names)
 
 

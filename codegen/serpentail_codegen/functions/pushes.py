@@ -32,8 +32,8 @@ def assemble_push_rates(draft: Draft, arrays: dict[str, Array]) -> None:
     load = gather_loads(draft, state, R, f_ext, torques)
     if tail.leg_numbers:
         feet = _load_of_feet(draft, state, R, arrays)
-        for name, ref in load.items():
-            draft.copy(ref, feet[name], adds=True)
+        for name in feet:
+            draft.copy(load[name], feet[name], adds=True)
 
     tau = weightless(draft, lambda k: torques.part(k, 1), **load)
     factored.solve(tau, arrays["v_dot"])

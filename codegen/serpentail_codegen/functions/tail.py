@@ -173,7 +173,7 @@ class Tail(Sizes):
 
     @property
     def pushes(self) -> int:
-        """Length of push: 12 numbers of the torso, then a force at each tail point and foot point."""
+        """Length of push: 12 numbers of the torso, then a force at each tail and foot point."""
         return 12 + 3 * self.tail_points + 18 * bool(self.leg_numbers)
 
     @property

@@ -57,7 +57,7 @@ F_EXT = Argument("f_ext", ("loads",),
     "force at B (N, world), moment (N m, body), then a force (N, world) at each of the N + 1 tail "
     "points")
 PUSH = Argument("push", ("pushes",),
-    "force on the torso (N, world), the sum of places (torso axes) times forces (N m), then a force "
+    "force on the torso (N, world), sum of places (torso axes) times forces (N m), then a force "
     "(N, world) at each tail point, then at A, M, T of both feet")
 FORCE = nv_numbers("force",
     "generalised force: at B (N, world), moment (N m, body), torques of the tail coordinates (N m)")

@@ -92,8 +92,8 @@ class Asked:
         """Force (K, 3), N, and moment (K, 3), N m, of the tail on the torso, torso axes.
 
         They act at the tail's mount, at every sample, and are computed when asked for. The model
-        needs ``mount_wrench``, and on the ground ``forward_dynamics_external``. ValueError is
-        raised if the motion has no model.
+        needs ``mount_wrench``, and on the ground or with a load ``forward_dynamics_external``.
+        ValueError is raised if the motion has no model.
         """
         if self.model is None:
             raise ValueError("mount_wrench: this motion has no model: use model.mount_wrench")

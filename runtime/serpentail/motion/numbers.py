@@ -75,7 +75,7 @@ def _entry(name: str) -> Callable[[Facts], Any]:
 def _ground_impulse(run: Facts) -> list[float] | None:
     """The sum of the groups' impulses; None in flight, and if no run added them up."""
     impulses = run.motion.info.get("impulse_N_s") or {}
-    found = [impulse for group, impulse in impulses.items() if group != "air"]
+    found = [impulse for group, impulse in impulses.items() if group not in ("air", "loads")]
     return np.sum(found, axis=0).tolist() if found else None
 
 
@@ -156,7 +156,7 @@ NUMBERS = (
         "impulse of the ground on all points (x, y, z), summed by the integrator",
         _ground_impulse,
     ),
-    Number("impulse_N_s", "N s", "the same for each group, and that of the air",
+    Number("impulse_N_s", "N s", "the same for each group, and that of loads and the air",
         lambda run: run.motion.info.get("impulse_N_s") or None),
     Number("peak_ground_force_N", "N", f"largest force on all points together, {STEPS}",
         lambda run: run.peak(0)),
@@ -183,7 +183,7 @@ NUMBERS = (
         lambda run: float(np.abs(run.motion.tau).max(initial=0))),
     Number("energy_change_J", "J", "energy at the end minus energy at the start",
         lambda run: float(run.motion.energy[-1] - run.motion.energy[0])),
-    Number("work_J", "J", "work of torques, damping, ground, drives of legs and joints, air",
+    Number("work_J", "J", "work of torques, damping, ground, drives of legs and joints, loads, air",
         _entry("work_J")),
     Number(
         "imbalance", "",

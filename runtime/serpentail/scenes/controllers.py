@@ -9,6 +9,7 @@ from ..basics.errors import SimulationError
 from ..model.model import Model
 from ..motion.trajectory import Trajectory
 from ..simulation.controllers.controller import Controller, Damping, Phases, TorqueTable
+from ..simulation.controllers.load import Load
 from ..simulation.controllers.pfl import KD, KP, Pfl
 from ..simulation.controllers.prescribed import Prescribed
 from ..simulation.controllers.schedules import Legs, Reference
@@ -40,6 +41,18 @@ def prescribed_of(table: Mapping) -> Prescribed:
     if "times" not in table:
         return Prescribed.moves(angles, table.get("moves", []))
     return Prescribed(table["times"], angles, table.get("blend", "quintic"))
+
+
+def loads_of(tables: list[Mapping]) -> list[Load]:
+    """Return the forces of tables [[simulate.load]], each at a point or a place in the torso."""
+    loads = []
+    for k, table in enumerate(tables):
+        if len({"point", "place"} & table.keys()) != 1 or not {"times", "force"} <= table.keys():
+            needs = "times, force, and point or place"
+            raise refusal(f"simulate.load[{k}]", dict(table), needs, SimulationError)
+        point = table.get("point", table.get("place"))
+        loads.append(Load(point, table["times"], table["force"]))
+    return loads
 
 
 def reference_of(where: str, model: Model, table: Mapping, parent: Path) -> Reference | Trajectory:

@@ -38,6 +38,7 @@ PHASES = Key(each=PHASE)
 INSTEAD = {  # keys of [simulate] that a scene with phases has elsewhere
     "duration": "each phase has its own",
     "reference": "give it to a phase",
+    "load": "phases have no forces from outside",
     "prescribed": "phases have no prescribed joints",
 }
 

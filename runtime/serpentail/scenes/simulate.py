@@ -19,7 +19,7 @@ from ..model.state import State, state_of
 from ..simulation.controllers.schedules import Reference
 from ..simulation.methods import SETTINGS
 from ..simulation.settle import check_settling, refuse_moving, settle
-from .controllers import controller_of, legs_of, prescribed_of, reference_of
+from .controllers import controller_of, legs_of, loads_of, prescribed_of, reference_of
 from .file import model_of, read_scene, size_of, subtable, values_of
 from .overrides import changed, split_changes
 from .phases import phases_of, refuse_beside_phases
@@ -95,6 +95,8 @@ def scenario_of(model: Model, table: Mapping, parent: Path, phases: Any = ()) ->
         if schedule is not None:
             times = np.asarray(schedule.times) * size_of(model).get("s", 1.0)
             settings["prescribed"] = replace(schedule, times=times)
+    if "load" in table:
+        settings["load"] = refused.attempt("load", loads_of, table["load"])
     reference = None
     if "reference" in table:
         straight = Reference([0.0, 1.0], np.zeros((2, model.layout.nt)))

@@ -37,10 +37,10 @@ Arrays = dict[str, np.ndarray]
 class Audit:
     """Work, impulses, and what they do not explain; arrays have the runs' axis, or none.
 
-    work (J): of torques, damping, the ground on the points, the drives of the legs, and the air.
-    impulses (..., 3), N s, world: of the ground on each group of points, and of the air. energy (J)
-    and momentum (..., 3), N s: changes that these and gravity do not explain. relative: the larger
-    of both relative to what was moved; in flights without air, the energy is that about the centre
+    work (J): of torques, damping, the ground on the points, the drives of the legs, loads, the air.
+    impulses (..., 3), N s, world: of the ground on each group of points, of loads, the air. energy
+    (J) and momentum (..., 3), N s: changes that these and gravity do not explain. relative: the
+    larger of both relative to what was moved; in free flights, the energy is that about the centre
     of mass. Where the ends and the net work are small besides the imbalance, what was moved is the
     largest energy of all samples.
     """

@@ -15,7 +15,7 @@ from ..basics.errors import SimulationError, StateError
 from ..model.model import Model
 from ..model.passive import behind_stops, stored_energy
 from ..motion.archive import origin
-from ..motion.given import PRESCRIBED
+from ..motion.given import LOADS, PRESCRIBED
 from ..motion.trajectory import Trajectory
 from .audit import BALANCED, Between, allowance, audited, warnings_of
 from .ground import LANDED_AT, GroundSettings
@@ -114,8 +114,9 @@ class Energies:
         """Return the info of the run, with its audit."""
         samples = self.samples
         info = samples.info | origin(self.model)
-        if (curve := self.ground.given) is not None:
-            info[PRESCRIBED] = curve.as_lists()
+        for name, curve in ((PRESCRIBED, self.ground.given), (LOADS, self.ground.loads)):
+            if curve is not None:
+                info[name] = curve.as_lists()
         if samples.failure is not None:
             return info | {"failure": str(samples.failure) or INTERRUPTED}
         if not samples.ledger.size:  # a part of a run

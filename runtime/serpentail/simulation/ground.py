@@ -52,8 +52,8 @@ class GroundSettings:
     def checked(
         cls, model: Model, start: Start, parameters: RunParameters, settings: dict
     ) -> "GroundSettings":
-        """Take legs, prescribed, load, bristles0 and stop_at out of settings; SimulationError if one is
-        wrong.
+        """Take legs, prescribed, load, bristles0, stop_at out of settings; SimulationError if one
+        is wrong.
         """
         given = curve_of(model, start.many, settings.pop("prescribed", None))
         loads = loads_of(model, settings.pop("load", None))
@@ -72,11 +72,6 @@ class GroundSettings:
         ground = cls(groups, legs, bristles, _stops(groups, choices["stop_at"]), given, loads)
         ground.refuse_deep(model, start, parameters)
         return ground
-
-    @property
-    def schedule(self) -> Legs | Piecewise | None:
-        """How legs, or prescribed joints, move."""
-        return self.legs or self.given
 
     @property
     def points(self) -> int:

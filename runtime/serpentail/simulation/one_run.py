@@ -109,6 +109,5 @@ class RunAgain:
     def runs(self, start: Start, ground: GroundSettings, method: IntegrationMethod) -> RunSet:
         """Return a run to make, with the same controller."""
         model = start.model
-        acting = start, ground.schedule, ground.loads
-        actuations = RunActuations(Records(model), self.controller, *acting)
+        actuations = RunActuations(Records(model), self.controller, start, ground)
         return RunSet(actuations, start, ground, model.parameters_of_runs(None, 1), method)

@@ -54,7 +54,7 @@ def prepared(
         )
     parameters = model.parameters_of_runs(changes, start.runs)
     ground = GroundSettings.checked(model, start, parameters, settings)
-    actuations = RunActuations(Records(model), controller, start, ground.schedule, ground.loads)
+    actuations = RunActuations(Records(model), controller, start, ground)
     choice = choose(actuations, start, parameters, method, settings)
     landing = ground.legs is not None and ground.legs.landing is not None
     if choice.name in SCIPY and (ground.stop_at or landing):

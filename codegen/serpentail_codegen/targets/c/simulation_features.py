@@ -87,5 +87,5 @@ def simulation_features(tail: Tail, names: Collection[str], factors: int) -> Sim
     """
     groups, legs = tuple(tail.groups.items()), "feet" in tail.contacts
     more = tail.given, tail.widths > 0, "rates_vjp" in names, tail.tendons
-    more = (*more, tail.pushes * ("push_rates" in names))
-    return SimulationFeatures("pfl" in names, factors, tail.points, groups, legs, *more)
+    loads = tail.pushes * ("push_rates" in names)
+    return SimulationFeatures("pfl" in names, factors, tail.points, groups, legs, *more, loads)

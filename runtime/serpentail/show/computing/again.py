@@ -65,6 +65,7 @@ def computed_again(model: Model, motion: Trajectory, most: int) -> dict[str, Any
         "it has prescribed joints, whose table pages do not know": model.layout.given > 0,
         "it ends at an event: leave out stop_at": again.ground.stop_at,
         f"it has {rows} samples: a longer output_step gives {most} or fewer": rows > most,
+        "forces from outside act: leave out load": again.ground.loads is not None,
         "its controller is a function: only Damping, torques over time and Pfl are C": any(
             each.user or each.native for each in parts
         ),

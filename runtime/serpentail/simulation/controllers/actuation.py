@@ -1,7 +1,7 @@
 """Controllers and legs of a run, as records of the generated C."""
 
 import ctypes
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,9 +16,10 @@ from .controller import Controller, controllers_of, parts_of, phases_of
 from .ctrl_c import CtrlC
 from .parts import NativeTorque, Parts, TorqueFunction
 from .piecewise import Piecewise
-from .schedules import Legs
 
-Schedule = Legs | Piecewise | None  # of legs, or of prescribed joints
+if TYPE_CHECKING:
+    from ..ground import GroundSettings
+
 ROUNDING = 1e-6  # of a tension's limit, by which those of a solver may go beyond it
 
 
@@ -30,10 +31,9 @@ class Actuation:
         records: Records,
         controller: Controller,
         span: tuple[float, float],
-        legs: Schedule = None,
-        loads: Piecewise | None = None,
+        ground: "GroundSettings",
     ):
-        self.records, self.loads = records, loads
+        self.records, self.loads = records, ground.loads
         self.error: BaseException | None = None
         self.ctrl_c = CtrlC()
         self.nt = self.model.layout.nt
@@ -50,18 +50,16 @@ class Actuation:
         # times at which something is not smooth; steps end there
         stops = {*self._kinks(begins, span)}
         members: dict[str, Any] = {}
-        if isinstance(legs, Piecewise):
-            stops |= {*legs.kinks().tolist()}
-            members["given"] = self._table(legs)
-        elif legs is not None:
+        for name, curve in (("given", ground.given), ("loads", ground.loads)):
+            if curve is not None:
+                stops |= {*curve.kinks().tolist()}
+                members[name] = self._table(curve)
+        if (legs := ground.legs) is not None:
             stops |= {*legs.curve.kinks().tolist()}
             members["legs"] = self._table(legs.curve)
             if legs.landing is not None:
                 members["landing"] = self._table(legs.landing)
                 members["landing_from"] = legs.landing_from
-        if loads is not None:
-            stops |= {*loads.kinks(2).tolist()}
-            members["loads"] = self._table(loads)
         self.stops = records.array(sorted(stops))
         self.record = records.record(
             "drive",
@@ -259,21 +257,20 @@ class RunActuations:
         records: Records,
         controller: object,
         start: Start,
-        legs: Schedule = None,
-        loads: Piecewise | None = None,
+        ground: "GroundSettings",
     ):
-        self.records, self.loads = records, loads
+        self.records, self.ground = records, ground
         self.span = start.start, start.end
         controllers = controllers_of(controller, start.runs if start.many else None)
         one_for_all = len(controllers) == 1 and start.runs > 1
-        if one_for_all and self._of(controllers[0], legs, None).has_state:
+        if one_for_all and self._of(controllers[0], None).has_state:
             controllers = controllers * start.runs
         # of one object that acts in several runs there is one record, unless it has a state
         made: dict[int, Actuation] = {}
         self._each = []
         for k, each in enumerate(controllers):
             if id(each) not in made or made[id(each)].has_state:
-                made[id(each)] = self._of(each, legs, k if len(controllers) > 1 else None)
+                made[id(each)] = self._of(each, k if len(controllers) > 1 else None)
             self._each.append(made[id(each)])
         self.distinct = [*dict.fromkeys(self._each)]
         self.alike = len(self.distinct) == 1
@@ -285,10 +282,10 @@ class RunActuations:
         """The model whose tails are driven."""
         return self.records.model
 
-    def _of(self, controller: Controller, legs: Schedule, k: int | None) -> Actuation:
+    def _of(self, controller: Controller, k: int | None) -> Actuation:
         """Return the actuation of run k, or of all; SimulationError if it is impossible."""
         try:
-            return Actuation(self.records, controller, self.span, legs, self.loads)
+            return Actuation(self.records, controller, self.span, self.ground)
         except SimulationError as error:
             if k is None:
                 raise

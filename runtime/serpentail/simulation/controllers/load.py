@@ -66,6 +66,11 @@ class Load:
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "force", force)
 
+    @property
+    def curve(self) -> Piecewise:
+        """The force (N) between the first time and the last, as a function of time."""
+        return linear(np.asarray(self.times), np.asarray(self.force))
+
 
 def loads_of(model: Model, loads: Any) -> Piecewise | None:
     """Return forces from outside as the table that the C of a model reads, which gets this C if it
@@ -77,7 +82,7 @@ def loads_of(model: Model, loads: Any) -> Piecewise | None:
     if not each:
         return None
     model.need("loads")
-    parts = [(linear(load.times, load.force), _spread(model, load.point)) for load in each]
+    parts = [(load.curve, _spread(model, load.point)) for load in each]
     times = np.unique(np.concatenate([curve.times for curve, _ in parts]))
     times = np.array([times[0] - 1.0, *times, times[-1] + 1.0])
     begins, table = times[:-1], np.zeros((len(times) - 1, len(parts[0][1]), 2))
