@@ -13,7 +13,7 @@ from ..model.names import Names
 from ..model.state import State, named
 from .archive import NAMES
 from .derived import AGAIN
-from .given import tensions_at
+from .given import LOADS, tensions_at
 from .mount import mount_wrenches
 from .resample import inside, states_between
 from .validation import layout_of, real
@@ -29,8 +29,8 @@ class Asked:
     q: Array
     v: Array
     tau: Array
-    info: dict[str, Any]
     contact: Any
+    info: dict[str, Any]
     model: Model | None
 
     @property
@@ -92,11 +92,13 @@ class Asked:
         """Force (K, 3), N, and moment (K, 3), N m, of the tail on the torso, torso axes.
 
         They act at the tail's mount, at every sample, and are computed when asked for. The model
-        needs ``mount_wrench``, and on the ground or with a load ``forward_dynamics_external``.
-        ValueError is raised if the motion has no model.
+        needs ``mount_wrench``, and on the ground ``forward_dynamics_external``. ValueError is
+        raised if the motion has no model, or was simulated with a load.
         """
         if self.model is None:
             raise ValueError("mount_wrench: this motion has no model: use model.mount_wrench")
+        if LOADS in self.info:
+            raise ValueError("mount_wrench: not known under a load: use model.mount_wrench")
         return mount_wrenches(self.model, self)
 
     @property

@@ -1,4 +1,4 @@
-"""What its info says of a motion: prescribed joints, tensions, forces from outside."""
+"""How prescribed joints of a motion move and its tendons pull, which its info says."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -29,11 +29,6 @@ def tensions_at(info: Mapping[str, Any], t: Array) -> Array | None:
         since = t >= (phase["begin"] if phase is not phases[0] else -np.inf)
         found[since] = _at(phase, t[since])[:, 0] if "times" in phase else 0.0
     return found
-
-
-def loads_at(info: Mapping[str, Any], t: Array) -> Array | None:
-    """Return forces from outside at t (s) as push_rates takes them, (K, n); None without."""
-    return _at(info[LOADS], t)[:, 0] if LOADS in info else None
 
 
 def _at(curve: Mapping[str, Any], t: Array) -> Array:

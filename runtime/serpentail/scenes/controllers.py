@@ -13,7 +13,7 @@ from ..simulation.controllers.load import Load
 from ..simulation.controllers.pfl import KD, KP, Pfl
 from ..simulation.controllers.prescribed import Prescribed
 from ..simulation.controllers.schedules import Legs, Reference
-from .simulate_keys import LAWS
+from .simulate_keys import LAWS, LOAD
 
 NODES = ("moves", "times", "blend")  # of a table [simulate.prescribed]: not the names of chains
 
@@ -43,16 +43,13 @@ def prescribed_of(table: Mapping) -> Prescribed:
     return Prescribed(table["times"], angles, table.get("blend", "quintic"))
 
 
-def loads_of(tables: list[Mapping]) -> list[Load]:
-    """Return the forces of tables [[simulate.load]], each at a point or a place in the torso."""
-    loads = []
+def loads_of(tables: list[dict[str, Any]]) -> list[Load]:
+    """Return the forces of tables [[simulate.load]]."""
     for k, table in enumerate(tables):
-        if len({"point", "place"} & table.keys()) != 1 or not {"times", "force"} <= table.keys():
-            needs = "times, force, and point or place"
-            raise refusal(f"simulate.load[{k}]", dict(table), needs, SimulationError)
-        point = table.get("point", table.get("place"))
-        loads.append(Load(point, table["times"], table["force"]))
-    return loads
+        if len(table) < len(LOAD):
+            needs = "point, times and force"
+            raise refusal(f"simulate.load[{k}]", table, needs, SimulationError)
+    return [Load(**table) for table in tables]
 
 
 def reference_of(where: str, model: Model, table: Mapping, parent: Path) -> Reference | Trajectory:

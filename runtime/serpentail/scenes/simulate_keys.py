@@ -54,12 +54,7 @@ def _controllers(more: dict[str, Key]) -> dict[str, Key]:
 
 
 POINT = {"anyOf": [{"const": "torso"}, {"type": "array", "items": {"type": ["string", "integer"]}}]}
-LOAD = {
-    "point": Key(form=POINT),
-    "place": Key("m", depth=1),
-    "times": TIMES,
-    "force": Key("N", depth=2),
-}
+LOAD = {"point": Key(form=POINT), "times": TIMES, "force": Key("N", depth=2)}
 LAWS_OF_ONE = _controllers({})
 SIMULATE = Key(
     keys={
@@ -69,7 +64,7 @@ SIMULATE = Key(
         "start": Key(keys=START),
         "legs": Key(keys=LEGS, needs=("gamma", "delta")),
         "prescribed": Key(form={"type": "object"}),  # its other keys are names of chains
-        "load": Key(each=Key(keys=LOAD, needs=("times", "force"))),
+        "load": Key(each=Key(keys=LOAD, needs=tuple(LOAD))),
         "reference": Key(keys=REFERENCE),
         "controller": Key(kinds=LAWS_OF_ONE, each=Key(kinds=_controllers({"begin": SECONDS}))),
     },

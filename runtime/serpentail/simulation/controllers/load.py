@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...basics.checks import finite_array, one_of, refusal
+from ...basics.checks import finite_array, one_of, refusal, whole_number
 from ...basics.errors import SimulationError
 from ...basics.short_repr import brief
 from ...model.model import Model
@@ -17,7 +17,7 @@ from .piecewise import Piecewise, checked_nodes, linear
 
 ON_TORSO = 12  # channels: the sum of forces, then that of places times forces
 FEET = 6  # points: A, M and T of the right foot, then of the left
-POINTS = '"torso", a place (x, y, z) in the torso, or a pair of a chain or "feet" and a number'
+POINTS = 'a pair of a chain or "feet" and a number, or on a free base "torso" or a place (x, y, z)'
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,11 +66,6 @@ class Load:
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "force", force)
 
-    @property
-    def curve(self) -> Piecewise:
-        """The force (N) between the first time and the last, as a function of time."""
-        return linear(np.asarray(self.times), np.asarray(self.force))
-
 
 def loads_of(model: Model, loads: Any) -> Piecewise | None:
     """Return forces from outside as the table that the C of a model reads, which gets this C if it
@@ -82,11 +77,12 @@ def loads_of(model: Model, loads: Any) -> Piecewise | None:
     if not each:
         return None
     model.need("loads")
-    parts = [(load.curve, _spread(model, load.point)) for load in each]
-    times = np.unique(np.concatenate([curve.times for curve, _ in parts]))
+    curves = [linear(np.asarray(load.times), np.asarray(load.force)) for load in each]
+    spreads = [_spread(model, load.point) for load in each]
+    times = np.unique(np.concatenate([curve.times for curve in curves]))
     times = np.array([times[0] - 1.0, *times, times[-1] + 1.0])
-    begins, table = times[:-1], np.zeros((len(times) - 1, len(parts[0][1]), 2))
-    for curve, spread in parts:
+    begins, table = times[:-1], np.zeros((len(times) - 1, len(spreads[0]), 2))
+    for curve, spread in zip(curves, spreads, strict=True):
         acts = (begins >= curve.times[0]) & (begins < curve.times[-1])
         pieces = np.stack(curve.at(begins)[:2], axis=-1) * acts[:, None, None]
         table += np.einsum("kfp,cf->kcp", pieces, spread)
@@ -95,27 +91,23 @@ def loads_of(model: Model, loads: Any) -> Piecewise | None:
 
 def _spread(model: Model, point: Any) -> np.ndarray:
     """Return how the channels (n, 3) of a model's table follow from a force at a point."""
-    chains = {chain.name: chain.points for chain in model.layout.chains}
-    points, feet = model.layout.chains[-1].points.stop, FEET * ("feet" in model.contacts)
-    chains |= {"feet": slice(points, points + feet)} if feet else {}
-    spread, unit = np.zeros((ON_TORSO + 3 * (points + feet), 3)), np.eye(3)
-    pair = isinstance(point, tuple | list) and len(point) == 2
-    if pair and isinstance(point[0], str):
-        own = range(points + feet)[chains[one_of("Load: point", point[0], chains, SimulationError)]]
-        if not isinstance(point[1], int | np.integer) or not -len(own) <= point[1] < len(own):
-            needs = f"a number from 0 to {len(own) - 1}, or from -1 backward"
-            raise refusal(f"Load: point of {point[0]}", point[1], needs, SimulationError)
-        first = ON_TORSO + 3 * own[point[1]]
+    groups = {c.name: range(c.points.start, c.points.stop) for c in model.layout.chains}
+    points = model.layout.chains[-1].points.stop
+    if "feet" in model.contacts:
+        groups["feet"] = range(points, points + FEET)
+        points += FEET
+    spread, unit = np.zeros((ON_TORSO + 3 * points, 3)), np.eye(3)
+    if isinstance(point, tuple | list) and len(point) == 2:
+        own = groups[one_of("Load: point", point[0], groups, SimulationError)]
+        bounds = {"least": -len(own), "most": len(own) - 1}
+        number = whole_number(f"Load: point of {point[0]}", point[1], SimulationError, **bounds)
+        first = ON_TORSO + 3 * own[number]
         spread[first : first + 3] = unit
         return spread
-    if model.fixed:
-        needs = f"a chain and a number, as the base of {model.name} is fixed"
-        raise refusal("Load: point", point, needs, SimulationError)
-    if isinstance(point, str):
-        one_of("Load: point", point, ("torso",), SimulationError)
-        point = np.zeros(3)
-    if pair or np.shape(point) != (3,):
+    place = np.zeros(3)
+    if not isinstance(point, str) or point != "torso":
+        place = finite_array("Load: point", point, SimulationError, "m")
+    if place.shape != (3,) or model.fixed:
         raise refusal("Load: point", point, POINTS, SimulationError)
-    place = finite_array("Load: point", point, SimulationError, "m")
     spread[:3], spread[3:ON_TORSO] = unit, np.kron(place[:, None], unit)
     return spread
