@@ -3,13 +3,13 @@
 from serpentail_scene.layout import OMEGA, VELOCITY
 
 from ..ir.program import Array, Ref
-from ..mechanics import contact, loads, rotations
+from ..mechanics import contact, loads, rotations, torso
 from .contact import Points, place_feet
 from .derivatives.jacobians import weightless
 from .draft import Draft
 from .factored import factored_dynamics
 from .layout import LOAD, block
-from .scope import State
+from .scope import Torso
 from .sweeps.loads import gather_loads
 
 ON_TORSO = 12  # numbers of the forces on the torso: their sum, and that of places times forces
@@ -25,18 +25,16 @@ def assemble_push_rates(draft: Draft, arrays: dict[str, Array]) -> None:
 
     # the forces as external loads, those on the torso with their moment about B
     f_ext, points = draft.array("f_ext", tail.loads), tail.loads - LOAD
+    moment = block(f_ext, OMEGA)
     draft.copy(block(f_ext, VELOCITY), push.part(0, 3))
-    reads = {"R": R, "places": push.part(3, 9)}
-    draft.step(loads.moment_of_places, reads, moment=block(f_ext, OMEGA))
-    draft.copy(f_ext.part(LOAD, points), push.part(ON_TORSO, points))
-    load = gather_loads(draft, state, R, f_ext, torques)
+    draft.step(loads.moment_of_places, {"R": R, "places": push.part(3, 9)}, moment=moment)
     if tail.leg_numbers:
-        feet = _load_of_feet(draft, state, R, arrays)
-        for name in feet:
-            draft.copy(load[name], feet[name], adds=True)
+        _add_feet(draft, state.torso(R), arrays, f_ext.part(0, LOAD))
+    draft.step(torso.torso_velocity, {"R": R, "p_dot": moment}, u=moment)
+    draft.copy(f_ext.part(LOAD, points), push.part(ON_TORSO, points))
 
-    tau = weightless(draft, lambda k: torques.part(k, 1), **load)
-    factored.solve(tau, arrays["v_dot"])
+    load = gather_loads(draft, state, R, f_ext, torques)
+    factored.solve(weightless(draft, lambda k: torques.part(k, 1), **load), arrays["v_dot"])
     if not tail.fixed:
         reads = {"R": R, "vector": load["load_force"]}
         draft.step(rotations.world_vector, reads, vector=block(force, VELOCITY))
@@ -44,18 +42,16 @@ def assemble_push_rates(draft: Draft, arrays: dict[str, Array]) -> None:
     draft.copy(force.part(tail.torso_nv, tail.nt), torques.whole())
 
 
-def _load_of_feet(draft: Draft, state: State, R: Ref, arrays: dict[str, Array]) -> dict[str, Ref]:
-    """``load_force, load_moment`` at B of forces on the points of massless legs."""
+def _add_feet(draft: Draft, body: Torso, arrays: dict[str, Array], load: Ref) -> None:
+    """Add forces on the points of massless legs, the last of ``push``, to a load at B in world
+    axes.
+    """
     arms, velocities, drifts = (draft.array(f"foot_{n}", 3, 6) for n in ("arm", "motion", "drift"))
-    points, push = Points(arms, velocities, {"feet": 0}, drifts=drifts), arrays["push"]
-    place_feet(draft, state.torso(R), points, arrays["legs"])
-    total = draft.vector("load_of_feet", 6)
-    draft.fill(total, 0)
+    place_feet(draft, body, Points(arms, velocities, {"feet": 0}, drifts=drifts), arrays["legs"])
+    first = arrays["push"].length - arms.length
     with draft.loop("k", 6) as k:
-        reads = {"arm": arms[k], "force": push.part(3 * k + (push.length - 18), 3)}
-        draft.step(contact.load_about_torso, reads, load_=total)
-    reads = {"R": R, "load": total}
-    return dict(draft.store(contact.load_in_torso, reads, load_force=3, load_moment=3))
+        reads = {"arm": arms[k], "force": arrays["push"].part(3 * k + first, 3)}
+        draft.step(contact.load_about_torso, reads, load_=load)
 
 
 ASSEMBLIES = {"push_rates": assemble_push_rates}

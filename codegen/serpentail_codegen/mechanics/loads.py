@@ -24,8 +24,8 @@ def load_at_point(let, R: M33, P: V3, f_point: V3, F_beyond: V6) -> dict:
 
 
 def moment_of_places(let, R: M33, places: M33) -> dict:
-    """Moment about B in torso axes of forces f at places r of the torso, by the sum of r f^T."""
-    turned = places * R  # r (R^T f)^T, whose skew part is r x R^T f
+    """Moment about B in world axes of forces f at places r of the torso, by the sum of r f^T."""
+    turned = R * places  # (R r) f^T, whose skew part is R r x f
     pairs = ((1, 2), (2, 0), (0, 1))
     return {"moment": Matrix([turned[a, b] - turned[b, a] for a, b in pairs])}
 

@@ -1,5 +1,7 @@
 """Controllers and legs of a run, as records of the generated C."""
 
+from __future__ import annotations
+
 import ctypes
 from typing import TYPE_CHECKING, Any
 
@@ -31,7 +33,7 @@ class Actuation:
         records: Records,
         controller: Controller,
         span: tuple[float, float],
-        ground: "GroundSettings",
+        ground: GroundSettings,
     ):
         self.records, self.loads = records, ground.loads
         self.error: BaseException | None = None
@@ -252,13 +254,7 @@ class RunActuations:
     drives: addresses of the C records of the runs' actuations.
     """
 
-    def __init__(
-        self,
-        records: Records,
-        controller: object,
-        start: Start,
-        ground: "GroundSettings",
-    ):
+    def __init__(self, records: Records, controller: object, start: Start, ground: GroundSettings):
         self.records, self.ground = records, ground
         self.span = start.start, start.end
         controllers = controllers_of(controller, start.runs if start.many else None)
