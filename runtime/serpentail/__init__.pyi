@@ -26,6 +26,7 @@ from .simulation.controllers.piecewise import Piecewise as Piecewise
 from .simulation.controllers.schedules import Legs as Legs
 from .simulation.controllers.schedules import Reference as Reference
 from .simulation.controllers.prescribed import Prescribed as Prescribed
+from .simulation.controllers.load import Load as Load
 from .motion.contact import Contact as Contact
 from .motion.trajectory import Trajectory as Trajectory
 from .motion.summary import summary as summary

@@ -17,7 +17,7 @@ from tests.support.forms import SOUND, Foreign
 from ...support.rows import row
 from .conftest import ARGUMENTS, CALLS, SIZES, assert_same, call, shapes, state, states
 
-ELSEWHERE = {"rollout", "implicit", "gradients", *NEEDS}  # tested in files of their own
+ELSEWHERE = {"rollout", "implicit", "gradients", "loads", *NEEDS}  # tested in files of their own
 ONE = "forward_dynamics_external"  # on which every form and every wrong value is tried
 
 
