@@ -9,6 +9,9 @@ from scipy.integrate import solve_ivp
 import serpentail as st
 from serpentail.scenes.simulate import scenario_of
 from serpentail.show.computing.again import computed_again
+from serpentail.simulation.prepare import prepared
+from serpentail.simulation.runs.lanes import fit_lanes
+from serpentail.simulation.start import Start
 from serpentail_scene.purposes import functions_of
 from tests.support import zoo
 from tests.support.rows import row
@@ -65,6 +68,8 @@ def test_a_short_push_gives_its_impulse_by_every_method_and_in_many_runs():
     each = {"t_span": 0.05, "load": [PUSH, PLACE], "output_step": 0.005}
     flights = [st.simulate(model, *start, **each) for start in zip(q, v, strict=True)]
     same(st.simulate(model, q, v, **each), flights)
+    start = Start.checked(model, (q, v), 0.05, None)
+    assert not fit_lanes(prepared(model, start, None, "tsit5", {"load": PUSH}))
 
 
 def test_forces_on_feet_act_where_they_are_and_fixed_bases_have_tails_alone():
@@ -88,7 +93,7 @@ def test_scenes_have_loads():
     found = scenario_of(model, table, Path()).simulate()
     assert (found.q == st.simulate(model, model.state(), t_span=0.1, load=TIP).q).all()
     assert "loads" in functions_of({"simulate": table}) and "loads" not in functions_of({})
-    for wrong in (tip, tip | {"force": [1]}, table["load"][0] | {"point": 3}):
+    for wrong in (tip, tip | {"force": [1]}):
         with row(wrong), pytest.raises(st.SimulationError, match=r"load\[0\]|Load: times"):
             scenario_of(model, table | {"load": [wrong]}, Path())
 
