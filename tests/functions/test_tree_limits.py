@@ -148,8 +148,7 @@ def test_pairs_at_equal_angles_neither_yaw_nor_roll(gecko):
     for model, pairs, tail in ((gecko, ("hind", "fore"), (0.4, 3.0)), (rat, ("hind",), (0, 0))):
         q, v, tau = np.zeros(model.nq), np.zeros(model.nv), np.zeros(model.layout.nt)
         q[3], q[7], v[6] = 1, *tail
-        layout = model.layout
-        legs = [[layout[f"{pair}_{side}"] for side in ("right", "left")] for pair in pairs]
+        legs = [[model.layout[f"{pair}_{side}"] for side in ("right", "left")] for pair in pairs]
         for leg in (each for pair in legs for each in pair):
             for x, own, values in zip((q, v, tau), (leg.q, leg.v, leg.tau), moves, strict=True):
                 x[own] = values[: x[own].size]
@@ -162,8 +161,7 @@ def test_pairs_at_equal_angles_neither_yaw_nor_roll(gecko):
 
 @pytest.mark.parametrize("method", ["tsit5", "dp8", "rk4", "ros34pw2", "implicit_euler"])
 def test_a_flight_keeps_momentum_and_energy(gecko, method):
-    v = 3 * np.random.default_rng(2).normal(size=gecko.nv)
-    q = gecko.state(height=1.0).q
+    q, v = gecko.state(height=1.0).q, 3 * np.random.default_rng(2).normal(size=gecko.nv)
     fixed = {"rk4": {"step": 1e-4}, "implicit_euler": {"step": 2e-6}}
     settings = fixed.get(method, {"rtol": 1e-8})
     motion = st.simulate(gecko, q, v, t_span=0.05, method=method, **settings)
