@@ -1,9 +1,7 @@
 """Controllers and legs of a run, as records of the generated C."""
 
-from __future__ import annotations
-
 import ctypes
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,15 +10,13 @@ from ...basics.errors import SimulationError
 from ...model.chains import refuse_driven
 from ...model.model import Model
 from ...motion.given import TENSIONS
+from ..ground import GroundSettings
 from ..records import CFunction, Records
 from ..start import Start
 from .controller import Controller, controllers_of, parts_of, phases_of
 from .ctrl_c import CtrlC
 from .parts import NativeTorque, Parts, TorqueFunction
 from .piecewise import Piecewise
-
-if TYPE_CHECKING:
-    from ..ground import GroundSettings
 
 ROUNDING = 1e-6  # of a tension's limit, by which those of a solver may go beyond it
 
