@@ -25,9 +25,7 @@ def package(tmp_path):
     return lambda name: shutil.copytree(zoo.folder(name), tmp_path / name)
 
 
-@pytest.mark.parametrize(
-    "name", ["bare", *(pytest.param(n, marks=pytest.mark.slow) for n in ("small", "polar"))]
-)
+@pytest.mark.parametrize("name", ["bare", "small", pytest.param("polar", marks=pytest.mark.slow)])
 def test_library_and_example_are_built_by_make_and_by_the_command_of_the_example(package, name):
     folder = package(name)
     assert run("make", "-s", "all", "example", cwd=folder, env=BARE) == ""

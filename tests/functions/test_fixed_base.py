@@ -56,6 +56,7 @@ def test_nothing_of_the_torso_is_there():
     assert not {"torso_mass", "torso_inertia"} & model.parameters.keys()
     assert set(model.manifest["functions"]) == {*FIXED, *PARTS} - {
         "implicit",
+        "loads",
         "rollout",
         "tendon_lengths",
         "tendon_torques",

@@ -9,7 +9,8 @@ import pytest
 import serpentail as st
 from serpentail.basics.attitude import angle_deg, from_angles, rotation_matrix
 from serpentail.planning.momentum import refuse_impossible
-from serpentail.planning.program.build import plan_program
+from serpentail.planning.problem import checked_goal
+from serpentail.planning.program.build import plan_program, with_room
 from serpentail.planning.result.excess import path_values
 from serpentail.planning.result.full_state import com_at_start, full_state
 from tests.support import zoo
@@ -20,6 +21,15 @@ from tests.support.tumbling import AGAIN, DURATION, integrated, keyed, planned, 
 COARSE = {"tolerance": None, "intervals": 8}
 LEGS = st.Legs.fixed(3.6, -0.3)
 FEET = 6  # points of the feet, which come first
+
+
+def test_attitudes_have_any_norm_and_equal_limits_have_room_between_them():
+    attitude, limits = np.array([0.5, -0.1, 0.7, 0.5]), np.array([[0.5, -np.inf], [0.5, 2.0]])
+    for factor in (1e-200, 0.3, 4.0, 1e200):
+        found = checked_goal(st.Goal(factor * attitude), rat().layout).attitude
+        np.testing.assert_allclose(found, attitude, rtol=1e-15)
+    (least, below), (most, above) = with_room(limits)
+    assert 0.499 < least < 0.5 < most < 0.501 and (below, above) == (-np.inf, 2.0)
 
 
 def test_damping_is_part_of_the_motion():

@@ -8,6 +8,8 @@ import pytest
 
 import serpentail as st
 from serpentail.sequence import optimise
+from serpentail.sequence.search import push_measures
+from serpentail.sequence.sequence import PhaseStart
 from tests.sequence.test_phases import DAMPING, kick, rat, sequence, settled
 from tests.support.rows import row
 
@@ -45,6 +47,15 @@ def test_what_is_found_keeps_its_limits():
     force = told["peak_ground_force_weights"]
     assert force == pytest.approx(max(measures["push"], measures["landing"])) and force <= 22
     assert {doubt.partition(": ")[0] for doubt in found.doubts} <= {*found.report["repeats"]}
+
+
+def test_a_push_is_measured_as_the_sequence_makes_it():
+    pushed = replace(sequence(kick(moves=[CROUCH, PUSH])), model=slippery()).simulate(*settled())
+    measures = push_measures(leap(), PhaseStart(0.0, *settled()), None)
+    told = st.summary(slippery(), pushed.trajectory)
+    spin = np.linalg.norm(told["angular_momentum_at_take_off"])
+    assert measures["push"] == pytest.approx(told["peak_ground_force_weights"], rel=1e-2)
+    assert measures["spin"] == pytest.approx(spin, rel=1e-2)
 
 
 def test_only_a_push_that_is_right_is_asked_for_less_spin(monkeypatch):

@@ -117,8 +117,8 @@ def plan_program(
         * np.array([[controls != TENSION], [1]]),
         bounded=bounded,
         state_limits=limits,
-        constant_limits=_with_room(_constant_limits(problem, variables)),
-        row_limits=_with_room(_path_limits(problem, terms)),
+        constant_limits=with_room(_constant_limits(problem, variables)),
+        row_limits=with_room(_path_limits(problem, terms)),
         fixed=fixed,
     )
     if at_start is not None:
@@ -127,7 +127,7 @@ def plan_program(
             at_start=at_start.node,
             start_equalities=len(at_start.values),
             start_values=at_start.values,
-            start_limits=_with_room(at_start.limits),
+            start_limits=with_room(at_start.limits),
         )
     if at_end is not None:
         optimal = replace(
@@ -262,7 +262,7 @@ def _constant_limits(problem: PlanningProblem, variables: PlanVariables) -> np.n
     return np.concatenate([np.reshape(part, (2, -1)) for part in parts], axis=1)
 
 
-def _with_room(limits: np.ndarray) -> np.ndarray:
+def with_room(limits: np.ndarray) -> np.ndarray:
     """Return limits (2, n) with room between them where they are equal."""
     least, most = limits
     with np.errstate(invalid="ignore"):
