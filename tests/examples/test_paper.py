@@ -96,6 +96,7 @@ def test_ends_are_upright_and_at_rest_within_the_bounds():
             assert np.abs(plan.torques).max() <= 0.02
 
 
+@pytest.mark.slow
 def test_the_optimum_is_that_of_st_plan():
     """Where both find the same; on a fine mesh, and from the paper's flight, to many digits."""
     here = start(rat(), 6)

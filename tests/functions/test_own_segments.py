@@ -52,6 +52,7 @@ def accelerated(H, force):
     return np.linalg.solve(H / np.outer(scale, scale), force / scale) / scale
 
 
+@pytest.mark.slow
 @every_tail
 def test_by_segments_a_model_is_its_set_of_bodies_too(name):
     """The form is the point: v_dot, and how it changes, against forces of 60 digits."""

@@ -29,6 +29,7 @@ NODES = (("input", 0), ("input", 1), ("add", 0, 1))
 ADD = Step("sum", "a + b.", (("a", 1), ("b", 1)), (("c", 1),), NODES, (2,))
 TAILS = {"m1_n3": Tail(1, 3), "m3_n4": Tail(3, 4), "m6_n6": Tail(6, 6)}
 TAILS |= {"arcs3": Tail(3, 4, "continuum")}
+SLOW = pytest.mark.slow
 
 
 @cache
@@ -69,7 +70,7 @@ LESS = {
 }
 
 
-@pytest.mark.parametrize("tail", TAILS)
+@pytest.mark.parametrize("tail", [pytest.param(t, marks=[SLOW] * (t == "m6_n6")) for t in TAILS])
 def test_directions_in_turn_give_the_same_numbers(tail):
     for name in WIDE:
         program = program_of(name, tail)

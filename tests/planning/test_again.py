@@ -55,6 +55,7 @@ def test_planning_again_from_neighbouring_states_derives_nothing(monkeypatch):
     np.testing.assert_allclose(found.trajectory.q[0], q, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_other_problems_and_models_share_no_program():
     """Memoised terms answer for their own problem only: damping, goal and model all matter."""
     few = {"intervals": 4}

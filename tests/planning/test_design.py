@@ -90,6 +90,7 @@ def test_plans_are_true_for_what_they_chose():
     np.testing.assert_allclose(plan.trajectory.angular_momentum - wanted, 0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_no_ordinary_plan_is_better():
     """Plans by compiled C, one for each of several lengths, and of several rates at the start, on
     the same mesh; the vertex of the parabola through three of them is what was chosen.

@@ -61,6 +61,7 @@ def test_an_easier_problem_is_led_back_to_the_wanted_one(monkeypatch):
     assert plan.report["objective"] == pytest.approx(alone.report["objective"], rel=1e-5)
 
 
+@pytest.mark.slow
 def test_a_search_that_finds_nothing_says_which_bound_suffices_and_a_plan_has_it():
     model, begin, weak = rat(), start(rat(), 1), st.Bounds(torque=0.002)
     given = {"start": begin, "duration": DURATION, "bounds": weak, "track": False}
@@ -97,6 +98,7 @@ def test_larger_bounds_are_larger_by_their_factor():
             assert with_bound(free, "duration", factor).duration == (0.3, 0.5 * factor)
 
 
+@pytest.mark.slow
 def test_ipopt_tries_where_fatrop_finds_nothing(monkeypatch):
     model = rat()
     tried = failing(monkeypatch, lambda _, __, solver: solver == "fatrop")

@@ -203,6 +203,7 @@ def test_what_cannot_be_is_refused_in_one_line():
         assert "\n" not in str(caught.value)
 
 
+@pytest.mark.slow
 def test_exports_and_iteration_hold_few_rows(tmp_path):
     pytest.importorskip("pyarrow")
     count = 20_000
