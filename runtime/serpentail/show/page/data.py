@@ -31,7 +31,7 @@ LABELS = {  # of the numbers that the page shows
     "com_rise_m": "rise of the centre of mass",
     "tilt_max_deg": "largest tilt of the back",
     "tilt_end_deg": "tilt at the end",
-    "impulse_N_s": "impulse of the ground, loads and the air",
+    "impulse_N_s": "impulse of ground, loads and air",
     "peak_ground_force_N": "largest force of the ground",
     "peak_ground_force_weights": "largest force of the ground",
     "peak_group_force_N": "largest force",
