@@ -30,7 +30,8 @@ FEW += ["pfl", "rollout", "implicit"]
 LANDING = [*FLYING, "contact_points", "leg_points", "contact_dynamics", "pfl", "implicit"]
 STANDING = ["mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics", "energy"]
 STANDING += ["momentum", "contact_points", "contact_dynamics", "rollout", "implicit"]
-PUSHED = ["forward_dynamics", "forward_dynamics_external", "energy", "momentum", "rollout", "loads"]
+PUSHED = ["mass_matrix", "forward_dynamics", "forward_dynamics_external", "energy", "momentum"]
+PUSHED += ["rollout", "loads"]
 TAPED = [*STANDING, "gradients"]
 TAPED_AIR = ["rollout", "energy", "momentum", "gradients"]
 # what differs from coordinate to coordinate shows an exchange of two of them
@@ -147,7 +148,7 @@ ZOO: dict[str, dict[str, Any]] = {
     ),
     # with forces from outside, which other models get when they are asked for them
     "pushed": _links(1, 3, functions=[*PUSHED, "pfl"]),
-    "pushed_fixed": _links(1, 2, base="fixed", functions=["forward_dynamics", *PUSHED[2:]]),
+    "pushed_fixed": _links(1, 2, base="fixed", functions=[*PUSHED[:2], *PUSHED[3:]]),
     "pushed_limbs": _own("mixed", MIXED[:2], functions=PUSHED, chain=LIMBS),
     "pushed_ground": _links(
         1,
