@@ -17,6 +17,7 @@ TORSO_Q = slice(0, TORSO_NQ)  # in q
 TORSO_V = slice(0, TORSO_NV)  # in v and in generalised forces
 TAIL_Q, TAIL_V = slice(TORSO_NQ, None), slice(TORSO_NV, None)  # tail coordinates, and their rates
 PER_SEGMENT = 2  # coordinates of a segment; of one that is a hinge there is one
+PUSH_ON_TORSO = 12  # numbers of `push`: the sum of the torso's forces, that of places times forces
 # in q, of all segments: alpha, a or phi; and beta, b or theta
 FIRST_Q, SECOND_Q = slice(TORSO_NQ, None, PER_SEGMENT), slice(TORSO_NQ + 1, None, PER_SEGMENT)
 

@@ -180,10 +180,8 @@ def test_flights():
 
 def test_in_air_and_with_motors():
     """By velocities and the wind, of a tail in air; and runs that motors limit have none."""
-    model, start = (
-        zoo.model("taped_air"),
-        zoo.model("taped_air").state(velocity=[1, -2, 1], bend=0.3),
-    )
+    model = zoo.model("taped_air")
+    start = model.state(velocity=[1, -2, 1], bend=0.3)
 
     def fly(e=0.0, wind=0.0):
         own = model.with_parameters(wind=np.add(model.parameters["wind"], [0, wind, 0]))

@@ -1,6 +1,6 @@
 """What forces from outside do to a run: they change v_dot, and work."""
 
-from serpentail_scene.layout import OMEGA, VELOCITY
+from serpentail_scene.layout import OMEGA, PUSH_ON_TORSO, VELOCITY
 
 from ..ir.program import Array, Ref
 from ..mechanics import contact, loads, rotations, torso
@@ -11,8 +11,6 @@ from .factored import factored_dynamics
 from .layout import LOAD, block
 from .scope import Torso
 from .sweeps.loads import gather_loads
-
-ON_TORSO = 12  # numbers of the forces on the torso: their sum, and that of places times forces
 
 
 def assemble_push_rates(draft: Draft, arrays: dict[str, Array]) -> None:
@@ -31,7 +29,7 @@ def assemble_push_rates(draft: Draft, arrays: dict[str, Array]) -> None:
     if tail.leg_numbers:
         _add_feet(draft, state.torso(R), arrays, f_ext.part(0, LOAD))
     draft.step(torso.torso_velocity, {"R": R, "p_dot": moment}, u=moment)
-    draft.copy(f_ext.part(LOAD, points), push.part(ON_TORSO, points))
+    draft.copy(f_ext.part(LOAD, points), push.part(PUSH_ON_TORSO, points))
 
     load = gather_loads(draft, state, R, f_ext, torques)
     factored.solve(weightless(draft, lambda k: torques.part(k, 1), **load), arrays["v_dot"])

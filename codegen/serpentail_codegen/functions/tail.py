@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from math import pi
 
 from serpentail_scene.keys import LIMBS
-from serpentail_scene.layout import PER_SEGMENT, Sizes
+from serpentail_scene.layout import PER_SEGMENT, PUSH_ON_TORSO, Sizes
 from serpentail_scene.parameters import Parameter
 
 from ..ir.program import Array, Index, Ref, padded
@@ -173,8 +173,8 @@ class Tail(Sizes):
 
     @property
     def pushes(self) -> int:
-        """Length of push: 12 numbers of the torso, then a force at each tail and foot point."""
-        return 12 + 3 * self.tail_points + 18 * bool(self.leg_numbers)
+        """Length of push: numbers of the torso, then a force at each tail and foot point."""
+        return PUSH_ON_TORSO + 3 * self.tail_points + 18 * bool(self.leg_numbers)
 
     @property
     def parameter_numbers(self) -> int:

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from serpentail_scene.layout import PUSH_ON_TORSO
+
 from ...basics.checks import finite_array, one_of, refusal, whole_number
 from ...basics.errors import SimulationError
 from ...basics.short_repr import brief
@@ -15,7 +17,6 @@ from ...model.model import Model
 from ...model.state import Quantities
 from .piecewise import Piecewise, checked_nodes, linear
 
-ON_TORSO = 12  # channels: the sum of forces, then that of places times forces
 FEET = 6  # points: A, M and T of the right foot, then of the left
 POINTS = 'a pair of a chain or "feet" and a number, or on a free base "torso" or a place (x, y, z)'
 
@@ -96,12 +97,12 @@ def _spread(model: Model, point: Any) -> np.ndarray:
     if "feet" in model.contacts:
         groups["feet"] = range(points, points + FEET)
         points += FEET
-    spread, unit = np.zeros((ON_TORSO + 3 * points, 3)), np.eye(3)
+    spread, unit = np.zeros((PUSH_ON_TORSO + 3 * points, 3)), np.eye(3)
     if isinstance(point, tuple | list) and len(point) == 2:
         own = groups[one_of("Load: point", point[0], groups, SimulationError)]
         bounds = {"least": -len(own), "most": len(own) - 1}
         number = whole_number(f"Load: point of {point[0]}", point[1], SimulationError, **bounds)
-        first = ON_TORSO + 3 * own[number]
+        first = PUSH_ON_TORSO + 3 * own[number]
         spread[first : first + 3] = unit
         return spread
     place = np.zeros(3)
@@ -109,5 +110,5 @@ def _spread(model: Model, point: Any) -> np.ndarray:
         place = finite_array("Load: point", point, SimulationError, "m")
     if place.shape != (3,) or model.fixed:
         raise refusal("Load: point", point, POINTS, SimulationError)
-    spread[:3], spread[3:ON_TORSO] = unit, np.kron(place[:, None], unit)
+    spread[:3], spread[3:PUSH_ON_TORSO] = unit, np.kron(place[:, None], unit)
     return spread
