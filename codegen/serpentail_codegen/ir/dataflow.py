@@ -188,7 +188,8 @@ def with_arrays(statement: ir.Statement, array: Mapping[str, ir.Array]) -> ir.St
     """Return a statement on other arrays, given by the names of its own."""
 
     def moved(ref: ir.Ref) -> ir.Ref:
-        return replace(ref, array=array[ref.array.name])
+        other = array[ref.array.name]
+        return ref if other is ref.array else replace(ref, array=other)
 
     changes: dict[str, Any] = {}
     for field in fields(statement):

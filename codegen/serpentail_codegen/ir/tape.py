@@ -261,17 +261,19 @@ def exact_quotient(x: Number, y: Number) -> Number:
 def replay(nodes: Iterable[Node], scalars: Sequence, algebra: Algebra) -> list:
     """Evaluate nodes in an algebra, such as numbers or another tape; ``scalars`` are the inputs."""
     values: list = []
-    for op, *args in nodes:
+    value = values.__getitem__
+    for node in nodes:
+        op = node[0]
         if op == "input":
-            values.append(scalars[args[0]])
+            values.append(scalars[node[1]])
         elif op == "const":
-            values.append(algebra.const(args[0]))
+            values.append(algebra.const(node[1]))
         elif op == "unit":
-            values.append(algebra.unit(*args))
+            values.append(algebra.unit(node[1], node[2]))
         elif op == "lane":
-            values.append(algebra.lane(values[args[0]], args[1]))
+            values.append(algebra.lane(values[node[1]], node[2]))
         else:
-            values.append(getattr(algebra, op)(*(values[a] for a in args)))
+            values.append(getattr(algebra, op)(*map(value, node[1:])))
     return values
 
 
