@@ -49,6 +49,8 @@ def compacted(step: Step) -> Step:
         if used.intersection(span):
             new_scalar |= {k: len(new_scalar) + k - span.start for k in span}
             inputs.append((name, len(span)))
+    if len(live) == len(step.nodes) and len(inputs) == len(step.inputs):
+        return step
 
     # nodes: those alive, at their new positions
     new_node = {node: k for k, node in enumerate(live)}

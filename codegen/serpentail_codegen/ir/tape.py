@@ -86,15 +86,15 @@ class Tape:
 
     def value(self, node: int) -> Number | None:
         """Return the constant that a node stands for, or None."""
-        op, *args = self.nodes[node]
-        if op == "neg" and self.nodes[args[0]][0] == "const":
-            return -self.nodes[args[0]][1]
-        return args[0] if op == "const" else None
+        found = self.nodes[node]
+        if found[0] == "neg" and self.nodes[found[1]][0] == "const":
+            return -self.nodes[found[1]][1]
+        return found[1] if found[0] == "const" else None
 
     def _negated(self, node: int) -> int | None:
         """Return what a node is the negation of, or None."""
-        op, *args = self.nodes[node]
-        return args[0] if op == "neg" else None
+        found = self.nodes[node]
+        return found[1] if found[0] == "neg" else None
 
     def _without_signs(self, a: int, b: int) -> tuple[int, int, int]:
         """Return two nodes without their negations, and how many negations were taken off."""
@@ -236,19 +236,20 @@ def lanes_of(node: Node, lanes: Lanes, inputs: Lanes = ()) -> int:
 
     ``inputs`` are the lanes of the inputs; where they are not given, inputs are narrow.
     """
-    op, *args = node
+    op = node[0]
     if op == "input":
-        return inputs[args[0]] if inputs else 0
+        return inputs[node[1]] if inputs else 0
     if op == "unit":
-        return args[1]
+        return node[2]
     if op in ("const", "lane"):
         return 0
 
     # an operation is as wide as its wide operands, which agree
-    widths = {lanes[a] for a in args} - {0}
+    widths = {lanes[a] for a in node[1:]}
+    widths.discard(0)
     if len(widths) > 1:
         raise ValueError(f"{op} joins operands of {sorted(widths)} lanes")
-    return max(widths, default=0)
+    return widths.pop() if widths else 0
 
 
 def exact_quotient(x: Number, y: Number) -> Number:
