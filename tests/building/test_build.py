@@ -92,6 +92,10 @@ def test_what_cannot_be_built_is_refused_by_name(cache, monkeypatch):
     monkeypatch.setattr("serpentail.building.generator.find_spec", lambda name: None)
     with pytest.raises(st.ModelError, match="without the package serpentail_codegen"):
         made(**TINY)
+    killed = ["sh", "-c", "kill -9 $$"]  # as by a system without memory
+    monkeypatch.setattr("serpentail.building.generator.command", lambda: killed)
+    with pytest.raises(st.ModelError, match="status -9"):
+        made(**TINY)
 
 
 def test_wrong_parameters_are_refused_before_anything_is_derived(cache):

@@ -80,7 +80,8 @@ def generate(scene: Path, output: Path, given: Path | None = None) -> Path:
         done = run_all([words], os.environ, lambda: _report(stage, progress))[0]
     folders = [path.parent for path in output.glob("*/manifest.json")]
     if done.returncode or len(folders) != 1:
-        message = (done.stderr or done.stdout).strip()
+        ended = f"the generator ended with status {done.returncode} (below 0: a signal)"
+        message = (done.stderr or done.stdout).strip() or f"{ended}: is there memory for it?"
         for path in (scene, given):
             message = message.replace(f"{path}", scene.name)
         raise ModelError(f"{scene.stem} could not be generated: {message}")
