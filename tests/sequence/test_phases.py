@@ -194,7 +194,7 @@ def check_planned(landed):
     """The plan is for the state at the event, and is tracked; legs move before the landing."""
     flight, motion = landed.phases[1], landed.trajectory
     at = int(np.searchsorted(motion.t, flight.begin))
-    np.testing.assert_allclose(flight.plan.problem.q0, motion.q[at], rtol=3e-16)  # a unit quaternion
+    np.testing.assert_allclose(flight.plan.problem.q0, motion.q[at], rtol=3e-16)  # made a unit
     inside = (motion.t > flight.begin) & (motion.t < flight.end)
     assert flight.plan.success and np.abs(motion.tau[inside]).max() <= 0.02
     ends = flight.begin + flight.plan.duration

@@ -88,19 +88,43 @@ def test_by_parameters_and_damping(of_a_drop):
     np.testing.assert_allclose(of_a_drop.by(lambda x: st.Damping(x[0]), 1e-3), expected, rtol=1e-4)
 
 
+TURNS = {"gamma": 4.1, "delta": -0.45, "duration": 0.011}
+RAMP = [0.004, 0.012, -0.03]
+
+
+def moved(x, shape="linear"):
+    move = dict(zip(TURNS, x, strict=True)) | {"at": "touch_down", "shape": shape}
+    return st.Legs.moves(*HELD, [move])
+
+
+def ramp(x):
+    return st.Legs([0, x[0], x[1]], HELD[0] + np.array([0, 0.05, x[2]]), HELD[1])
+
+
 def test_changes_are_the_transpose_of_gradients():
-    """Through touches, kinks and a landing; the gradients are compared with differences."""
+    """Through touches, kinks, a landing and breaks; the gradients are compared with differences."""
     (q, v), rng = dropped(), np.random.default_rng(3)
-    move = {"gamma": 4.1, "delta": -0.45, "duration": 0.011, "at": "touch_down"}
-    driven = {"legs": st.Legs.moves(*HELD, [move]), "controller": st.TorqueTable([0, 0.02], TAU)}
-    for how in ({}, driven, {"method": "auto", "rtol": 1e-5}):
-        run = landed(q, v, **{"method": "switching", "rtol": 1e-6} | how)
+
+    def torques(x):
+        return st.TorqueTable([0, x[0], x[1]], np.reshape(x[2:8], (3, 2)), damping=x[8:])
+
+    driven = (torques, [0.009, 0.02, 0, 0.01, 0.02, -0.01, 0, 0.005, 1e-3, 2e-3])
+    for method, *made in (
+        ({"method": "switching"},),
+        ({"method": "switching"}, (moved, [*TURNS.values()]), driven),
+        ({"method": "switching"}, (ramp, RAMP), driven),
+        ({"method": "auto", "rtol": 1e-5}, (torques, driven[1])),
+    ):
+        how = {key: f(x) for (f, x), key in zip(made[::-1], ("controller", "legs"), strict=False)}
+        run = landed(q, v, **{"rtol": 1e-6} | method | how)
         weights, change = ([*rng.normal(size=(2, 8)), rng.normal(size=(6, 2))] for _ in range(2))
         own = {name: rng.normal() * rat().parameters[name] for name in ("mu", "K_n", "tail_length")}
-        found, by = run.jvp(*change, own), run.vjp(*weights)
+        given = [(f, x, rng.normal(size=len(x)) * x) for f, x in made]
+        found, by = run.jvp(*change, own, given), run.vjp(*weights)
         ends = zip(weights, (found.q, found.v, found.bristles), strict=True)
         starts = [np.vdot(*pair) for pair in zip(change, (by.q0, by.v0, by.bristles0), strict=True)]
         starts += [by.by(name)[0] * size for name, size in own.items()]
+        starts += [by.by(f, x) @ dx for f, x, dx in given]
         with row(how):
             total = sum(np.vdot(*pair) for pair in ends)
             assert abs(total - sum(starts)) < 1e-10 * np.abs(starts).max() and found.exists
@@ -109,23 +133,15 @@ def test_changes_are_the_transpose_of_gradients():
 def test_by_legs_and_torques():
     """Their numbers, and the times at which they break: there forces jump."""
     q, v = dropped()
-    turns = {"gamma": 4.1, "delta": -0.45, "duration": 0.011}
-
-    def moved(x, shape):
-        move = dict(zip(turns, x, strict=True)) | {"at": "touch_down", "shape": shape}
-        return st.Legs.moves(*HELD, [move])
-
-    def ramp(x):
-        return st.Legs([0, x[0], x[1]], HELD[0] + np.array([0, 0.05, x[2]]), HELD[1])
 
     def torques(x):
         return st.TorqueTable([0, 0.01, x[0]], np.reshape(x[1:], (3, 2)), damping=1e-3)
 
     driven = [0.02, 0.01, 0, 0.02, -0.01, 0, 0.005]
     for key, make, x in (
-        ("legs", ramp, [0.004, 0.012, -0.03]),
-        ("legs", lambda x: moved(x, "accelerate"), [*turns.values()]),
-        ("legs", lambda x: moved(x, "linear"), [*turns.values()]),
+        ("legs", ramp, RAMP),
+        ("legs", lambda x: moved(x, "accelerate"), [*TURNS.values()]),
+        ("legs", lambda x: moved(x, "linear"), [*TURNS.values()]),
         ("controller", torques, driven),
     ):
         with row(key, x):
@@ -233,6 +249,11 @@ def test_refusals():
         run.vjp(v=np.eye(8)[0]).by("mew")
     with pytest.raises(st.SimulationError, match=r"^parameters.mu: value .*1 finite numbers"):
         run.jvp(parameters={"mu": [1.0, 2.0]})
+    with pytest.raises(st.SimulationError, match="schedules: value"):
+        run.jvp(schedules=[(3, [1.0], [1.0])])
+    with pytest.raises(st.SimulationError, match="nothing that the run had"):
+        model = zoo.model("taped_air")
+        st.simulate(model, model.state(), t_span=0.01).jvp(schedules=[(ramp, RAMP, RAMP)])
     with pytest.raises(st.SimulationError, match=r"^loss: value nan"):
         st.gradient(rat(), lambda q, v: np.nan, q, v, 0.01, legs=LEGS)
     with pytest.raises(ValueError, match=r"^vjp: only motions of simulate"):

@@ -1,6 +1,6 @@
 """What a motion is asked for: its states at any time, numbers by name, and its summary."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -156,8 +156,9 @@ class Asked:
         v0: ArrayLike | None = None,
         bristles0: ArrayLike | None = None,
         parameters: Mapping[str, ArrayLike] | None = None,
+        schedules: Iterable[tuple[Callable[[Array], Any], ArrayLike, ArrayLike]] = (),
     ) -> Any:
-        """Return how the end of a run changes with its start and parameters; errors as of ``vjp``.
+        """Return how the end of a run changes with all that it was made of; errors as of ``vjp``.
 
         Parameters
         ----------
@@ -167,13 +168,16 @@ class Asked:
             Change of the friction springs at the start (m); default zeros.
         parameters : mapping, optional
             Changes of named parameters (SI), as by ``Model.with_parameters``.
+        schedules : sequence of (callable, x, dx), optional
+            Functions that make the run's legs or controller of numbers, as for ``Gradient.by``; the
+            numbers of the run (n,), and their changes (n,).
 
         Returns
         -------
         Change
             Change of the end, to first order. It agrees with ``vjp`` to rounding.
         """
-        return self._run("jvp").jvp((q0, v0, bristles0), parameters or {})
+        return self._run("jvp").jvp((q0, v0, bristles0), parameters or {}, schedules)
 
     def _run(self, field: str) -> Any:
         """Return what makes the run again; ValueError if it has no derivatives."""

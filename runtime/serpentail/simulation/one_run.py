@@ -1,12 +1,10 @@
 """Makes one run, and makes it again: less exactly, or with samples at other times."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..basics.errors import SimulationError
 from ..basics.progress import Stage
@@ -102,9 +100,9 @@ class RunAgain:
         """Return a gradient; see ``Trajectory.vjp``."""
         return vjp(self, parts)
 
-    def jvp(self, parts: tuple[Any, Any, Any], parameters: Mapping[str, ArrayLike]) -> Change:
+    def jvp(self, *parts: Any) -> Change:
         """Return a change; see ``Trajectory.jvp``."""
-        return jvp(self, parts, parameters)
+        return jvp(self, *parts)
 
     def runs(self, start: Start, ground: GroundSettings, method: IntegrationMethod) -> RunSet:
         """Return a run to make, with the same controller."""

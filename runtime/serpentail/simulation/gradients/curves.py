@@ -9,7 +9,7 @@ from ..controllers.piecewise import Piecewise
 
 @dataclass(frozen=True, eq=False)
 class CurveGradient:
-    """Gradient by a table: by its times (pieces + 1,) and coefficients, shaped like them."""
+    """Gradient by a table, or its change: times (pieces + 1,) and coefficients, shaped like its."""
 
     times: np.ndarray
     coefficients: np.ndarray
@@ -22,6 +22,35 @@ class CurveGradient:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class _Places:
+    """Where times (n,) lie in a table: piece (n,), whether the table is at rest there, whether that
+    is after its end, and the powers of the time in the piece (n, orders) with two derivatives.
+    """
+
+    piece: np.ndarray
+    held: np.ndarray
+    after: np.ndarray
+    powers: np.ndarray
+    first: np.ndarray
+    second: np.ndarray
+
+
+def _places(curve: Piecewise, at: tuple[np.ndarray, np.ndarray]) -> _Places:
+    """Return where times are; at: times (n,), and the ends of the smooth parts they are in."""
+    times, pieces = curve.times, len(curve.times) - 1
+    t, early = np.minimum(*at), at[0] >= at[1]
+    sides = [np.searchsorted(times, t, side) - 1 for side in ("right", "left")]
+    piece = np.clip(np.where(early, sides[1], sides[0]), 0, pieces - 1)
+    held = np.where(early, (t <= times[0]) | (t > times[-1]), (t < times[0]) | (t >= times[-1]))
+    x = np.clip(t, times[0], times[-1]) - times[piece]
+    orders = np.arange(curve.coefficients.shape[-1])
+    powers = x[:, None] ** orders
+    first = orders * np.pad(powers, [(0, 0), (1, 0)])[:, :-1]
+    second = orders * np.pad(first, [(0, 0), (1, 0)])[:, :-1]
+    return _Places(piece, held, held & (t >= times[-1]), powers, first, second)
+
+
 def curve_gradient(
     curve: Piecewise, at: tuple[np.ndarray, np.ndarray], values: np.ndarray, rates: np.ndarray
 ) -> CurveGradient:
@@ -30,31 +59,36 @@ def curve_gradient(
     at: times (n,), and the ends of the smooth parts that they are in; values, rates (n, channels):
     gradients by values and rates of the table there.
     """
-    times, pieces = curve.times, len(curve.times) - 1
-    t, early = np.minimum(*at), at[0] >= at[1]
-    sides = [np.searchsorted(times, t, side) - 1 for side in ("right", "left")]
-    piece = np.clip(np.where(early, sides[1], sides[0]), 0, pieces - 1)
-    held = np.where(early, (t <= times[0]) | (t > times[-1]), (t < times[0]) | (t >= times[-1]))
-    after = held & (t >= times[-1])
-    x = np.clip(t, times[0], times[-1]) - times[piece]
-
-    # powers of x and their derivatives
-    orders = np.arange(curve.coefficients.shape[-1])
-    powers = x[:, None] ** orders
-    first = orders * np.pad(powers, [(0, 0), (1, 0)])[:, :-1]
-    second = orders * np.pad(first, [(0, 0), (1, 0)])[:, :-1]
-    rates = np.where(held[:, None], 0.0, rates)
+    p = _places(curve, at)
+    rates = np.where(p.held[:, None], 0.0, rates)
     coefficients = np.zeros(curve.coefficients.shape)
-    each = values[:, :, None] * powers[:, None, :] + rates[:, :, None] * first[:, None, :]
-    np.add.at(coefficients, piece, each)
+    each = values[:, :, None] * p.powers[:, None, :] + rates[:, :, None] * p.first[:, None, :]
+    np.add.at(coefficients, p.piece, each)
 
     # x grows if its piece begins earlier, and at the end if that comes later
-    c = curve.coefficients[piece]
-    slope = np.einsum("nc,nck,nk->n", values, c, first) + np.einsum(
-        "nc,nck,nk->n", rates, c, second
-    )
-    slope[held & ~after] = 0
-    by_times = np.zeros(len(times))
-    np.add.at(by_times, piece, -slope)
-    by_times[-1] += slope[after].sum()
+    c = curve.coefficients[p.piece]
+    slope = np.einsum("nc,nck,nk->n", values, c, p.first)
+    slope += np.einsum("nc,nck,nk->n", rates, c, p.second)
+    slope[p.held & ~p.after] = 0
+    by_times = np.zeros(len(curve.times))
+    np.add.at(by_times, p.piece, -slope)
+    by_times[-1] += slope[p.after].sum()
     return CurveGradient(by_times, coefficients)
+
+
+def curve_change(
+    curve: Piecewise, at: tuple[np.ndarray, np.ndarray], change: CurveGradient
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the changes of values and rates (n, channels) of a table for one of its times and
+    coefficients: the transpose of ``curve_gradient``.
+    """
+    p = _places(curve, at)
+    c, moved = curve.coefficients[p.piece], change.coefficients[p.piece]
+    later = np.where(p.after, change.times[-1], 0.0) - change.times[p.piece]
+    later[p.held & ~p.after] = 0
+    values = np.einsum("nck,nk->nc", moved, p.powers)
+    values += np.einsum("nck,nk->nc", c, p.first) * later[:, None]
+    rates = np.einsum("nck,nk->nc", moved, p.first)
+    rates += np.einsum("nck,nk->nc", c, p.second) * later[:, None]
+    rates[p.held] = 0
+    return values, rates

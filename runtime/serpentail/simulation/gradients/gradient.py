@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -13,20 +13,18 @@ from ...basics.checks import one_of, refusal
 from ...basics.errors import SimulationError
 from ...basics.short_repr import brief
 from ...model.model import Model
-from ...model.parameters import flat
+from ...model.parameters import flat as flat_parameters
 from ...model.state_space import in_numbers, in_tangent
 from ..controllers.controller import parts_of
-from ..controllers.schedules import Legs
-from .curves import CurveGradient, curve_gradient
-from .nodes import BREAK, LANDING
-from .tape import Swept, Tape
+from .curves import CurveGradient
+from .tables import STEP, by_numbers, by_tables, changed_by_tables, flat, parts_of_run
+from .tape import Tape
 
 if TYPE_CHECKING:
     from ..one_run import RunAgain
 
 METHODS = ("tsit5", "ros34pw2", "switching")
 USELESS = 1e6  # condition beyond which a gradient says nothing of a change that one could make
-STEP = 1e-5  # relative, of central differences of tables and parameters
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,31 +97,10 @@ class Gradient:
             return self.parameters @ directions(self.model, what)
         if not callable(what) or x is None:
             raise refusal("by", what, "a parameter's name, or a function and x", SimulationError)
-        at = np.atleast_1d(np.asarray(x, float))
-        steps = STEP * np.maximum(np.abs(at), STEP)
-        pairs = ([what(at + sign * row) for sign in (1, -1)] for row in np.diag(steps))
-        ends = zip(pairs, steps, strict=True)
-        return np.array([self._along(*pair) / (2 * step) for pair, step in ends])
-
-    def _along(self, late: Any, early: Any) -> float:
-        """Return the change from one pair of legs, or one controller, to another."""
-        if isinstance(late, Legs):
-            legs = self._change(self.legs, late.curve, early.curve)
-            return legs + self._change(self.landing, late.landing, early.landing)
-        nt = len(self.damping)
-        parts, others = parts_of(late, nt), parts_of(early, nt)
-        none = np.zeros(nt)
-        damping = [none if p.damping is None else p.damping for p in (parts, others)]
-        change = self.damping @ (damping[0] - damping[1])
-        return float(change + self._change(self.torques, parts.torques, others.torques))
-
-    @staticmethod
-    def _change(gradient: CurveGradient | None, late: Any, early: Any) -> float:
-        if late is None or gradient is None:
-            return 0.0
-        if late.coefficients.shape != gradient.coefficients.shape:
-            raise SimulationError("by: the function makes a table that the run did not have")
-        return gradient.along(late, early)
+        own = {name: getattr(self, name) for name in ("damping", "torques", "legs", "landing")}
+        own = {name: part for name, part in own.items() if part is not None}
+        columns = by_numbers(what, x, own)
+        return np.sum([flat(own[name]) @ by for name, by in columns.items()], axis=0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +128,7 @@ def directions(model: Model, name: str) -> np.ndarray:
         for sign in (1, -1):
             moved = (value + sign * row).tolist()
             varied = model._varied({name: moved if len(moved) > 1 else moved[0]})
-            ends.append(np.array(flat(model.manifest, varied.parameters)))
+            ends.append(np.array(flat_parameters(model.manifest, varied.parameters)))
         columns.append((ends[0] - ends[1]) / (2 * step))
     return np.array(columns).T
 
@@ -206,7 +183,7 @@ def vjp(again: RunAgain, parts: tuple[Any, Any, Any]) -> Gradient:
         v0,
         bristles0,
         swept.by_parameters,
-        **_by_tables(again, tape, swept),
+        **by_tables(again, tape, swept),
         exists=not tape.moves.grazes,
         doubts=doubts,
         condition=condition,
@@ -214,9 +191,14 @@ def vjp(again: RunAgain, parts: tuple[Any, Any, Any]) -> Gradient:
 
 
 def jvp(
-    again: RunAgain, parts: tuple[Any, Any, Any], parameters: Mapping[str, ArrayLike]
+    again: RunAgain,
+    parts: tuple[Any, Any, Any],
+    parameters: Mapping[str, ArrayLike],
+    schedules: Iterable[tuple[Callable[[np.ndarray], Any], ArrayLike, ArrayLike]] = (),
 ) -> Change:
-    """Return the change of the end of a run, for one of q0, v0 and bristles, and of parameters."""
+    """Return the change of the end of a run, for one of q0, v0 and bristles, of parameters, and of
+    the numbers that legs or a controller are made of.
+    """
     tape, model = again.tape, again.tape.model
     dq, *others = _parts(again, parts, ("q0", "v0", "bristles0"))
     moved = np.zeros(len(model.parameter_vector))
@@ -224,7 +206,17 @@ def jvp(
         by = directions(model, name)
         moved += by @ _numbers(f"parameters.{name}", value, by.shape[1])
     change = np.concatenate([in_numbers(tape.nodes["states"][0], dq, 0.5), *others])
-    q, v, bristles = _parted(tape, -1, tape.swept("jvp", change, moved).state, 2)
+    tables: dict[str, Any] = {}
+    for each in schedules:
+        if not isinstance(each, tuple) or len(each) != 3 or not callable(each[0]):
+            raise refusal("schedules", each, "(function, x, dx) for each", SimulationError)
+        make, x, dx = each
+        for name, by in by_numbers(make, x, parts_of_run(again)).items():
+            tables[name] = tables.get(name, 0.0) + by @ _numbers("schedules", dx, by.shape[1])
+    rows = None
+    if tables:  # where they are looked up, backward
+        rows = changed_by_tables(again, tape, tape.swept("vjp", 0 * change).rows, tables)
+    q, v, bristles = _parted(tape, -1, tape.swept("jvp", change, moved, rows).state, 2)
     grazes, doubts = tape.moves.grazes, tape.moves.doubts
     return Change(q, v, bristles, not grazes, grazes + doubts)
 
@@ -239,34 +231,3 @@ def _parted(tape: Tape, node: int, state: np.ndarray, factor: float) -> Any:
     """Return the parts of what was swept to a node: by q in its tangent space, v and bristles."""
     dq, v, bristles = np.split(state, np.cumsum([tape.model.nq, tape.model.nv]))
     return in_tangent(tape.nodes["states"][node], dq, factor), v, bristles.reshape(-1, 2)
-
-
-def _by_tables(again: RunAgain, tape: Tape, swept: Swept) -> dict[str, Any]:
-    """Return the gradients by damping, and by the tables of torques, legs and landing."""
-    nt, legs = tape.model.layout.nt, again.ground.legs
-    parts = np.split(swept.rows, np.cumsum([1, 1, nt, nt]), axis=1)
-    (t, until), (rates, by_tau, by_legs) = (part[:, 0] for part in parts[:2]), parts[2:]
-    found: dict[str, Any] = dict.fromkeys(("torques", "legs", "landing"))
-    curves = {"torques": parts_of(again.controller, nt).torques, "legs": legs and legs.curve}
-    if curves["torques"]:
-        found["torques"] = curve_gradient(curves["torques"], (t, until), by_tau, 0 * by_tau)
-    if legs:
-        late, begin = by_legs[:, 8] > 0, tape.landed_at
-        values, slopes = by_legs[:, :4], by_legs[:, 4:8]
-        for name, curve, chosen, since in (
-            ("legs", legs.curve, ~late, 0.0),
-            ("landing", legs.landing, late, begin),
-        ):
-            if curve:
-                at = t[chosen] - since, until[chosen] - since
-                found[name] = curve_gradient(curve, at, values[chosen], slopes[chosen])
-
-    # nodes at breaks move with these; of two tables that break at once, neither can move alone
-    for node in np.flatnonzero(tape.moves.kinds == BREAK):
-        here = {name: curve.times == tape.times[node] for name, curve in curves.items() if curve}
-        alone = sum(at.any() for at in here.values()) == 1
-        for name, at in here.items():
-            found[name].times[at] += swept.by_times[node] if alone else np.nan
-    if found["landing"]:
-        found["landing"].times[1] += swept.by_times[tape.moves.kinds == LANDING].sum()
-    return {"damping": -(rates * by_tau).sum(axis=0)} | found

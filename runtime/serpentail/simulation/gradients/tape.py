@@ -90,9 +90,16 @@ class Tape:
     def _function(self, name: str) -> Callable[..., int]:
         return self.run.function(name, ctypes.c_void_p)
 
-    def swept(self, way: str, state: np.ndarray, parameters: np.ndarray | None = None) -> Swept:
+    def swept(
+        self,
+        way: str,
+        state: np.ndarray,
+        parameters: np.ndarray | None = None,
+        outside: tuple[np.ndarray, np.ndarray] | None = None,
+    ) -> Swept:
         """Carry a gradient by the end (nq + nv + 2 points,) to the start, way "vjp"; or a change of
-        the start and of parameters, as in the struct, to the end, way "jvp".
+        the start, of parameters, as in the struct, and of rows and nodes' times, to the end, way
+        "jvp".
         """
         record, moves, count = self.record, self.moves, len(self.times)
         columns = 2 + 2 * self.model.layout.nt + 9 * bool(self.ground.legs)
@@ -100,12 +107,15 @@ class Tape:
         none = np.zeros(len(self.model.parameter_vector))
         found |= {"by_parameters": none if parameters is None else parameters}
         found |= {"rows": np.zeros((ROWS * count, columns))}
+        record.row, record.largest = 0, 0.0
+        if outside is not None:
+            found["rows"], found["by_times"] = outside
+            record.row = len(outside[0])
         given = {"kinds": moves.kinds}
         if self.ground.points:
             given |= {"ties": moves.ties, "sides": moves.sides, "sunk": moves.sunk}
         for name, array in (found | given).items():
             self._set(name, array)
-        record.row, record.largest = 0, 0.0
         if self.ground.legs:
             record.landed_at, record.by_landing = self.landed_at, 0.0
         if status := self._function(f"rollout_{way}")(self.run.address, ctypes.addressof(record)):
