@@ -70,7 +70,9 @@ LESS = {
 }
 
 
-@pytest.mark.parametrize("tail", [pytest.param(t, marks=[SLOW] * (t == "m6_n6")) for t in TAILS])
+@pytest.mark.parametrize(
+    "tail", [pytest.param(t, marks=[SLOW] * (t in ("arcs3", "m6_n6"))) for t in TAILS]
+)
 def test_directions_in_turn_give_the_same_numbers(tail):
     for name in WIDE:
         program = program_of(name, tail)

@@ -127,6 +127,7 @@ def test_goals_are_met_however_large_an_objective_is():
             assert tilt_deg(end.q[-1, 3:7]) < 1e-5
 
 
+@pytest.mark.slow
 def test_least_time_and_energy_are_found():
     settings = {"objective": "time", "duration": (0.2, 0.5)}
     plan, other = planned(settings), planned(settings, solver="ipopt")

@@ -18,7 +18,7 @@ from tests.support.rows import row
 from .elsewhere import JOBS, MOMENTS, POOLS, TWICE, WAYS, start, starts
 
 LIMIT = 500.0  # s
-QUICK = ("fork", "threads", "at rest", "beside rollouts")
+QUICK = ("fork", "beside rollouts")
 BESIDE = [name for name in MOMENTS if name.startswith("beside")]  # where chance decides
 
 
