@@ -73,8 +73,9 @@ def moves_of(tape: "Tape") -> NodeMoves:
 
 def margins(tape: "Tape", t: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Return the margins (n, points, 3) of states y (n, size) at times t (n,)."""
-    q, v, bristles = np.split(y, np.cumsum([tape.model.nq, tape.model.nv]), axis=1)
-    return tape.model.kernel("margins")(q, v, bristles, *tape.ground.legs_at(t, tape.landed_at))
+    nq, n = tape.model.nq, tape.model.nq + tape.model.nv
+    state = map(np.ascontiguousarray, (y[:, :nq], y[:, nq:n], y[:, n:]))
+    return tape.model.kernel("margins")(*state, *tape.ground.legs_at(t, tape.landed_at))
 
 
 def _grazes(tape: "Tape", at: np.ndarray) -> list[str]:
@@ -106,7 +107,8 @@ def _insert(tape: "Tape", at: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nd
     y = _between(tape, step, new - step)
     y[:, QUATERNION] /= np.linalg.norm(y[:, QUATERNION], axis=1)[:, None]
     t = tape.times[step] + (new - step) * np.diff(tape.times)[step]
-    made = {"times": t[:, None], "untils": tape.nodes["untils"][step], "states": y, "rates": 0 * y}
+    made = {"times": t[:, None], "untils": tape.nodes["untils"][step], "states": y}
+    made |= {"rates": np.nan * y}  # not known
     places = np.concatenate([np.arange(len(tape.times)), new])
     order = np.argsort(places)
     for name, array in tape.nodes.items():
