@@ -204,7 +204,7 @@ class Kernel:
     def _batch(self, count: int, arrays: Arrays, outputs: Arrays) -> None:
         """Evaluate a batch; single states are repeated."""
         whole = [
-            np.ascontiguousarray(np.broadcast_to(a, (count, *shape)))
+            a if a.ndim > len(shape) else np.ascontiguousarray(np.broadcast_to(a, (count, *shape)))
             for a, shape in zip(arrays, self.shapes, strict=True)
         ]
         rows = [a.reshape(count, *shape) for a, shape in zip(outputs, self.out_shapes, strict=True)]

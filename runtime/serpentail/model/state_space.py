@@ -44,7 +44,7 @@ def product_matrix(quaternion: Array) -> Array:
     """Return M (..., 4, 3): the quaternion times (0, omega) is M omega."""
     w, x, y, z = np.moveaxis(quaternion, -1, 0)
     rows = [[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
 
 def in_tangent(q: Array, x: Array, factor: float) -> Array:

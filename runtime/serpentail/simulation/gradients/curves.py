@@ -45,9 +45,9 @@ def _places(curve: Piecewise, at: tuple[np.ndarray, np.ndarray]) -> _Places:
     held = np.where(early, (t <= times[0]) | (t > times[-1]), (t < times[0]) | (t >= times[-1]))
     x = np.clip(t, times[0], times[-1]) - times[piece]
     orders = np.arange(curve.coefficients.shape[-1])
-    powers = x[:, None] ** orders
-    first = orders * np.pad(powers, [(0, 0), (1, 0)])[:, :-1]
-    second = orders * np.pad(first, [(0, 0), (1, 0)])[:, :-1]
+    powers, less = x[:, None] ** orders, np.maximum(orders - [[1], [2]], 0)
+    first = orders * x[:, None] ** less[0]
+    second = orders * (orders - 1) * x[:, None] ** less[1]
     return _Places(piece, held, held & (t >= times[-1]), powers, first, second)
 
 
@@ -61,19 +61,25 @@ def curve_gradient(
     """
     p = _places(curve, at)
     rates = np.where(p.held[:, None], 0.0, rates)
-    coefficients = np.zeros(curve.coefficients.shape)
     each = values[:, :, None] * p.powers[:, None, :] + rates[:, :, None] * p.first[:, None, :]
-    np.add.at(coefficients, p.piece, each)
+    coefficients = _sums(p.piece, each, len(curve.coefficients))
 
     # x grows if its piece begins earlier, and at the end if that comes later
     c = curve.coefficients[p.piece]
     slope = np.einsum("nc,nck,nk->n", values, c, p.first)
     slope += np.einsum("nc,nck,nk->n", rates, c, p.second)
     slope[p.held & ~p.after] = 0
-    by_times = np.zeros(len(curve.times))
-    np.add.at(by_times, p.piece, -slope)
+    by_times = np.append(_sums(p.piece, -slope, len(curve.coefficients)), 0.0)
     by_times[-1] += slope[p.after].sum()
     return CurveGradient(by_times, coefficients)
+
+
+def _sums(piece: np.ndarray, rows: np.ndarray, pieces: int) -> np.ndarray:
+    """Return the sum (pieces, ...) of the rows (n, ...) of each piece."""
+    flat = rows.reshape(len(rows), -1)
+    places = flat.shape[1] * piece[:, None] + np.arange(flat.shape[1])
+    sums = np.bincount(places.ravel(), flat.ravel(), pieces * flat.shape[1])
+    return sums.reshape(pieces, *rows.shape[1:])
 
 
 def curve_change(
