@@ -85,6 +85,7 @@ def test_what_cannot_be_is_refused():
     for given, settings, told in (
         (leap(), {"goal": {"rise": 0.4}, "limits": {"push": 2}}, "limits.push: value 2"),
         (leap(), {"limits": {"landing": 0.5}}, "limits.landing: value 0.5"),
+        (leap(), {"limits": {"torque": 0.1}}, "limits.torque: value 0.1"),
         (leap(), {"goal": {"rise": -1.0}}, "goal.rise: value -1.0"),
         (leap(), {"best": "speed"}, "best: value 'speed'"),
         (sequence(kick()), {}, "leap"),

@@ -187,18 +187,29 @@ class Landing:
     def standing(self) -> bool | None:
         """Whether it ends upright, at rest and on its feet, which are the points of limbs."""
         motion = self.motion
-        feet = [name for name in self.groups if name == "feet" or name in limbs_of(self.model)]
-        if motion.contact is None or not feet:
+        if not _feet(self.model, self.groups):
             return None
-        carried = sum(motion.contact.of(name).forces[-1, :, 2].sum() for name in feet)
         slow = np.linalg.norm(motion.v[-1, VELOCITY]) < MAX_SPEED
-        heavy = carried > MIN_SHARE * weight_of(self.model.parameters)
+        least = MIN_SHARE * weight_of(self.model.parameters)
+        heavy = carried(self.model, motion)[-1] > least
         return bool(upright(motion) > MIN_UPRIGHT and slow and heavy)
 
     def landed(self) -> bool | None:
         """Whether it stands at the end and was never on its back after the landing."""
         least = self.least_upright()
         return None if self.standing is None or least is None else self.standing and least > 0
+
+
+def _feet(model: Model, groups: list[str]) -> list[str]:
+    return [name for name in groups if name == "feet" or name in limbs_of(model)]
+
+
+def carried(model: Model, motion: Trajectory) -> Array:
+    """Return with how much (N) the ground pushes feet and limbs up, in each sample (K,)."""
+    contact = motion.contact
+    assert contact is not None
+    feet = _feet(model, [*contact.groups])
+    return np.asarray(sum(contact.of(name).forces[..., 2].sum(axis=1) for name in feet))
 
 
 def upright(motion: Trajectory) -> float:

@@ -134,7 +134,12 @@ def _height(model: Model, goal: Goal, angles: np.ndarray) -> float:
     q[QUATERNION] = UPRIGHT if named else goal.attitude
     if goal.tail is not None:
         q[TAIL_Q] = np.nan_to_num(goal.tail)
-    legs = (np.array([*angles, *angles, *np.zeros(4)]),) if "feet" in model.contacts else ()
-    points, _ = model.contact_points(q, at_rest, *legs)
+    points = points_of(model, (q, at_rest), angles)
     lowest = points[: model.contacts.get("feet", len(points)), 2].min()
     return float(com_at_start(model, (q, at_rest))[0][2] - lowest)
+
+
+def points_of(model: Model, state: State, angles: np.ndarray) -> np.ndarray:
+    """Return the contact points (P, 3), with the legs of a model with feet at these angles."""
+    legs = (np.array([*angles, *angles, *np.zeros(4)]),) if "feet" in model.contacts else ()
+    return np.asarray(model.contact_points(*state, *legs)[0])

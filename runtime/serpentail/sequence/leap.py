@@ -67,7 +67,7 @@ def measures_of(sequence: Sequence, run: SequenceRun) -> dict[str, Any]:
         "landing": float(weights[-1]),
         "spin": 0.0 if spin is None else float(np.linalg.norm(spin)),
         "tilt": float(tilt(motion).max()),
-        "leg_rate": leg_rate((sequence.gamma, sequence.delta), sequence.phases),
+        "leg_rate": leg_rate(sequence, (sequence.gamma, sequence.delta), sequence.phases, motion),
         "rise": com_rise(model, motion) or 0.0,
         "standing": bool(run.complete and landing.landed()),
         "planned": all(phase.plan is None or phase.plan.success for phase in run.phases),
@@ -97,14 +97,19 @@ def repeats(leap: Leap, start: PhaseStart) -> Iterator[tuple[str, dict[str, Any]
     sequence, run = leap.sequence, leap.run
     model, (push, _, land) = sequence.model, sequence.phases
     held = _tracked(sequence, run)
-    gamma, delta = sequence.last_angles(push, ())
-    lower = replace(sequence, phases=(held, land), gamma=gamma, delta=delta)
+    lower = replace(sequence, phases=(held, land))
+    if sequence.gamma is not None:
+        gamma, delta = sequence.last_angles(push, ())
+        lower = replace(lower, gamma=gamma, delta=delta)
     for drop in LOWER:
         here = state_at(run, run.phases[1].begin)
         here.q[2] += drop
         yield f"ground {1e3 * drop:g} mm lower", _measured(lower, here)
-    masses = [name for name in ("torso_mass", "tail_mass") if name in model.parameters]
-    others = {f"masses times {k:g}": {m: k * model.parameters[m] for m in masses} for k in HEAVIER}
+    names = [parameter["name"] for parameter in model.manifest["parameters"]]
+    masses: dict[str, Any] = {
+        n: np.array(model.parameters[n]) for n in names if n.endswith(("mass", "masses"))
+    }
+    others = {f"masses times {k:g}": {n: k * x for n, x in masses.items()} for k in HEAVIER}
     others |= {f"mu {mu:g}": {"mu": mu} for mu in SLIPPERY}
     for what, changes in others.items():
         other = replace(sequence, model=model.with_parameters(**changes), phases=(push, held, land))

@@ -15,14 +15,16 @@ from serpentail_scene.layout import POSITION
 
 from ..basics.checks import number, refusal
 from ..basics.errors import SimulationError
+from ..model.chains import limbs_of, refuse_given
 from ..model.state import State, parted
 from ..planning.problem import checked_goal
 from ..simulation.controllers.moves import TOUCH_DOWN
 from .leap import Leap, measures_of, missed, repeats, state_at
 from .phase import AIRBORNE, BEFORE, LANDING
 from .run import SequenceRun
-from .search import landing_measures, push_measures, searched, tilt, unknowns_of
+from .search import landing_measures, push_measures, searched, tilt
 from .sequence import PhaseStart, Sequence
+from .unknowns import joints_of, strongest_of, unknowns_of, with_curve
 from .wanted import ENOUGH, Wanted, wanted_of
 
 LIMITS = MappingProxyType({"push": 25.0, "landing": 25.0, "tilt": radians(60)})
@@ -44,24 +46,30 @@ def optimise(
     best: str | None = None,
     time_limit: float = 60.0,
 ) -> Leap:
-    """Find moves of the legs for a jump that is made for its landing.
+    """Find moves or torques of the legs for a jump that is made for its landing.
 
-    The sequence's own moves are the first guess. The angles (within 0.9 rad) and durations (half to
-    twice) of the push and of the landing, and the angles before the landing, are searched for by
-    differential evolution, with a run for each try. The flight is planned as ever. A slow first
-    move, a crouch, turns a push into the cone of friction: on slippery ground it needs one.
+    The sequence's own are the first guess. Legs without mass: the angles (within 0.9 rad) and
+    durations (half to twice) of the push and of the landing, and the angles before the landing.
+    Limbs: the largest torque of each joint, of a pair the same, and the durations between the times
+    of the curves of push and landing. They are searched for by differential evolution, with a run
+    for each try. The flight is planned as ever. A slow first move, a crouch, turns a push into the
+    cone of friction: on slippery ground it needs one.
 
     Parameters
     ----------
     leap : Sequence
         A push (until "airborne"), a planned flight (until "landing"), and a landing with one move
-        at "touch_down"; the last move of the flight stretches the legs, ``before_landing``.
+        at "touch_down"; the last move of the flight stretches the legs, ``before_landing``. Of a
+        model without "feet" but with driven limbs: push and landing have no moves, and as
+        controller a TorqueTable or TorqueCurve without damping of the limbs.
     q0, v0, bristles0
         The start, as of ``Sequence.simulate``.
     limits : mapping
         Largest values: push and landing (force of the ground, body weights), spin (angular
         momentum at the take-off, kg m^2/s), tilt (of the torso from upright at any time, rad),
-        leg_rate (rad/s). Default: 25 body weights each, and 60 degrees.
+        leg_rate (rad/s); torque of limbs in push and landing (N m; a number, or a mapping by names
+        of chains and joints as of ``Bounds``). In flight the plan's own bounds hold. Default: 25
+        body weights each, 60 degrees, and the largest torques of the first guess.
     goal : mapping
         ``rise``: least rise of the centre of mass (m); ``standing``: whether it stands at the end.
     best : {"rise", "softness", "spin"}, optional
@@ -81,7 +89,9 @@ def optimise(
     SimulationError
         An argument is wrong, or the legs are too short: a rise over a stroke s takes at least
         1 + rise / s body weights.
-    PlanningError, StateError, ModelError, ExtraMissing
+    ModelError
+        Joints are prescribed.
+    PlanningError, StateError, ExtraMissing
         As of ``Sequence.simulate``.
 
     Examples
@@ -91,7 +101,8 @@ def optimise(
     """
     begun, wanted = time.monotonic(), wanted_of(limits, goal, best)
     time_limit = number("time_limit", time_limit, SimulationError, unit="s", above=0)
-    _check(leap)
+    leap = _checked(leap)
+    strongest = strongest_of(leap, limits.get("torque"))
     q, v = (np.asarray(part, float) for part in parted(leap.model, q0, v0)[0])
     start = PhaseStart(0.0, q, v, bristles0)
     _refuse_short_legs(leap, start, wanted)
@@ -107,10 +118,11 @@ def optimise(
             before = kept[-1].run
             touch = replace(state_at(before, before.phases[2].begin), bristles=None)
             lands, enough = partial(landing_measures, touch=touch), -np.inf if best else ENOUGH
-            unknowns = [*unknowns_of(leap.phases, 1)[-2:], *unknowns_of(leap.phases, 2)]
+            unknowns = [*unknowns_of(leap, 1, strongest)[-2:], *unknowns_of(leap, 2, strongest)]
             leap = searched(leap, unknowns, lands, wanted, until, enough, turn)
         else:
-            leap = searched(leap, unknowns_of(leap.phases, 0), push, asked, until, seed=turn)
+            unknowns = unknowns_of(leap, 0, strongest)
+            leap = searched(leap, unknowns, push, asked, until, seed=turn)
         run = leap.simulate(q, v, bristles0)
         measures = measures_of(leap, run)
         kept.append(Leap(leap, run, {"measures": measures}, tuple(missed(wanted, measures))))
@@ -151,23 +163,37 @@ def _flies(run: SequenceRun, wanted: Wanted, measures: Mapping[str, Any]) -> boo
     return all(shares.get(name, 0.0) <= 1 for name in (*PUSHED, "tilt"))
 
 
-def _check(leap: Any) -> None:
-    """SimulationError for what is no push, flight and landing."""
-    if not isinstance(leap, Sequence) or len(leap.phases) != 3 or leap.gamma is None:
-        raise refusal("leap", leap, "a Sequence of a model with feet, of 3 phases", SimulationError)
+def _checked(leap: Any) -> Sequence:
+    """Return a leap whose limbs are driven by curves; SimulationError for what is no push, flight
+    and landing.
+    """
+    if not isinstance(leap, Sequence) or len(leap.phases) != 3:
+        raise refusal("leap", leap, "a Sequence of 3 phases", SimulationError)
     push, flight, land = leap.phases
-    last, lands = [{}, *flight.moves][-1], [move.get("at") for move in land.moves]
-    pushes = {move.get("at") for move in push.moves} - {TOUCH_DOWN}
+    if leap.gamma is None:
+        refuse_given(leap.model, "optimise")
+        if not joints_of(leap.model):
+            remedy = 'give it "feet", or limbs with drive = "torque" among its contacts'
+            raise SimulationError(f"leap: {leap.model.name} has no legs that push: {remedy}")
+        push, land = (with_curve(leap.model, phase) for phase in (push, land))
+        leap = replace(leap, phases=(push, flight, land))
+    numbers = [unknowns_of(leap, k, np.ones(leap.model.layout.nt)) for k in range(3)]
+    pushes, lands, stretches = bool(numbers[0]), bool(numbers[2]), True
+    first = last = f"a TorqueTable or TorqueCurve of {', '.join(joints_of(leap.model))}"
+    if leap.gamma is not None:
+        first, last = "moves", f"one move, at {TOUCH_DOWN!r}"
+        pushes = bool({move.get("at") for move in push.moves} - {TOUCH_DOWN})
+        lands = [move.get("at") for move in land.moves] == [TOUCH_DOWN]
+        stretches = {BEFORE, "gamma", "delta"} <= {*[{}, *flight.moves][-1]}
     for phase, is_right, needs in (
-        (push, push.until == AIRBORNE and pushes, f"moves, until = {AIRBORNE!r}"),
+        (push, push.until == AIRBORNE and pushes, f"{first}, until = {AIRBORNE!r}"),
         (flight, flight.plan and flight.until == LANDING, f"a plan, until = {LANDING!r}"),
-        (flight, {BEFORE, "gamma", "delta"} <= {*last}, f"a last move with {BEFORE}"),
-        (land, lands == [TOUCH_DOWN], f"one move, at {TOUCH_DOWN!r}"),
+        (flight, stretches, f"a last move with {BEFORE}"),
+        (land, lands, last),
     ):
         if not is_right:
             raise SimulationError(f"phase {phase.name!r}: needs {needs}: see docs/sequences.md")
-    for k in range(3):
-        unknowns_of(leap.phases, k)
+    return leap
 
 
 def _refuse_short_legs(leap: Sequence, start: PhaseStart, wanted: Wanted) -> None:
@@ -176,13 +202,19 @@ def _refuse_short_legs(leap: Sequence, start: PhaseStart, wanted: Wanted) -> Non
     From its height at the start the torso cannot be pushed farther than the legs reach.
     """
     model, rise = leap.model, wanted.limits.get("rise", 0.0)
-    angles = np.linspace(-pi, pi, GRID)
-    gamma, delta = (each.ravel() for each in np.meshgrid(angles, angles))
-    legs = np.stack([gamma, delta, gamma, delta, *np.zeros((4, gamma.size))], axis=1)
-    q, v = (np.broadcast_to(part, (gamma.size, len(part))) for part in (start.q, start.v))
-    points, _ = model.contact_points(q, v, legs)
-    feet = np.asarray(points)[:, : model.contacts["feet"]] - start.q[POSITION]
-    stroke = float(np.linalg.norm(feet, axis=-1).max() - start.q[2])
+    if leap.gamma is None:
+        p = model.parameters
+        owners = {model.layout[name].owner for name in limbs_of(model)}
+        reach = max(np.linalg.norm(p[f"{o}_mount"]) + p.get(f"{o}_length", np.inf) for o in owners)
+    else:
+        angles = np.linspace(-pi, pi, GRID)
+        gamma, delta = (each.ravel() for each in np.meshgrid(angles, angles))
+        legs = np.stack([gamma, delta, gamma, delta, *np.zeros((4, gamma.size))], axis=1)
+        q, v = (np.broadcast_to(part, (gamma.size, len(part))) for part in (start.q, start.v))
+        points, _ = model.contact_points(q, v, legs)
+        feet = np.asarray(points)[:, : model.contacts["feet"]] - start.q[POSITION]
+        reach = np.linalg.norm(feet, axis=-1).max()
+    stroke = float(reach - start.q[2])
     least = 1 + rise / max(stroke, 1e-9)
     for name in ("push", "landing"):
         if wanted.limits.get(name, np.inf) < least:

@@ -6,9 +6,9 @@ because the force of a landing is full of small optima.
 """
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from scipy.optimize import Bounds, OptimizeResult, differential_evolution
@@ -18,8 +18,11 @@ from serpentail_scene.layout import QUATERNION, TAIL_Q
 from ..basics.attitude import tilt_deg
 from ..basics.errors import SimulationError
 from ..basics.progress import Stage
+from ..model.chains import limbs_of
+from ..model.passive import behind_stops
 from ..model.weight import fall, weight_of
 from ..motion.ground import peaks
+from ..motion.landing import carried
 from ..motion.trajectory import Trajectory
 from ..planning.problem import checked_goal
 from ..planning.result.full_state import com_at_start
@@ -27,60 +30,32 @@ from ..simulation.controllers.pfl import Pfl
 from ..simulation.controllers.piecewise import FASTEST
 from ..simulation.controllers.schedules import Legs, Reference
 from ..simulation.simulate import simulate
-from .flight import landing_time
-from .phase import BEFORE, Phase
-from .sequence import PhaseStart, Sequence
+from .flight import landing_time, points_of
+from .phase import Phase
+from .sequence import PhaseStart, Sequence, clear_of_ground
+from .unknowns import SearchedNumber, curve_of, with_numbers
 from .wanted import Wanted
 
-ANGLE = 0.9  # rad, that an angle may move to each side of the first guess
-LONGER = 2.0  # times, that a duration may become longer or shorter
 PEOPLE, ROUNDS = 8, 25  # tries of a round for each number; most rounds
-AFTER = 0.03  # s that a push is followed after its last move
+AFTER = 0.03  # s that a push is followed after its last move, or the end of its torques
 LANDING = 1.0  # s that a landing is followed
 SWINGS = 0.1  # s in which the tail goes to its goal
 ABOVE = 1e-4  # m, of the feet where a landing begins
 FAILED = 1e3  # cost of a run that fails
 SAMPLES = 100
 AllPhases = list[Phase] | tuple[Phase, ...]
+Moves = Iterable[Mapping[str, Any]]
 Measured = Callable[[Sequence], dict[str, float]]  # of a sequence
 RTOL = 1e-4  # of the searches; the leap itself has the sequence's own
 
 
-class MoveNumber(NamedTuple):
-    """A number of a move: its phase, move and key, and its first guess (rad or s)."""
-
-    phase: int
-    move: int
-    key: str
-    guess: float
-
-
-def unknowns_of(phases: AllPhases, k: int) -> list[MoveNumber]:
-    """Return the angles of all moves of phase k, and durations of moves on the ground.
-
-    SimulationError about moves that have a rate in place of a duration.
+def leg_rate(sequence: Sequence, angles: Any, phases: AllPhases, motion: Trajectory) -> float:
+    """Return the largest rate (rad/s) of the legs: of limbs in a motion, of legs without mass in
+    all moves of phases, from their first angles on.
     """
-    found = []
-    for j, move in enumerate(phases[k].moves):
-        if "rate" in move:
-            field = f"phase {phases[k].name!r}: moves[{j}].rate"
-            remedy = "optimise changes durations: give duration, and limits.leg_rate"
-            raise SimulationError(f"{field}: value {move['rate']}: {remedy}")
-        keys = ("gamma", "delta") if BEFORE in move else ("gamma", "delta", "duration")
-        found += [MoveNumber(k, j, key, float(move[key])) for key in keys if key in move]
-    return found
-
-
-def with_numbers(phases: AllPhases, unknowns: list[MoveNumber], x: np.ndarray) -> tuple[Phase, ...]:
-    """Return phases whose moves have the numbers x."""
-    moves = [[{**move} for move in phase.moves] for phase in phases]
-    for unknown, value in zip(unknowns, x.tolist(), strict=True):
-        moves[unknown.phase][unknown.move][unknown.key] = value
-    return tuple(replace(phase, moves=each) for phase, each in zip(phases, moves, strict=True))
-
-
-def leg_rate(angles: Iterable[float], phases: AllPhases) -> float:
-    """Return the largest rate (rad/s) of the legs in all moves, from their first angles on."""
+    if sequence.gamma is None:
+        own = [sequence.model.layout[name].v for name in limbs_of(sequence.model)]
+        return max(float(np.abs(motion.v[:, each]).max(initial=0)) for each in own)
     (gamma, delta), fastest = angles, 0.0
     for move in (move for phase in phases for move in phase.moves):
         before, gamma, delta = (gamma, delta), move.get("gamma", gamma), move.get("delta", delta)
@@ -91,7 +66,7 @@ def leg_rate(angles: Iterable[float], phases: AllPhases) -> float:
 
 def searched(
     sequence: Sequence,
-    unknowns: list[MoveNumber],
+    unknowns: list[SearchedNumber],
     measured: Measured,
     wanted: Wanted,
     end: float,
@@ -105,7 +80,7 @@ def searched(
     """
 
     def changed(x: np.ndarray) -> Sequence:
-        return replace(sequence, phases=with_numbers(sequence.phases, unknowns, x))
+        return with_numbers(sequence, unknowns, x)
 
     def cost(x: np.ndarray) -> float:
         try:
@@ -117,10 +92,9 @@ def searched(
         stage.tell()
         return intermediate_result.fun <= enough or time.monotonic() > end
 
-    guess = np.array([unknown.guess for unknown in unknowns])
-    timed = [unknown.key == "duration" for unknown in unknowns]
-    least, most = np.where(timed, [guess / LONGER, guess * LONGER], [guess - ANGLE, guess + ANGLE])
-    with Stage("optimise", sequence.phases[unknowns[0].phase].name) as stage:
+    guess, least, most = np.array([(each.guess, each.least, each.most) for each in unknowns]).T
+    guess = guess.clip(least, most)
+    with Stage("optimise", sequence.phases[unknowns[-1].k].name) as stage:
         settings: dict[str, Any] = {"popsize": PEOPLE, "maxiter": ROUNDS, "polish": False}
         settings |= {"x0": guess, "seed": seed, "callback": stop}
         return changed(differential_evolution(cost, Bounds(least, most), **settings).x)
@@ -128,20 +102,22 @@ def searched(
 
 def push_measures(sequence: Sequence, start: PhaseStart, aim: Any) -> dict[str, float]:
     """Return push (body weights), rise (m), spin (kg m^2/s), leg_rate (rad/s) of a push; of the
-    flight after it, whose tail only goes to the plan's goal, tilt (rad), and miss: how far (rad)
-    the torso then is from the attitude aim.
+    flight after it, whose tail and limbs only go to the plan's goal, tilt (rad), and miss: how far
+    (rad) the torso then is from the attitude aim.
     """
     model, (push, flight, _) = sequence.model, sequence.phases
     first = sequence.gamma, sequence.delta
-    end = max(move["at"] + move["duration"] for move in push.moves) + AFTER
-    pushed = _run(sequence, push, start, Legs.moves(*first, push.moves), end)
-    assert pushed.contact is not None
-    if pushed.contact.forces[-1, :, 2].max() > 0:
+    ends = [move["at"] + move["duration"] for move in push.moves] or curve_of(push).times
+    pushed = _run(sequence, push, start, (first, push.moves), float(max(ends)) + AFTER)
+    clear = clear_of_ground(pushed, push.clearance)
+    if clear is None:
         raise SimulationError("push: still on the ground")
 
     # the flight, to the landing
     goal = checked_goal(flight.plan[0].get("goal"), model.layout)
-    q, v = pushed.q[-1], pushed.v[-1]
+    q, v = (x[np.searchsorted(pushed.t, clear)] for x in (pushed.q, pushed.v))
+    if behind := behind_stops(model, q[None, TAIL_Q]):  # no plan begins there
+        raise SimulationError(f"push: {behind}")
     down = fall(model.parameters)
     height, speed = (-(part @ down) for part in com_at_start(model, (q, v)))
     height += com_at_start(model, (start.q, start.v))[0] @ down
@@ -149,7 +125,7 @@ def push_measures(sequence: Sequence, start: PhaseStart, aim: Any) -> dict[str, 
     follows = replace(flight, controller=Pfl(model, Reference([0.0, SWINGS], tails)))
     angles = sequence.last_angles(flight, push.moves)
     end = landing_time(model, (q, v), goal, angles)
-    flown = _run(sequence, follows, PhaseStart(0.0, q, v, None), Legs.fixed(*angles), end)
+    flown = _run(sequence, follows, PhaseStart(0.0, q, v, None), (angles, ()), end)
     tilts, miss = tilt(flown), 0.0
     if isinstance(aim, str):
         miss = float(tilts[-1])
@@ -159,7 +135,7 @@ def push_measures(sequence: Sequence, start: PhaseStart, aim: Any) -> dict[str, 
         "push": float(peaks(pushed)["all"].force / weight_of(model.parameters)),
         "rise": float((height + speed * abs(speed) / (2 * down @ down)) / np.linalg.norm(down)),
         "spin": float(np.linalg.norm(model.momentum(q, v)[1])),
-        "leg_rate": leg_rate(first, (push,)),
+        "leg_rate": leg_rate(sequence, first, (push,), pushed),
         "tilt": float(tilts.max()),
         "miss": miss,
     }
@@ -170,22 +146,17 @@ def landing_measures(sequence: Sequence, touch: PhaseStart) -> dict[str, float]:
     tilt (rad), leg_rate (rad/s); lean (deg) and the share of the weight on the feet at the end.
     """
     model, (push, flight, phase) = sequence.model, sequence.phases
-    gamma, delta = sequence.last_angles(flight, push.moves).tolist()
-    angles = np.array([gamma, delta, gamma, delta, *np.zeros(4)])
-    points, _ = model.contact_points(touch.q, touch.v, angles)
+    angles = sequence.last_angles(flight, push.moves)
     q = touch.q.copy()
-    q[2] += ABOVE - np.asarray(points)[:, 2].min()
-    legs = Legs.moves(gamma, delta, phase.moves)
-    motion = _run(sequence, phase, replace(touch, q=q), legs, LANDING)
-    assert motion.contact is not None
+    q[2] += ABOVE - points_of(model, (q, touch.v), angles)[:, 2].min()
+    motion = _run(sequence, phase, replace(touch, q=q), (angles, phase.moves), LANDING)
     tilts, weight = tilt(motion), weight_of(model.parameters)
-    carried = motion.contact.of("feet").forces[-SAMPLES // 4 :, :, 2].sum(axis=1).mean()
     return {
         "landing": float(peaks(motion)["all"].force / weight),
         "tilt": float(tilts.max()),
-        "leg_rate": leg_rate((gamma, delta), (phase,)),
+        "leg_rate": leg_rate(sequence, angles, (phase,), motion),
         "lean": float(np.degrees(tilts[-1])),
-        "carried": float(carried / weight),
+        "carried": float(carried(model, motion)[-SAMPLES // 4 :].mean() / weight),
     }
 
 
@@ -194,10 +165,15 @@ def tilt(motion: Trajectory) -> np.ndarray:
     return np.radians(tilt_deg(motion.attitude))
 
 
-def _run(sequence: Sequence, phase: Phase, start: PhaseStart, legs: Legs, end: float) -> Trajectory:
-    """Return the motion of a phase from a start at 0, to a time (s)."""
+def _run(
+    sequence: Sequence, phase: Phase, start: PhaseStart, legs: tuple[Any, Moves], end: float
+) -> Trajectory:
+    """Return the motion of a phase from a start at 0, to a time (s); legs: angles, and moves."""
+    (gamma, delta), moves = legs
     settings: dict[str, Any] = {**sequence.settings, "rtol": RTOL, "output_step": end / SAMPLES}
-    settings |= {"controller": phase.controller, "legs": legs, "bristles0": start.bristles}
+    settings |= {"controller": phase.controller, "bristles0": start.bristles}
+    if sequence.gamma is not None:
+        settings["legs"] = Legs.moves(gamma, delta, moves)
     motion = simulate(sequence.model, start.q, start.v, end, **settings)
     assert isinstance(motion, Trajectory)  # of one start
     return motion

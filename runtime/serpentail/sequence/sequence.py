@@ -207,7 +207,7 @@ class Sequence(NearNames):
 
         end = start.time + phase.duration
         if phase.until == AIRBORNE:  # found in samples of a first run
-            clear = _clear(run(end, output_step=phase.duration / SAMPLES), phase.clearance)
+            clear = clear_of_ground(run(end, output_step=phase.duration / SAMPLES), phase.clearance)
             return run(clear or end), AIRBORNE if clear else "duration"
         events = phase.stop_at(self.model)
         motion = run(end, stop_at=events) if events else run(end)
@@ -232,7 +232,7 @@ def _check_phase(model: Model, phase: Phase) -> None:
         raise SimulationError(f"{where}: moves: {model.name} has no legs: leave them out")
 
 
-def _clear(motion: Trajectory, clearance: float) -> float | None:
+def clear_of_ground(motion: Trajectory, clearance: float) -> float | None:
     """Return the first time (s) at which nothing touches and all points are above a height (m)."""
     assert motion.contact is not None
     high = motion.contact.points[..., 2].min(axis=1) > clearance

@@ -10,7 +10,7 @@ from ..basics.errors import SimulationError
 from ..motion.landing import MIN_SHARE, MIN_UPRIGHT
 
 UNITS = {"push": "", "landing": "", "spin": "kg m^2/s", "tilt": "rad", "leg_rate": "rad/s"}
-NAMES = {"limits": (*UNITS,), "goal": ("rise", "standing")}
+NAMES = {"limits": (*UNITS, "torque"), "goal": ("rise", "standing")}
 BEST = ("rise", "softness", "spin")  # what may be made as large, or as small, as it can be
 PAID = 10.0  # weight, in the cost, of a share beyond MARGIN; what is to be best has about 1
 EVEN = 0.1  # of the mean square of all shares, if nothing is to be best
@@ -69,7 +69,7 @@ def wanted_of(limits: Any, goal: Any, best: Any) -> Wanted:
             raise refusal(where, given, "a mapping, such as {'push': 25}", SimulationError)
         for name, value in given.items():
             one_of(f"{where}: name", name, NAMES[where], SimulationError)
-            if name == "standing" or (name == "rise" and value is None):
+            if name in ("standing", "torque") or (name == "rise" and value is None):
                 continue
             least = {"least": 1.0} if name in ("push", "landing") else {"above": 0.0}
             unit = UNITS.get(name, "m")
