@@ -3,7 +3,7 @@
 righting        righting in the air from many random starts, as the paper plans and as we do
 contact         motions on the ground (Sects. 4, 4.4): films, plots and a table
 landing         kicks that the tail rights onto the feet, planned and passive
-leaps           jumps that are made for a soft landing: 20 bodies, 30 tails
+leaps           jumps that are made for a soft landing: 20 bodies, 30 tails, 10 with legs of mass
 ground          friction and stiffness of the ground from one landing: 60 landings
 morphology      plans of righting for tails of many shapes, from many tumbles: 20400
 replanning      bodies unlike the planned one: the plan's torques, PFL, predictive control

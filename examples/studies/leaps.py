@@ -20,7 +20,8 @@ LENGTHS, MASSES = np.linspace(0.1, 0.25, 5), np.linspace(2e-3, 10e-3, 6)  # m, k
 TAIL = {"tail": "articulated", "segments": 1, "links": 3}
 LIMITS = {"push": 25.0, "landing": 25.0, "tilt": radians(60), "spin": 4e-4}
 # N m, of the scene rat_kick: half of a jerboa's; the signs stretch the legs
-TORQUES = {"hind_hip": -0.0712, "hind_knee": 0.0693, "hind_ankle": -0.0621}
+STRETCHING = [0, 0, *[-0.0712, 0.0693, -0.0621] * 2]
+TORQUES = {"hind_hip": 0.0712, "hind_knee": 0.0693, "hind_ankle": 0.0621}
 BONES = ("hind_link_lengths", "hind_link_centers")
 CROUCHED = [0, 0, *np.radians([50, -105, 137, 50, -105, 137])]  # rad, the stops of rat_kick
 TIME = 1200.0  # s, for a machine with other work: the CPU time is counted
@@ -60,16 +61,13 @@ def limbed_leap(model: st.Model) -> st.Sequence:
     """Return the first guess of a jump by torques: half of the largest ones push, and half of them
     let the legs yield to the crouch.
     """
-
-    def law(times: list, shares: list) -> st.TorqueTable:
-        return st.TorqueTable(times, np.outer(shares, [0, 0, *TORQUES.values(), *TORQUES.values()]))
-
-    most = {"tail": 0.02} | {name: abs(value) for name, value in TORQUES.items()}
-    bounds = st.Bounds(angle={"tail": pi / 3, "beta_1": 1e-3, "hind": 2.5}, torque=most)
+    angles = {"tail": pi / 3, "beta_1": 1e-3, "hind": 2.5}
+    bounds = st.Bounds(angle=angles, torque={"tail": 0.02} | TORQUES)
     ends = {"tail": [radians(-20), 0.0], "hind": np.radians([20, -45, 55])}
     goal = st.Goal(torso_rate=None, chains=ends, chain_rates={"tail": 0.0, "hind": 0.0})
     plan = {"goal": goal, "bounds": bounds, "solver": st.Solver(track=False, time_limit=20.0)}
-    push, land = law([0, 0.02, 0.04, 0.05], [0, 0.5, 0.5, 0]), law([0, 0.03, 0.05], [0.5, 0.5, 0])
+    push = st.TorqueTable([0, 0.02, 0.04, 0.05], np.outer([0, 0.5, 0.5, 0], STRETCHING))
+    land = st.TorqueTable([0, 0.03, 0.05], np.outer([0.5, 0.5, 0], STRETCHING))
     phases = [
         st.Phase("push", 0.3, "airborne", 0.003, push),
         st.Phase("flight", 1.0, until="landing", plan=plan),
@@ -108,9 +106,8 @@ def legs(number: int) -> dict:
         changes[name] = (own * random.uniform(1 - SPREAD, 1 + SPREAD, own.shape)).tolist()
     model = model.with_parameters(**changes, mu=random.uniform(0.6, 1.0))
     start = st.settle(model, model.state(height=0.035, bend=CROUCHED), duration=0.5)
-    most = {name: abs(value) for name, value in TORQUES.items()}
-    rise = random.uniform(*LOWER)
-    return found(limbed_leap(model), start, rise, LIMITS | {"torque": most})
+    limits = LIMITS | {"torque": TORQUES}
+    return found(limbed_leap(model), start, random.uniform(*LOWER), limits)
 
 
 def tail(length: float, mass: float) -> dict:

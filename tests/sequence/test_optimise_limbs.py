@@ -9,7 +9,7 @@ import pytest
 
 import serpentail as st
 from serpentail.sequence import search
-from serpentail.sequence.unknowns import strongest_of, unknowns_of, with_numbers
+from serpentail.sequence.unknowns import strongest_of, unknowns_of, with_curve, with_numbers
 from serpentail.sequence.wanted import wanted_of
 from tests.support.rows import row
 
@@ -37,14 +37,12 @@ def leap(model, **changes):
 
 
 def as_curves(sequence):
-    push, flight, land = sequence.phases
-    laws = [st.TorqueCurve(each.controller.parts(8).torques) for each in (push, land)]
-    phases = [replace(push, controller=laws[0]), flight, replace(land, controller=laws[1])]
-    return replace(sequence, phases=phases)
+    return replace(sequence, phases=[with_curve(sequence.model, p) for p in sequence.phases])
 
 
 @pytest.mark.slow  # it makes its model, and searches
-def test_limbs_jump_and_land_within_their_torque():
+def test_limbs_jump_and_land_within_their_torque(monkeypatch):
+    monkeypatch.setattr(search, "ROUNDS", 12)
     rat = st.build("rat_kick", purpose=["plan"])
     start = st.settle(rat, rat.state(height=0.035, bend=CROUCH), duration=0.5)
     limits = {"push": 20, "landing": 22, "tilt": "60 deg", "spin": 4e-4, "torque": BOUND}
@@ -56,7 +54,7 @@ def test_limbs_jump_and_land_within_their_torque():
     assert np.linalg.norm(told["angular_momentum_at_take_off"]) <= 4e-4
     hip, knee, ankle = np.abs(motion.tau[:, 2:5]).max(axis=0)
     assert max(hip, ankle) <= 0.06 * (1 + 1e-9) and knee <= 0.065 * (1 + 1e-9)
-    np.testing.assert_allclose(motion.q[:, 9:12], motion.q[:, 12:15], atol=1e-4)
+    np.testing.assert_allclose(motion.q[:, 9:12], motion.q[:, 12:15], atol=2e-3)
     rates = np.abs(motion.v[:, 8:]).max()
     assert found.report["measures"]["leg_rate"] == pytest.approx(rates, rel=1e-6)
     assert {"masses times 1.1", "mu 0.5"} <= {*found.report["repeats"]}
