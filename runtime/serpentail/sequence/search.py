@@ -109,13 +109,17 @@ def push_measures(sequence: Sequence, start: PhaseStart, aim: Any) -> dict[str, 
     first = sequence.gamma, sequence.delta
     ends = [move["at"] + move["duration"] for move in push.moves] or curve_of(push).times
     pushed = _run(sequence, push, start, (first, push.moves), float(max(ends)) + AFTER)
-    clear = clear_of_ground(pushed, push.clearance)
-    if clear is None:
+    assert pushed.contact is not None
+    at = -1
+    if sequence.gamma is None:  # whose torques act until it is clear
+        clear = clear_of_ground(pushed, push.clearance)
+        at = 0 if clear is None else int(np.searchsorted(pushed.t, clear))
+    if at == 0 or pushed.contact.forces[at, :, 2].max() > 0:
         raise SimulationError("push: still on the ground")
 
     # the flight, to the landing
     goal = checked_goal(flight.plan[0].get("goal"), model.layout)
-    q, v = (x[np.searchsorted(pushed.t, clear)] for x in (pushed.q, pushed.v))
+    q, v = pushed.q[at], pushed.v[at]
     if behind := behind_stops(model, q[None, TAIL_Q]):  # no plan begins there
         raise SimulationError(f"push: {behind}")
     down = fall(model.parameters)
