@@ -186,12 +186,11 @@ class Landing:
     @cached_property
     def standing(self) -> bool | None:
         """Whether it ends upright, at rest and on its feet, which are the points of limbs."""
-        motion = self.motion
-        if not _feet(self.model, self.groups):
+        motion, forces = self.motion, carried(self.model, self.motion)
+        if forces is None:
             return None
         slow = np.linalg.norm(motion.v[-1, VELOCITY]) < MAX_SPEED
-        least = MIN_SHARE * weight_of(self.model.parameters)
-        heavy = carried(self.model, motion)[-1] > least
+        heavy = forces[-1] > MIN_SHARE * weight_of(self.model.parameters)
         return bool(upright(motion) > MIN_UPRIGHT and slow and heavy)
 
     def landed(self) -> bool | None:
@@ -200,15 +199,13 @@ class Landing:
         return None if self.standing is None or least is None else self.standing and least > 0
 
 
-def _feet(model: Model, groups: list[str]) -> list[str]:
-    return [name for name in groups if name == "feet" or name in limbs_of(model)]
-
-
-def carried(model: Model, motion: Trajectory) -> Array:
-    """Return with how much (N) the ground pushes feet and limbs up, in each sample (K,)."""
-    contact = motion.contact
-    assert contact is not None
-    feet = _feet(model, [*contact.groups])
+def carried(model: Model, motion: Trajectory) -> Array | None:
+    """Return with how much (N) the ground pushes feet and limbs up, in each sample (K,); None
+    without such points.
+    """
+    contact, own = motion.contact, {"feet", *limbs_of(model)}
+    if contact is None or not (feet := [name for name in contact.groups if name in own]):
+        return None
     return np.asarray(sum(contact.of(name).forces[..., 2].sum(axis=1) for name in feet))
 
 

@@ -154,13 +154,14 @@ def landing_measures(sequence: Sequence, touch: PhaseStart) -> dict[str, float]:
     q = touch.q.copy()
     q[2] += ABOVE - points_of(model, (q, touch.v), angles)[:, 2].min()
     motion = _run(sequence, phase, replace(touch, q=q), (angles, phase.moves), LANDING)
-    tilts, weight = tilt(motion), weight_of(model.parameters)
+    tilts, weight, forces = tilt(motion), weight_of(model.parameters), carried(model, motion)
+    assert forces is not None
     return {
         "landing": float(peaks(motion)["all"].force / weight),
         "tilt": float(tilts.max()),
         "leg_rate": leg_rate(sequence, angles, (phase,), motion),
         "lean": float(np.degrees(tilts[-1])),
-        "carried": float(carried(model, motion)[-SAMPLES // 4 :].mean() / weight),
+        "carried": float(forces[-SAMPLES // 4 :].mean() / weight),
     }
 
 

@@ -55,10 +55,8 @@ def unknowns_of(leap: Sequence, k: int, strongest: np.ndarray) -> list[SearchedN
         if level := _largest(curve, own):
             most = float(strongest[own].min())
             found.append(SearchedNumber(k, level, WEAKEST * most, most, partial(_with_level, own)))
-    for j, width in enumerate(np.diff(curve.times).tolist() if found else ()):
-        found.append(
-            SearchedNumber(k, width, width / LONGER, width * LONGER, partial(_with_width, j))
-        )
+    for j, x in enumerate(np.diff(curve.times).tolist() if found else ()):
+        found.append(SearchedNumber(k, x, x / LONGER, x * LONGER, partial(_with_width, j)))
     return found
 
 
@@ -128,12 +126,11 @@ def _of_moves(phase: Phase, k: int) -> list[SearchedNumber]:
             field = f"phase {phase.name!r}: moves[{j}].rate"
             remedy = "optimise changes durations: give duration, and limits.leg_rate"
             raise SimulationError(f"{field}: value {move['rate']}: {remedy}")
-        for key in [key for key in ("gamma", "delta") if key in move]:
-            x, put = float(move[key]), partial(_with_move, j, key)
-            found.append(SearchedNumber(k, x, x - ANGLE, x + ANGLE, put))
-        if "duration" in move and BEFORE not in move:
-            x, put = float(move["duration"]), partial(_with_move, j, "duration")
-            found.append(SearchedNumber(k, x, x / LONGER, x * LONGER, put))
+        keys = ("gamma", "delta") if BEFORE in move else ("gamma", "delta", "duration")
+        for key in [key for key in keys if key in move]:
+            x = float(move[key])
+            ends = (x / LONGER, x * LONGER) if key == "duration" else (x - ANGLE, x + ANGLE)
+            found.append(SearchedNumber(k, x, *ends, partial(_with_move, j, key)))
     return found
 
 
