@@ -7,6 +7,7 @@ colours (Pillow's MAXCOVERAGE): the film strip is that of `make demo`, the jump 
 contact, the page a screenshot of it at 0.405 s, 1100 x 640.
 """
 
+import logging
 import os
 import sys
 from importlib.metadata import version as installed
@@ -14,6 +15,8 @@ from pathlib import Path
 
 # The examples of the gallery run in this process: their figures need no screen.
 os.environ.setdefault("MPLBACKEND", "agg")
+# A warning ends a build; how long a plan took is none.
+logging.getLogger("serpentail").setLevel(logging.WARNING)
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 
