@@ -9,7 +9,7 @@ from tests.support.rows import row
 
 HELD = np.radians([230.0, -20.0])  # of the legs
 LEGS = st.Legs.fixed(*HELD)
-SPAN, DAMPED, TAU = 0.03, st.Damping(1e-3), [[0.0, 0.01], [0.02, -0.01]]
+SPAN, DAMPED = 0.03, st.Damping(1e-3)
 EXACT = {"method": "tsit5", "rtol": 1e-12, "output_step": SPAN}
 
 

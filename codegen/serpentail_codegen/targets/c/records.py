@@ -181,9 +181,10 @@ TAPE = fields("""
     real *state: [STATE] gradient by the end, then by the start; or change of the start, then of
         the end
     real *by_parameters: [PARAMETERS] gradient by the parameters, or their change
-    real *by_times: [room] gradients by the times of nodes
+    real *by_times: [room] gradients by the times of nodes, or their changes
     long row: rows so far
-    real *rows: [7 room][ROW] t, until, tail rates; gradients by torques and legs there
+    real *rows: [7 room][ROW] t, until, tail rates; gradients by torques and legs there, or
+        their changes
     long step: number of the step that is computed again
     real largest: largest gradient by q and v at a node
 """)

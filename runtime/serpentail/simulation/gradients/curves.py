@@ -14,13 +14,6 @@ class CurveGradient:
     times: np.ndarray
     coefficients: np.ndarray
 
-    def along(self, late: Piecewise, early: Piecewise) -> float:
-        """Return the change from one table to another."""
-        by_times = self.times @ (late.times - early.times)
-        return float(
-            by_times + (self.coefficients * (late.coefficients - early.coefficients)).sum()
-        )
-
 
 @dataclass(frozen=True, eq=False)
 class _Places:

@@ -13,11 +13,11 @@ from ...basics.checks import one_of, refusal
 from ...basics.errors import SimulationError
 from ...basics.short_repr import brief
 from ...model.model import Model
-from ...model.parameters import flat as flat_parameters
+from ...model.parameters import flat
 from ...model.state_space import in_numbers, in_tangent
 from ..controllers.controller import parts_of
 from .curves import CurveGradient
-from .tables import STEP, by_numbers, by_tables, changed_by_tables, flat, parts_of_run
+from .tables import STEP, by_numbers, by_tables, changed_by_tables, numbers_of, parts_of_run
 from .tape import Tape
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ class Gradient:
         own = {name: getattr(self, name) for name in ("damping", "torques", "legs", "landing")}
         own = {name: part for name, part in own.items() if part is not None}
         columns = by_numbers(what, x, own)
-        return np.sum([flat(own[name]) @ by for name, by in columns.items()], axis=0)
+        return np.sum([numbers_of(own[name]) @ by for name, by in columns.items()], axis=0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +128,7 @@ def directions(model: Model, name: str) -> np.ndarray:
         for sign in (1, -1):
             moved = (value + sign * row).tolist()
             varied = model._varied({name: moved if len(moved) > 1 else moved[0]})
-            ends.append(np.array(flat_parameters(model.manifest, varied.parameters)))
+            ends.append(np.array(flat(model.manifest, varied.parameters)))
         columns.append((ends[0] - ends[1]) / (2 * step))
     return np.array(columns).T
 

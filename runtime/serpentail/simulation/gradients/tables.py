@@ -36,11 +36,16 @@ def parts_made(made: Any, nt: int) -> Tables:
     return {name: part for name, part in found.items() if part is not None}
 
 
-def flat(part: Any) -> np.ndarray:
+def numbers_of(part: Any) -> np.ndarray:
     """Return the numbers of damping, or the times and coefficients of a table."""
     if isinstance(part, np.ndarray):
         return part
     return np.concatenate([part.times, part.coefficients.ravel()])
+
+
+def _shape(part: Any) -> tuple[int, ...]:
+    """Return the shape of damping, or of a table's coefficients."""
+    return np.shape(getattr(part, "coefficients", part))
 
 
 def by_numbers(make: Callable[[np.ndarray], Any], x: ArrayLike, own: Tables) -> Tables:
@@ -51,10 +56,10 @@ def by_numbers(make: Callable[[np.ndarray], Any], x: ArrayLike, own: Tables) -> 
     steps = STEP * np.maximum(np.abs(at), STEP)
     for row, step in zip(np.diag(steps), steps, strict=True):
         ends = [parts_made(make(at + sign * row), len(own["damping"])) for sign in (1, -1)]
-        late, early = ({name: flat(part) for name, part in end.items()} for end in ends)
-        for name in own.keys() & late:
-            if not len(late[name]) == len(early[name]) == len(flat(own[name])):
+        for name in own.keys() & ends[0]:
+            if len({_shape(parts.get(name)) for parts in (*ends, own)}) > 1:
                 raise SimulationError("by: the function makes a table that the run did not have")
+        late, early = ({name: numbers_of(part) for name, part in end.items()} for end in ends)
         columns.append({n: (late[n] - early[n]) / (2 * step) for n in own.keys() & late})
     if not columns or not columns[0]:
         raise SimulationError("by: the function makes nothing that the run had: legs or controller")
@@ -86,11 +91,7 @@ def _breaks(tape: Tape, own: Tables) -> Iterator[tuple[int, Tables, bool]]:
 def by_tables(again: RunAgain, tape: Tape, swept: Swept) -> Tables:
     """Return the gradients by damping, and by the tables of torques, legs and landing."""
     nt, own, rows = tape.model.layout.nt, parts_of_run(again), swept.rows
-    rates, by_tau, by_legs = (
-        rows[:, 2 : 2 + nt],
-        rows[:, 2 + nt : 2 + 2 * nt],
-        rows[:, 2 + 2 * nt :],
-    )
+    _, rates, by_tau, by_legs = np.split(rows, [2, 2 + nt, 2 + 2 * nt], axis=1)
     found: Tables = dict.fromkeys(("torques", "legs", "landing"))
     for name, (chosen, at) in _acting(tape, own, rows).items():
         by = by_tau if name == "torques" else by_legs[chosen, :4]
@@ -109,22 +110,23 @@ def by_tables(again: RunAgain, tape: Tape, swept: Swept) -> Tables:
 def changed_by_tables(
     again: RunAgain, tape: Tape, rows: np.ndarray, change: Tables
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return how rows and the times of nodes change for changes of damping and tables (flat, by
-    name): the transpose of ``by_tables``.
+    """Return how rows and the times of nodes change for changes of the numbers of damping and
+    tables, by name: the transpose of ``by_tables``.
     """
     nt, own = tape.model.layout.nt, parts_of_run(again)
-    found, moved = 0 * rows, np.zeros(len(tape.times))
-    found[:, 2 + nt : 2 + 2 * nt] = -rows[:, 2 : 2 + nt] * change.get("damping", 0.0)
+    found, moved, acting = 0 * rows, np.zeros(len(tape.times)), _acting(tape, own, rows)
+    _, _, tau, legs = np.split(found, [2, 2 + nt, 2 + 2 * nt], axis=1)  # parts of it
+    tau[:] = -rows[:, 2 : 2 + nt] * change.get("damping", 0.0)
     curves = {}
     for name in change.keys() - {"damping"}:
         times, coefficients = np.split(change[name], [len(own[name].times)])
         curves[name] = CurveGradient(times, coefficients.reshape(own[name].coefficients.shape))
-        chosen, at = _acting(tape, own, rows)[name]
+        chosen, at = acting[name]
         values, slopes = curve_change(own[name], at, curves[name])
         if name == "torques":
-            found[:, 2 + nt : 2 + 2 * nt] += values
+            tau += values
         else:
-            found[chosen, 2 + 2 * nt : 10 + 2 * nt] += np.hstack([values, slopes])
+            legs[chosen, :8] += np.hstack([values, slopes])
     for node, here, alone in _breaks(tape, own):
         shifts = [curves[name].times[at].sum() for name, at in here.items() if name in curves]
         moved[node] = sum(shifts) if alone or not any(shifts) else np.nan
