@@ -24,9 +24,14 @@ def turned_by(a, b):
     return np.degrees((one.inv() * other).magnitude())
 
 
-def test_the_torso_may_be_hidden_in_the_first_frames():
-    """24 flights of any attitude; all or some of the torso is hidden in frames 0 to 5."""
-    for seed in range(24):
+@pytest.mark.parametrize(
+    "seeds",
+    [range(24), pytest.param(range(24, 60), marks=pytest.mark.slow)],
+    ids=["some", "others"],
+)
+def test_the_torso_may_be_hidden_in_the_first_frames(seeds):
+    """Flights of any attitude; all or some of the torso is hidden in frames 0 to 5."""
+    for seed in seeds:
         model = zoo.model(("m1_n3", "m2_n2", "arcs2")[seed % 3])
         x, rng = start(model, seed), np.random.default_rng([seed, 7])
         x[3:7] = Rotation.random(random_state=seed).as_quat()
