@@ -55,7 +55,7 @@ demo: $(DRAWS)
 	$(PY) examples/demo.py
 	@$(MAKE) --no-print-directory $(PAGED)
 #> make test                              the quick tests; ROOM=simulation: those of one folder of tests/
-#> make test-slow                         the rest, and three rooms as on a processor without AVX-512
+#> make test-slow                         the rest, and three rooms optimised and without AVX-512
 #> make test-all                          both, with models optimised as a user's are
 # what pytest and Python compile is kept, away from the sources: seconds of every process
 test test-slow test-all: export PYTHONDONTWRITEBYTECODE :=
@@ -68,7 +68,7 @@ test: $(TESTED)
 	$(PYTEST) --quick -m "not slow" $(if $(ROOM),tests/$(ROOM))
 test-slow: $(READY)
 	$(AS_AVX2)
-	$(PYTEST) -m slow
+	$(PYTEST) --quick -m slow
 test-all: $(READY)
 	$(PY) -m tests.support.zoo
 	$(PYTEST)

@@ -226,8 +226,9 @@ def test_one_command_makes_the_landing_and_phases_can_be_changed(capsys):
 
 
 @pytest.mark.slow
-def test_the_landing_survives_other_tails_or_says_in_one_message_why_not():
+def test_the_landing_survives_other_tails_or_says_in_one_message_why_not(monkeypatch):
     """Feet first, then upright and at rest on them; else one warning names the phase and time."""
+    monkeypatch.setenv("CC", "cc")  # optimised: many runs and plans
     landed, masses = 0, (2, 3.6, 5.2, 6.8, 8.4, 10)
     # one does not land, one by a plan that is tried again: these take most of the time
     for length, mass in (*product((100, 175, 212.5), masses), (250, 2), (250, 10)):
