@@ -135,6 +135,7 @@ def one(folder, starts, files=(), **given):
     return found, (folder / "made").read_text().count("once")
 
 
+@pytest.mark.slow
 def test_parts_are_made_once_and_again_where_inputs_change_files_are_gone_or_one_failed(
     tmp_path, monkeypatch
 ):

@@ -21,7 +21,7 @@ from tests.support.faults import TAKING_MORE, broken, failed, not_a_number
 from tests.support.rows import row
 from tests.verification import verify_model
 
-SOUND = ("m1_n1", "arcs1", "elastic", "single_ground", "limbs")
+SOUND = ("m1_n1", "arcs1", "elastic", "single_ground")
 OTHERS = [  # polar ones have no states
     pytest.param(n, marks=pytest.mark.slow) for n in zoo.ZOO if n not in (*SOUND, "polar")
 ]
