@@ -60,6 +60,17 @@ def test_energy_balances_over_long_runs_and_better_with_tolerance(name):
             assert errors[-1] < 2e-4 and errors[-1] < max(0.1 * errors[0], 1e-9)
 
 
+def test_books_count_what_damping_of_the_stops_takes():
+    """One run goes into the stops of all its joints but the last two, the other into none."""
+    q, v = bent(0.0)
+    v[6:] = 20, -15, 25, -18
+    for model in (zoo.model("damped_stops"), zoo.model("damped_stops").with_parameters(**FREE)):
+        run = st.simulate(model, q, v, t_span=0.3, **EXACT)
+        assert run.info["imbalance"]["relative"] < 1e-8
+        reached = np.abs(run.tail).max(axis=0) > np.abs(model.parameters["tail_stop_upper"])
+        assert reached[:2].all() == (model is zoo.model("damped_stops"))
+
+
 def test_damping_of_the_tail_and_of_a_controller_add_up():
     q, v = bent([0.3, -0.2, 0.2, 0.1])
     v[6:] = 10
