@@ -2,9 +2,11 @@
 sanitizers and valgrind find nothing, and would find what is put in.
 """
 
+import os
 import re
 import shutil
 import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ import serpentail as st
 from checks.stress import memory
 from tests.support import toolchains, zoo
 from tests.support.compile_once import compile_once
+from tests.support.models import folder_of
 
 from .target.emitted import model_of, run
 
@@ -237,3 +240,27 @@ def test_sanitizers_would_find_a_short_workspace(tmp_path):
     program = built(model, tmp_path, text)
     done = subprocess.run([program], capture_output=True, text=True, check=False)
     assert done.returncode != 0 and "heap-buffer-overflow" in done.stderr
+
+
+FLIGHTS = """
+import sys, numpy as np, serpentail as st
+from serpentail.simulation.runs import batch
+batch.worth_lanes = lambda *_: True
+model = st.load(sys.argv[1])
+q, v = np.zeros((11, model.nq)), np.zeros((11, model.nv))
+q[:, 3], v[:, 3:] = 1, np.arange(11)[:, None]
+how = {"t_span": 0.1, "output_step": 0.0123, "controller": st.Damping(1e-6)}
+for method in ({"method": "tsit5"}, {"method": "rk4", "step": 1e-3}):
+    found = st.simulate(model, q, v, **how, **method)
+    assert found.info["abreast"] == 8 and found.errors == [None] * 11
+"""
+
+
+def test_flights_side_by_side_keep_to_their_memory(tmp_path):
+    """In Python, by a library that is sanitized."""
+    found = [run("gcc", f"-print-file-name=lib{n}.so").strip() for n in ("asan", "ubsan")]
+    own = {"CC": f"gcc {' '.join(SANITIZED[3:])}", "LD_PRELOAD": ":".join(found)}
+    own |= {"SERPENTAIL_CACHE": str(tmp_path), "ASAN_OPTIONS": "detect_leaks=0"}
+    wanted = ["forward_dynamics", "energy", "momentum", "rollout"]
+    folder = folder_of(zoo.scene("bare", functions=wanted))
+    run(sys.executable, "-c", FLIGHTS, folder, env=os.environ | own)

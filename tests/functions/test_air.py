@@ -25,7 +25,7 @@ def moving(model):
     return [(s["q"], s["v"], s) for kind, s in of_every_kind(model) if "straight" not in kind]
 
 
-@every_model
+@pytest.mark.parametrize("name", [*NAMES, "air_arc"])
 def test_the_force_is_the_sum_over_gauss_points(name):
     model = zoo.model(name)
     for q, v, _ in moving(model):

@@ -121,6 +121,7 @@ ZOO: dict[str, dict[str, Any]] = {
     "air": _links(2, 2, parameters=AIR | widths(4)),
     "air_mixed": _own("mixed", MIXED, parameters=TORSO | MOUNTED | AIR | widths(7)),
     "air_fixed": _links(2, 2, base="fixed", parameters=TAIL_IN_AIR),
+    "air_arc": _arcs(1, functions=["air_force"], parameters=AIR | widths(1)),
     "air_ground": _links(1, 3, parameters=AIR, functions=["air_force", *LANDING], **GROUND),
     # pulled by tendons, whose guides are alike, or of links of their own and to some segments
     "tendons": _links(2, 2, tendon=RING),

@@ -182,6 +182,8 @@ def test_condition_without_a_mass_matrix_is_of_the_same_size():
     for s in states.states(model):
         ratio = errors.sensitivity(partial, s.q) / errors.sensitivity(model, s.q)
         assert 0.01 < ratio < 1.001
+    partial.kernels = {}
+    assert errors.sensitivity(partial, s.q) == 1.0
 
 
 def test_slope_is_the_derivative():
@@ -203,3 +205,7 @@ def test_states_are_of_all_kinds_seeded_and_exact_in_the_real_type():
                     np.testing.assert_array_equal(x, x.astype(model.parameter_vector.dtype))
             assert not any(s.q[7:].any() for s in first if s.kind == "straight")
             assert all(abs(abs(s.q[7:]) - np.pi).max() < 0.011 for s in first[8::2])
+    model = zoo.model("mixed")
+    folded = next(s.q[7:] for s in states.states(model) if s.kind == states.KINDS[2])
+    links = np.repeat(model.kinds, model.layout.widths) != "continuum"
+    assert abs(abs(folded[links]) - np.pi).max() < 0.011 and len({*folded}) == len(folded)
