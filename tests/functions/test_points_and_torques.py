@@ -13,7 +13,7 @@ LEGS = {"L_h2d": 0.01, "L_d2k": 0.02, "L_k2a": 0.03, "L_a2m": 0.04, "L_m2t": 0.0
 
 def test_joints_are_those_of_the_reference():
     """Of quaternions of any norm, one by one, in a batch and in CasADi, for any parameters."""
-    models = {name: zoo.model(name) for name in ("feet", "ground_m2_n2", "ground_arcs")}
+    models = {name: zoo.own(name) for name in ("feet", "ground_m2_n2", "ground_arcs")}  # no lanes
     other = models["feet"].with_parameters(hip=(0.01, 0.02, -0.03), **LEGS)
     models["other legs"] = other.with_parameters(delta_m=0.7)
     for name, model in models.items():

@@ -236,15 +236,15 @@ def test_a_touch_in_a_long_step_is_told_to_rounding():
 
 
 def test_a_foot_that_dips_within_a_step_is_seen():
-    """Shanks swing there and back, on a parabola, in one step of a body at rest. Steps of
-    a fixed length are not cut: the result says so.
+    """Shanks that rested before swing there and back, on a parabola, in one step of a body at
+    rest. Steps of a fixed length are not cut: the result says so.
     """
     model, T = animal().with_parameters(gravity=0), 0.05
-    swing = np.zeros((1, 4, 3))
-    swing[0, :, 0] = np.radians([210, -50, 210, -50])
-    swing[0, 1::2, 1:] = -0.04 / T, 0.04 / T**2
+    swing = np.zeros((2, 4, 3))
+    swing[..., 0] = np.radians([210, -50, 210, -50])
+    swing[1, 1::2, 1:] = -0.04 / T, 0.04 / T**2
     legs = st.Legs.fixed(0, 0)
-    object.__setattr__(legs, "curve", Piecewise(np.array([0, T]), swing))  # C takes any degree
+    object.__setattr__(legs, "curve", Piecewise(np.array([-1, 0, T]), swing))  # C takes any degree
     q, v, times = np.zeros(model.nq), np.zeros(model.nv), np.linspace(0, T, 2001)
     q[2:4] = 1, 1
     angles = [np.append(legs.curve.at(t)[0], np.zeros(4)) for t in times]
