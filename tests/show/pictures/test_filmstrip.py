@@ -15,6 +15,7 @@ from serpentail.show.pictures.pen import PALE
 from serpentail.show.pictures.strip import moments, strip_of, way_of
 from serpentail.show.pictures.style import SHADOW, STYLE, TORSO
 from serpentail.show.pictures.views import NAMED, SIDE, views_of
+from tests.support import zoo
 from tests.support.drawn_flight import SPEEDS, flight
 from tests.support.rows import row
 
@@ -193,6 +194,9 @@ def test_the_key_has_every_mark_and_lies_on_the_page():
         assert told[-1] == "below the ground" and told[-2].startswith("force, 60 mm: ")
     above = standing(height=1.0).filmstrip(frames=1)[0].legends[0].get_texts()
     assert "below the ground" not in [text.get_text() for text in above]
+    tail = st.simulate(zoo.model("fixed"), np.full(4, 0.3), np.zeros(4), t_span=0.1)
+    told = tail.filmstrip(frames=1)[0].legends[0].get_texts()
+    assert [text.get_text() for text in told] == ["tail"]
 
 
 def faces(axes, colour):
