@@ -125,3 +125,7 @@ def test_what_cannot_be_made_again_says_so_in_one_line(rat):
     made_by = len(calls)
     assert st.summary(model, run).errors == {} and len(calls) == made_by
     assert st.summary(model, run, errors=True).errors["apex_m"] >= 0 and len(calls) > made_by
+    torque = [0.0]
+    run = st.simulate(model, Q0, V0, controller=lambda *_: np.full(4, torque[-1]), **how)
+    torque.append(np.nan)
+    assert "the run fails" in st.summary(model, run, errors=True)["warnings"][-1]
