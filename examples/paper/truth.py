@@ -10,7 +10,8 @@ import serpentail as st
 from examples.paper.collocation import PaperPlan, paper_plan, states_of
 from serpentail.basics.attitude import angle_deg, from_angles
 
-# of IPOPT. A plan that needs many depends on how a processor rounds: short tries come first
+# iterations of IPOPT in three rounds of tries; `st.plan` has 300, too. Which plan comes after many
+# depends on how a processor rounds, so those that need few come first.
 SHORT, ITERATIONS, MOST = 80, 300, 1500
 TRUE = ("open_loop_attitude_error_deg", "energy_J", "peak_power_W")
 TRACKED = ("tracked_attitude_error_deg", "tracked_tail_error_rad", "dyn_err")

@@ -61,7 +61,7 @@ def test_energy_balances_over_long_runs_and_better_with_tolerance(name):
 
 
 def test_books_count_what_damping_of_the_stops_takes():
-    """One run goes into the stops of all its joints but the last two, the other into none."""
+    """The first two joints go into their stops in one run, and none does in the other."""
     q, v = bent(0.0)
     v[6:] = 20, -15, 25, -18
     for model in (zoo.model("damped_stops"), zoo.model("damped_stops").with_parameters(**FREE)):

@@ -132,7 +132,7 @@ def shallow(count):
     return q[found], v[found], ends[found]
 
 
-@pytest.mark.parametrize("count", [60, pytest.param(200, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [60, pytest.param(400, marks=pytest.mark.slow)])
 def test_a_touch_that_a_tolerance_misses_is_named(count):
     """The run passes above it, closer than it knows its height; nothing is said far above."""
     (q, v, times), far, missed = shallow(count), np.eye(11)[2], {}

@@ -206,6 +206,6 @@ def test_states_are_of_all_kinds_seeded_and_exact_in_the_real_type():
             assert not any(s.q[7:].any() for s in first if s.kind == "straight")
             assert all(abs(abs(s.q[7:]) - np.pi).max() < 0.011 for s in first[8::2])
     model = zoo.model("mixed")
-    folded = next(s.q[7:] for s in states.states(model) if s.kind == states.KINDS[2])
+    folded = next(s.q[7:] for s in states.states(model) if s.kind == "folded")
     links = np.repeat(model.kinds, model.layout.widths) != "continuum"
     assert abs(abs(folded[links]) - np.pi).max() < 0.011 and len({*folded}) == len(folded)

@@ -175,7 +175,7 @@ def test_figures_are_the_same_twice_in_every_format_whatever_the_user_has_set(tm
 def test_a_figure_keeps_its_look_until_it_is_saved(tmp_path):
     """Whoever saves it, with whatever settings: Matplotlib makes ticks when it draws."""
     few = partial(flight().filmstrip, frames=3, views=("top",))
-    for draw in (few, flight().plot):
+    for draw in (flight().filmstrip, few, flight().plot):
         figures = [draw()[0] for _ in range(2)]
         figures[0].savefig(tmp_path / "a.png")
         with matplotlib.rc_context(OTHERS):
