@@ -203,7 +203,9 @@ def test_what_depends_on_parameters_alone_stays_narrow():
 
 
 def test_batches_stay_straight_for_longer_tails_than_single_states():
-    """Sizes are the point: batches of derivatives are straight for short tails alone."""
+    """Sizes are the point: batches of derivatives are straight for short tails alone, unless a scene
+    asks for loops.
+    """
     sizes = [("forward_dynamics", "batch", (3, 4), (8, 16))]
     sizes += [("forward_dynamics_derivatives", "batch_derivatives", (1, 3), (3, 4))]
     for name, part, *both in sizes:
@@ -218,6 +220,8 @@ def test_batches_stay_straight_for_longer_tails_than_single_states():
                     assert manifest["functions"][name]["emission"] in ("lanes", "segments")
                 else:
                     assert ("for (int d = 0;" in source) != straight
+    loops = folder_of(zoo.scene("bare", emission="loops", functions=[name]))
+    assert "for (int d = 0;" in (loops / "src" / f"bare_{part}.c").read_text()
 
 
 def test_long_tails_go_by_segments_where_that_is_less_work():
