@@ -81,7 +81,8 @@ def simulated(table):
 
 
 def in_phases(phases):
-    scenario_of(zoo.model("ground"), tables("kick_and_land")["simulate"], SCENES, phases)
+    start = tables("kick_and_land")["simulate"] | {"start": {}}
+    scenario_of(zoo.model("ground"), start, SCENES, phases)
 
 
 def swept(monkeypatch):
@@ -99,13 +100,13 @@ def test_a_value_of_a_wrong_kind_is_refused_by_name(monkeypatch):
     """Each key gets each wrong value; the quick test takes one in thirteen."""
     short = {(key,) for key in KEYS} | {("parameters", name) for name in NAMES}
     one, kick = tomllib.loads(VALID), tables("kick_and_land")
-    settled = kick["simulate"] | {"start": {}}
+    unsettled = kick["simulate"] | {"start": {}}
     phases = [(0, *place) for place in known(TABLES["phase"].each)]
     plan, identify = tables("righting_m1_n3")["plan"], tables("identify_tail")["identify"]
     rows = (
         ("scene", one | OF_BODY, generated, short),
         ("segments", one | OF_SEGMENTS, generated, ()),
-        ("simulate", settled, simulated, known(TABLES["simulate"])),
+        ("simulate", unsettled, simulated, known(TABLES["simulate"])),
         ("phase", kick["phase"], in_phases, phases),
         ("plan", plan, plan_arguments, known(TABLES["plan"])),
         ("identify", identify, identify_arguments, known(TABLES["identify"])),

@@ -192,10 +192,10 @@ def test_scene_has_the_arguments_of_plan_and_errors_name_the_key(tmp_path):
         with row(words), pytest.raises(st.PlanningError, match=words):
             st.planned(str(tmp_path / "scene.toml"))
 
-    few = {"intervals": 4, "plan.tolerance": "free", "duration": "0.5 s", "tail_mass": "4 g"}
+    few = {"intervals": 10, "plan.tolerance": "free", "duration": "0.5 s", "tail_mass": "4 g"}
     plan = st.planned("righting_m1_n3", changes=few)
     assert (plan.report["intervals"], plan.duration, plan.model.parameters["tail_mass"]) == (
-        4,
+        10,
         0.5,
         0.004,
     )

@@ -6,7 +6,7 @@ point masses at Gauss-Legendre nodes. It shares no formula with the recursions u
 """
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 
 import mpmath
 import numpy as np
@@ -264,6 +264,7 @@ def spin(R_dot, R):
     return np.array([W[2, 1] - W[1, 2], W[0, 2] - W[2, 0], W[1, 0] - W[0, 1]]) / 2
 
 
+@lru_cache(10000)  # a motion of the torso bends nothing, one of an arc bends no other arc
 def bent(a, b, length):
     """Return position and attitude of the end of an arc of a bend, in its root's frame.
 

@@ -4,12 +4,14 @@ Every formula also takes complex numbers: velocities and Jacobians are complex-s
 the points' positions.
 """
 
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
 
 STEP = 1e-30
 SIDES = (1, -1)
+GAUSS = np.polynomial.legendre.leggauss(12)
 
 
 def hat(w):
@@ -76,7 +78,7 @@ def arc(R, P, angles, length, samples):
     the tangent.
     """
     bend, out = np.array([angles[0], 0, angles[1]]), []
-    nodes, weights = np.polynomial.legendre.leggauss(12)
+    nodes, weights = GAUSS
     for k in range(samples):
         xs, ws = (k + (nodes + 1) / 2) / samples, weights / (2 * samples)
         P = P - length * R @ sum(w * turn(x * bend)[:, 1] for x, w in zip(xs, ws, strict=True))
@@ -142,7 +144,10 @@ class Contacts:
 
     def __init__(self, model, animal=None):
         points = Chains(animal) if animal else Points(model)
-        self.parameters, self.points = model.parameters, points
+        self.parameters = model.parameters
+        # motions of the torso bend no tail and turn no leg
+        self.tail = lru_cache(4)(lambda q_t: points.at(np.array(q_t)))
+        self.feet = lru_cache(4)(lambda legs: feet(model.parameters, np.array(legs)))
         self.groups = [entry["group"] for entry in model.manifest["contacts"]]
         self.friction, self.nv = model.manifest["scene"]["friction"], model.nv
 
@@ -152,9 +157,9 @@ class Contacts:
         """
         P, out = self.parameters, []
         if "feet" in self.groups:
-            out += feet(P, legs)
+            out += self.feet(tuple(legs))
         if "tail" in self.groups:
-            out += self.points.at(q_t)
+            out += self.tail(tuple(q_t))
         if "torso" in self.groups:
             axes, down = np.array(P["torso_semi_axes"]), -R.real[2]
             out.append(axes**2 * down / np.sqrt((axes * down) @ (axes * down)))

@@ -27,7 +27,9 @@ FLYING = [*(name for name in VALUES if name not in NEEDS), "rollout"]
 FEW = ["mass_matrix", "forward_dynamics", "energy", "contact_dynamics"]
 FEW += ["pfl", "rollout", "implicit"]
 # derivatives of flight are those of the same tail without contact
-LANDING = [*FLYING, "contact_points", "leg_points", "contact_dynamics", "pfl", "implicit"]
+RUNNING = [*FLYING, "pfl", "implicit"]
+LANDING = [*RUNNING, "contact_points", "leg_points", "contact_dynamics"]
+GUIDED = ["airborne_rates", "airborne_rates_derivatives"]
 STANDING = ["mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics", "energy"]
 STANDING += ["momentum", "contact_points", "contact_dynamics", "rollout", "implicit"]
 PUSHED = ["mass_matrix", "forward_dynamics", "forward_dynamics_external", "energy", "momentum"]
@@ -112,7 +114,12 @@ ZOO: dict[str, dict[str, Any]] = {
     "mixed": _own("mixed", MIXED),
     # springs, damping and stops
     "elastic": _links(2, 2, parameters=ELASTIC),
-    "damped_stops": _links(2, 2, parameters=ELASTIC | {"tail_stop_damping": [2e-3, 0, 1e-3, 3e-3]}),
+    "damped_stops": _links(
+        2,
+        2,
+        functions=RUNNING,
+        parameters=ELASTIC | {"tail_stop_damping": [2e-3, 0, 1e-3, 3e-3]},
+    ),
     "elastic_arcs": _arcs(2, parameters=ELASTIC),
     "elastic_ground": _links(2, 2, parameters=ELASTIC, functions=LANDING, **GROUND),
     # motors that a run meets the limits of
@@ -126,15 +133,15 @@ ZOO: dict[str, dict[str, Any]] = {
     # pulled by tendons, whose guides are alike, or of links of their own and to some segments
     "tendons": _links(2, 2, tendon=RING),
     "tendons_own": _own("articulated", OWN_LINKS, tendon=TAPERING),
-    "tendons_arcs": _arcs(2, tendon=RING),
+    "tendons_arcs": _arcs(2, tendon=RING, functions=[*RUNNING, "tendon_lengths"]),
     # on the ground
     "ground_m1_n1": _links(1, 1, **GROUND),
     "ground": _links(1, 3, **GROUND),
-    "ground_m2_n2": _links(2, 2, **GROUND),
-    "ground_arcs": _arcs(2, **GROUND),
+    "ground_m2_n2": _links(2, 2, functions=LANDING, **GROUND),
+    "ground_arcs": _arcs(2, functions=LANDING, **GROUND),
     "ground_mixed": _own("mixed", MIXED, functions=LANDING, **GROUND),
-    "feet": _links(1, 3, contacts=["feet"]),
-    "feet_tail": _links(1, 3, contacts=["feet", "tail"]),
+    "feet": _links(1, 3, functions=LANDING, contacts=["feet"]),
+    "feet_tail": _links(1, 3, functions=LANDING, contacts=["feet", "tail"]),
     "smooth": _links(1, 3, friction="smooth", functions=LANDING, **GROUND),
     "paper": _links(1, 3, friction="paper", functions=LANDING, **GROUND),
     # a torso that never moves
@@ -158,11 +165,17 @@ ZOO: dict[str, dict[str, Any]] = {
         functions=[*PUSHED, "contact_points", "contact_dynamics", "implicit"],
     ),
     # other gravity
-    "slope": _links(1, 3, slope={"angle": "25 deg", "toward": "-x"}, contacts=["torso"]),
+    "slope": _links(
+        1,
+        3,
+        functions=[name for name in LANDING if name != "leg_points"],
+        slope={"angle": "25 deg", "toward": "-x"},
+        contacts=["torso"],
+    ),
     # other numbers
     "weightless": _links(1, 3, weightless=True),
     "single": _links(2, 2, real="float"),
-    "single_ground": _links(1, 3, real="float", **GROUND),
+    "single_ground": _links(1, 3, real="float", functions=[*LANDING, *GUIDED], **GROUND),
     "baked": _links(1, 3, baked=True),
     # the same bits everywhere; the second is small, for many compilers, emulators and watchers
     "reproducible": _links(1, 3, profile="reproducible", **GROUND),

@@ -181,7 +181,7 @@ def test_a_figure_keeps_its_look_until_it_is_saved(tmp_path):
         with matplotlib.rc_context(OTHERS):
             figures[1].savefig(tmp_path / "b.png")
         assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
-        assert figures[0]._repr_png_().startswith(STARTS[".png"])
+    assert figures[0]._repr_png_().startswith(STARTS[".png"])
 
 
 def test_drawing_leaves_pyplot_alone_and_importing_leaves_matplotlib_alone(tmp_path):
