@@ -203,8 +203,8 @@ def test_what_depends_on_parameters_alone_stays_narrow():
 
 
 def test_batches_stay_straight_for_longer_tails_than_single_states():
-    """Sizes are the point: batches of derivatives are straight for short tails alone, unless a scene
-    asks for loops.
+    """Sizes are the point: those of derivatives are straight for short tails, unless a scene asks
+    for loops.
     """
     sizes = [("forward_dynamics", "batch", (3, 4), (8, 16))]
     sizes += [("forward_dynamics_derivatives", "batch_derivatives", (1, 3), (3, 4))]
