@@ -26,10 +26,10 @@ GROUND = {"contacts": ["feet", "tail", "torso"]}
 FLYING = [*(name for name in VALUES if name not in NEEDS), "rollout"]
 FEW = ["mass_matrix", "forward_dynamics", "energy", "contact_dynamics"]
 FEW += ["pfl", "rollout", "implicit"]
-# derivatives of flight are those of the same tail without contact
 RUNNING = [*FLYING, "pfl", "implicit"]
+# derivatives of flight are those of the same tail without contact
 LANDING = [*RUNNING, "contact_points", "leg_points", "contact_dynamics"]
-GUIDED = ["airborne_rates", "airborne_rates_derivatives"]
+GUIDED = ["airborne_rates", "airborne_rates_derivatives"]  # which predictive control takes, too
 STANDING = ["mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics", "energy"]
 STANDING += ["momentum", "contact_points", "contact_dynamics", "rollout", "implicit"]
 PUSHED = ["mass_matrix", "forward_dynamics", "forward_dynamics_external", "energy", "momentum"]
