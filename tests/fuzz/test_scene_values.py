@@ -3,6 +3,7 @@
 import datetime
 import tomllib
 import warnings
+from functools import cache
 
 import pytest
 
@@ -68,6 +69,7 @@ def put(value, path, new):
     return found
 
 
+@cache
 def tables(name):
     return tomllib.loads((SCENES / f"{name}.toml").read_text())
 
@@ -80,9 +82,13 @@ def simulated(table):
     scenario_of(zoo.model("ground"), table, SCENES, tables("kick_and_land")["phase"])
 
 
+def unsettled():
+    """A run of a whole scene whose start takes no time."""
+    return tables("kick_and_land")["simulate"] | {"start": {}}
+
+
 def in_phases(phases):
-    start = tables("kick_and_land")["simulate"] | {"start": {}}
-    scenario_of(zoo.model("ground"), start, SCENES, phases)
+    scenario_of(zoo.model("ground"), unsettled(), SCENES, phases)
 
 
 def swept(monkeypatch):
@@ -100,13 +106,12 @@ def test_a_value_of_a_wrong_kind_is_refused_by_name(monkeypatch):
     """Each key gets each wrong value; the quick test takes one in thirteen."""
     short = {(key,) for key in KEYS} | {("parameters", name) for name in NAMES}
     one, kick = tomllib.loads(VALID), tables("kick_and_land")
-    unsettled = kick["simulate"] | {"start": {}}
     phases = [(0, *place) for place in known(TABLES["phase"].each)]
     plan, identify = tables("righting_m1_n3")["plan"], tables("identify_tail")["identify"]
     rows = (
         ("scene", one | OF_BODY, generated, short),
         ("segments", one | OF_SEGMENTS, generated, ()),
-        ("simulate", unsettled, simulated, known(TABLES["simulate"])),
+        ("simulate", unsettled(), simulated, known(TABLES["simulate"])),
         ("phase", kick["phase"], in_phases, phases),
         ("plan", plan, plan_arguments, known(TABLES["plan"])),
         ("identify", identify, identify_arguments, known(TABLES["identify"])),

@@ -18,7 +18,7 @@ from typing import Any
 import serpentail as st
 from serpentail_codegen.scene.parse import parse_scene
 from serpentail_codegen.scene.scene import Scene
-from serpentail_scene.signatures.table import NEEDS, VALUES
+from serpentail_scene.signatures.table import AIRBORNE, NEEDS, VALUES
 from tests.support import models
 from tests.support.bodies import CHAINS, LIMBS, MIXED, OWN_ARCS, OWN_LINKS, TOUCHING
 
@@ -26,10 +26,8 @@ GROUND = {"contacts": ["feet", "tail", "torso"]}
 FLYING = [*(name for name in VALUES if name not in NEEDS), "rollout"]
 FEW = ["mass_matrix", "forward_dynamics", "energy", "contact_dynamics"]
 FEW += ["pfl", "rollout", "implicit"]
-RUNNING = [*FLYING, "pfl", "implicit"]
 # derivatives of flight are those of the same tail without contact
-LANDING = [*RUNNING, "contact_points", "leg_points", "contact_dynamics"]
-GUIDED = ["airborne_rates", "airborne_rates_derivatives"]  # which predictive control takes, too
+LANDING = [*FLYING, "contact_points", "leg_points", "contact_dynamics", "pfl", "implicit"]
 STANDING = ["mass_matrix", "bias_force", "inverse_dynamics", "forward_dynamics", "energy"]
 STANDING += ["momentum", "contact_points", "contact_dynamics", "rollout", "implicit"]
 PUSHED = ["mass_matrix", "forward_dynamics", "forward_dynamics_external", "energy", "momentum"]
@@ -114,12 +112,7 @@ ZOO: dict[str, dict[str, Any]] = {
     "mixed": _own("mixed", MIXED),
     # springs, damping and stops
     "elastic": _links(2, 2, parameters=ELASTIC),
-    "damped_stops": _links(
-        2,
-        2,
-        functions=RUNNING,
-        parameters=ELASTIC | {"tail_stop_damping": [2e-3, 0, 1e-3, 3e-3]},
-    ),
+    "damped_stops": _links(2, 2, parameters=ELASTIC | {"tail_stop_damping": [2e-3, 0, 1e-3, 3e-3]}),
     "elastic_arcs": _arcs(2, parameters=ELASTIC),
     "elastic_ground": _links(2, 2, parameters=ELASTIC, functions=LANDING, **GROUND),
     # motors that a run meets the limits of
@@ -133,7 +126,7 @@ ZOO: dict[str, dict[str, Any]] = {
     # pulled by tendons, whose guides are alike, or of links of their own and to some segments
     "tendons": _links(2, 2, tendon=RING),
     "tendons_own": _own("articulated", OWN_LINKS, tendon=TAPERING),
-    "tendons_arcs": _arcs(2, tendon=RING, functions=[*RUNNING, "tendon_lengths"]),
+    "tendons_arcs": _arcs(2, tendon=RING),
     # on the ground
     "ground_m1_n1": _links(1, 1, **GROUND),
     "ground": _links(1, 3, **GROUND),
@@ -165,17 +158,11 @@ ZOO: dict[str, dict[str, Any]] = {
         functions=[*PUSHED, "contact_points", "contact_dynamics", "implicit"],
     ),
     # other gravity
-    "slope": _links(
-        1,
-        3,
-        functions=[name for name in LANDING if name != "leg_points"],
-        slope={"angle": "25 deg", "toward": "-x"},
-        contacts=["torso"],
-    ),
+    "slope": _links(1, 3, slope={"angle": "25 deg", "toward": "-x"}, contacts=["torso"]),
     # other numbers
     "weightless": _links(1, 3, weightless=True),
     "single": _links(2, 2, real="float"),
-    "single_ground": _links(1, 3, real="float", functions=[*LANDING, *GUIDED], **GROUND),
+    "single_ground": _links(1, 3, real="float", functions=[*LANDING, *AIRBORNE], **GROUND),
     "baked": _links(1, 3, baked=True),
     # the same bits everywhere; the second is small, for many compilers, emulators and watchers
     "reproducible": _links(1, 3, profile="reproducible", **GROUND),
