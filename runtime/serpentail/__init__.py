@@ -96,6 +96,8 @@ __all__ = list(_HOME)
 
 def __getattr__(name: str) -> Any:
     """Import a public name when it is first used: importing the package loads nothing else."""
+    if name.startswith("_"):  # of which inspect and test runners ask for many
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     if name not in _HOME:
         from .basics.near_names import none_such
 

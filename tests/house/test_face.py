@@ -100,6 +100,9 @@ def test_a_name_that_does_not_exist_tells_the_nearest_three():
             getattr(whole, asked)
         near = str(caught.value).split(" are ")[1].split(", ")
         assert near[0] == meant and len(near) == 3 and {*near} <= {*dir(whole)}
+    for whole in (st, model, motion):  # tools ask for many of these
+        with pytest.raises(AttributeError, match=r"'_simulate'$"):
+            _ = whole._simulate
     for whole, name, place in (
         (model, "tail_mass", ".parameters['tail_mass']"),
         (motion, "tau_alpha_1", "['tau_alpha_1']"),
