@@ -32,6 +32,7 @@ def pytest_addoption(parser):
 def pytest_configure(config):
     """Choose the compiler of all processes, and let Ctrl-C reach them also in the background."""
     choose_compiler(config.getoption("--quick"))
+    gc.set_threshold(20_000, 20, 50)
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as for `make test &` in a script
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if os.environ.get("CI") and missing():
@@ -44,9 +45,8 @@ def pytest_sessionstart(session):
 
 
 def pytest_collection_finish(session):
-    """Search for cycles less often, and not in what was imported: a tenth of a run's time."""
+    """Search for cycles not in what was imported: with their number, a tenth of a run's time."""
     gc.freeze()
-    gc.set_threshold(20_000, 20, 50)
 
 
 @pytest.fixture
