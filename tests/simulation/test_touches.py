@@ -56,7 +56,7 @@ def grazes(tail, count):
     # far above the ground, then lowered: a flight does not know its height
     q[:, 2] = 10
     free, found = {"method": "tsit5", "rtol": 1e-9}, []
-    coarse = flown(model, q, v, output_step=1e-3, **free)
+    coarse = flown(model, q, v, output_step=1e-3, rtol=1e-5)
     for k, depth in enumerate(10 ** rng.uniform(-4, np.log10(5e-3), many)):
         if not 2 < lowest_of(coarse[k]).argmin() < 118 or len(found) == count:
             continue
