@@ -100,9 +100,7 @@ def test_functions_without_a_form_have_another():
 
 
 def signs(segments, **changed):
-    """Which pivots are positive: two of each segment from the last one on, then six of the
-    torso.
-    """
+    """Which pivots are positive: two of each segment from the last on, then six of the torso."""
     found = Run(segments, Numbers(np), arguments(segments) | changed).guards
     assert [status for status, _ in found] == ["NOT_POSITIVE_DEFINITE"] * 12
     return [value > 0 for _, value in found]

@@ -30,9 +30,7 @@ class ExactContinuum(ManyDigits):
         self.segment_length = self.tail_length / segments
 
     def tail_points(self, q, samples):
-        """World positions (m samples + 1, 3) of equally spaced slices, from the mount to the
-        tip.
-        """
+        """World positions (m samples + 1, 3) of equally spaced slices, from mount to tip."""
         fractions = [self.mp.mpf(sample) / samples for sample in range(1, samples + 1)]
         frames = list(self._frames(*self._path(q)))
         slices = [self._slices(*frame, fractions)[0] for frame in frames]

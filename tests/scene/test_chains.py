@@ -43,11 +43,7 @@ def test_wrong_chains_are_refused():
         ("chain.a.joints", [BONE], {"a": PLAIN | {"joints": [BONE]}}),
         ("chain.a.drive", "prescribe", {"a": PLAIN | {"drive": "prescribe"}}),
         ("chain.a.drive", "prescribed", {"a": limb(BONE | GIVEN, BONE | {"name": "b"})}),
-        (
-            "chain.a.drive",
-            "prescribed",
-            {"a": limb(*SPRUNG) | GIVEN},
-        ),
+        ("chain.a.drive", "prescribed", {"a": limb(*SPRUNG) | GIVEN}),
         ("chain.a.damping", -1, {"a": PLAIN | {"damping": -1}}),
         ("chain.tail", "tail", {"tail": PLAIN}),
         ("chain.torso", "torso", {"torso": PLAIN}),

@@ -66,9 +66,7 @@ def test_by_the_start(of_a_drop):
     by_v = [slope(lambda e, r=r: ended(q, v + e * r), 5e-5) for r in np.eye(8)]
     np.testing.assert_allclose(of_a_drop.q0, by_q, atol=1e-4 * np.abs(by_q).max())
     np.testing.assert_allclose(of_a_drop.v0, by_v, atol=2e-5 * np.abs(by_v).max())
-    np.testing.assert_allclose(
-        of_a_drop.q0[[0, 1]], 0, atol=1e-9
-    )  # the ground is the same everywhere
+    np.testing.assert_allclose(of_a_drop.q0[:2], 0, atol=1e-9)  # the ground is alike everywhere
     u = np.random.default_rng(0).normal(size=(6, 2)) * 1e-4
     assert of_a_drop.bristles0.shape == u.shape and of_a_drop.exists and not of_a_drop.doubts
     assert 1 < of_a_drop.condition < 1e4

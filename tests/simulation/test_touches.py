@@ -43,9 +43,7 @@ def flown(model, q, v, **how):
 
 @cache
 def grazes(tail, count):
-    """Starts (count, nq), (count, nv) that dip 0.1 to 5 mm into the ground for a moment; and when
-    they do.
-    """
+    """Starts (count, nq), (count, nv) that soon dip 0.1 to 5 mm into the ground, and when."""
     rng, model, many = np.random.default_rng(5), animal(tail), 8 * count
     q, v = np.zeros((many, model.nq)), np.zeros((many, model.nv))
     attitude, axis = rng.normal(size=(many, 4)), rng.normal(size=(many, 3))

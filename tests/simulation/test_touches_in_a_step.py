@@ -8,16 +8,12 @@ from serpentail.simulation.controllers.piecewise import Piecewise
 from tests.support import zoo
 from tests.support.rows import row
 
-LEGS = st.Legs.fixed(np.radians(210), np.radians(-15))
-
-
-def animal():
-    return zoo.model("ground_m2_n2")
+LEGS, NAME = st.Legs.fixed(np.radians(210), np.radians(-15)), "ground_m2_n2"
 
 
 def test_a_touch_in_a_long_step_is_told_to_rounding():
     """A slow fall for 8 s, late on the clock, in one step, on ground that does not press."""
-    model = animal().with_parameters(gravity=5e-3, K_n=1e-18)
+    model = zoo.model(NAME).with_parameters(gravity=5e-3, K_n=1e-18)
     q, v = np.zeros(model.nq), np.zeros(model.nv)
     q[2:4] = 1, 1
     begin = st.simulate(model, q, v, legs=LEGS, t_span=1e-3).contact.points[0, :, 2].min()
@@ -34,7 +30,7 @@ def test_a_foot_that_dips_within_a_step_is_seen():
     """Shanks that rested before swing there and back, on a parabola, in one step of a body at
     rest. Steps of a fixed length are not cut: the result says so.
     """
-    model, T = animal().with_parameters(gravity=0), 0.05
+    model, T = zoo.model(NAME).with_parameters(gravity=0), 0.05
     swing = np.zeros((2, 4, 3))
     swing[..., 0] = np.radians([210, -50, 210, -50])
     swing[1, 1::2, 1:] = -0.04 / T, 0.04 / T**2
@@ -60,7 +56,7 @@ def test_a_foot_that_dips_within_a_step_is_seen():
 def test_feet_that_a_far_hip_swings_through_the_ground_within_a_step_are_seen():
     """A ball with short legs turns, on ground that does not press."""
     ball = {"gravity": 0, "K_n": 1e-18, "tail_mass": 1e-6, "torso_inertia": [5e-5] * 3}
-    ball |= {name: 1e-6 for name in animal().parameters if name.startswith("L_")}
+    ball |= {name: 1e-6 for name in zoo.model(NAME).parameters if name.startswith("L_")}
     once = {"method": "rk4", "step": 0.04, "t_span": 0.04, "output_step": 0.04, "legs": LEGS}
     along = [[1, 0.1, 0], [0, -1, 0.1], [0, 0.1, -1]]
     for hip in map(np.array, [[1, 1, 0], [0, -1, 1], [1, 0, -1], *along]):
@@ -71,7 +67,7 @@ def test_feet_that_a_far_hip_swings_through_the_ground_within_a_step_are_seen():
             half = (np.arccos(-way[2]) - 0.2) / 2  # 0.2 rad before the hip points down
             q[2], q[3], q[4:7] = 0.297, np.cos(half), np.sin(half) * about
             v[3:6] = 10 * about
-            run = st.simulate(animal().with_parameters(hip=0.3 * way, **ball), q, v, **once)
+            run = st.simulate(zoo.model(NAME).with_parameters(hip=0.3 * way, **ball), q, v, **once)
             assert run.info["steps"] == 1
             down = next(event for event in run.events if event["group"] == "feet")
             assert down["time"] == pytest.approx((0.2 - np.arccos(0.297 / 0.3)) / 10, abs=1e-4)

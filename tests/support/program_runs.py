@@ -32,9 +32,7 @@ def unrolled(program, arguments, algebra=RATIONAL, fixed=()):
 
 
 def outputs(builder, **arguments):
-    """Run what a builder recorded on exact numbers, interpreted and unrolled: both give the
-    same.
-    """
+    """Run what a builder recorded on exact numbers, interpreted and unrolled: both agree."""
     program = builder.finish()
     found = interpreted(program, arguments)
     assert unrolled(program, arguments) == found

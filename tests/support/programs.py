@@ -200,9 +200,7 @@ def nested():
 
 
 def chain():
-    """An array that grows from its own last entry; then a part of it is cleared, and used once
-    more.
-    """
+    """An array that grows from its own last entry; a part of it is cleared, then used again."""
     b, mass, x, y, u, w = built()
     a = b.array("a", 1, 4)
     b.copy(a[0], mass[0])

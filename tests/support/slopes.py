@@ -15,9 +15,7 @@ def derivatives(f):
 
 
 def difference(a, b):
-    """Return the largest difference of two matrices, relative to the largest entry of the
-    second.
-    """
+    """Return the largest difference of two matrices, relative to the second's largest entry."""
     a, b = (np.array(casadi.DM(x)) for x in (a, b))
     return np.max(np.abs(a - b), initial=0) / (np.max(np.abs(b), initial=0) + 1e-300)
 

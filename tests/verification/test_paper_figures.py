@@ -1,6 +1,4 @@
-"""The paper's figures: numbers that independent computations gave must come out of
-the models.
-"""
+"""The paper's figures: numbers that independent computations gave must come out of the models."""
 
 from functools import cache
 

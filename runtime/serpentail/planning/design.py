@@ -87,9 +87,7 @@ def with_totals(model: Model, design: Design, totals: Any) -> Design:
 
 def checked_design(model: Model, value: Any) -> Design:
     """Return a checked design; PlanningError names the parameter, its value and the remedy."""
-    if value is None:
-        return Design()
-    if not isinstance(value, Mapping):
+    if not isinstance(value, Mapping | None):
         raise refusal("design", value, NEEDS, PlanningError)
     if not value:
         return Design()

@@ -20,6 +20,7 @@ QUICK = "identify_tail"  # others take seconds to make
 def read_urdf(model, path, _):
     read = pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer(), True)
     assert (read.nq, read.nv) == (model.nq, model.nv)
+    assert f"<!-- {model.name}, made by serpentail {st.__version__}. SI" in path.read_text()
 
 
 def read_mjcf(model, path, _):

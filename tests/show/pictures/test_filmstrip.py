@@ -13,7 +13,7 @@ import serpentail as st
 from serpentail.show.pictures.frames import drawn_points
 from serpentail.show.pictures.pen import PALE
 from serpentail.show.pictures.strip import moments, strip_of, way_of
-from serpentail.show.pictures.style import SHADOW, STYLE, TORSO
+from serpentail.show.pictures.style import INK, SHADOW, STYLE, TORSO
 from serpentail.show.pictures.views import NAMED, SIDE, views_of
 from tests.support import zoo
 from tests.support.drawn_flight import SPEEDS, flight
@@ -209,6 +209,9 @@ def test_what_is_below_the_ground_is_pale_and_shadows_lie_where_one_looks_down()
     for view, lies in (("side", False), ("oblique", True), ("top", True)):
         ((axes,),) = standing(height=0.3).filmstrip(frames=[0.0], views=(view,))[1]
         assert bool(faces(axes, SHADOW)) == lies, view
+        if view == "top":  # the tail's, too
+            first = {line.get_color(): line.get_xydata() for line in axes.lines[::-1]}
+            np.testing.assert_allclose(first[SHADOW], first[INK])
         ((axes,),) = standing(height=-0.06).filmstrip(frames=[0.0], views=(view,))[1]
         whole, part = faces(axes, TORSO)
         assert (whole.get_facecolor()[3], part.get_facecolor()[3]) == (PALE, 1)
