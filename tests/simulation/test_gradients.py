@@ -72,6 +72,13 @@ def test_by_the_start(of_a_drop):
     assert 1 < of_a_drop.condition < 1e4
 
 
+def test_errors_fall_with_the_tolerance():
+    """Here a point begins to slide, at a time that bristles move."""
+    start = dropped(np.random.default_rng(13))
+    found, exact = (gradient(*start, rtol=r, controller=DAMPED).q0 for r in (1e-8, 1e-11))
+    np.testing.assert_allclose(found, exact, atol=1e-6 * np.abs(exact).max())
+
+
 def test_by_parameters_and_damping(of_a_drop):
     q, v = dropped()
     for name in ("K_n", "D_n", "D_f", "torso_mass", "tail_mass", "tail_length", "gravity"):
