@@ -28,9 +28,7 @@ def right_hand_side(model, rng, count):
 
 
 def torso_and_tail(J, H, w):
-    """S of S (k_v - r_v) = forces: what is left of H (1 - w J) when q and bristles are
-    eliminated.
-    """
+    """S of S (k_v - r_v) = forces: H (1 - w J) after q and bristles are eliminated."""
     nv, W = len(H), np.eye(len(J)) - w * J
     own, others = np.arange(nv, 2 * nv), np.r_[:nv, 2 * nv : len(J)]
     rest = np.linalg.solve(W[np.ix_(others, others)], W[np.ix_(others, own)])

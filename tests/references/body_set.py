@@ -90,9 +90,7 @@ class Animal:
     # ---- places ----------------------------------------------------------------------------
 
     def bodies(self, q):
-        """Mass, COM, attitude and moments of all bodies in the world, and the points of all
-        chains.
-        """
+        """Mass, COM, attitude and moments of all bodies in the world, and points of all chains."""
         place, R, at = q[:3], rotation(q[3:7]), 7
         found, points = [(MP.mpf(self.torso_mass), place, R, exact(self.torso_inertia))], []
         for chain in self._all:

@@ -1,6 +1,4 @@
-"""The paper's Table 1 in SI units, and seeded states (q, v, v_dot, tau) of a tail with m
-segments.
-"""
+"""The paper's Table 1 in SI units, and seeded states (q, v, v_dot, tau) of a tail."""
 
 from math import pi
 

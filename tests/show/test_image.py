@@ -5,11 +5,11 @@ import struct
 from functools import partial, reduce
 
 import numpy as np
+import pytest
 
 import serpentail as st
-from serpentail.motion.derived import AGAIN
+from serpentail.show.computing import again
 from serpentail.show.computing.image import BASE, WRITTEN, Image
-from serpentail.simulation.runs.single import CompiledRun
 from tests.support import zoo
 
 FORMS = {"pointer": "<I", "real": "<d", "int": "<i", "long": "<i"}
@@ -33,13 +33,20 @@ def behind(image, place, thing):
     return place + -place % 8
 
 
-def test_an_image_holds_the_records_and_all_that_they_lead_to():
-    model, flight = zoo.model("ground_m2_n2"), {"t_span": 0.01, "legs": st.Legs.fixed(3, -1)}
+def test_an_image_holds_the_records_and_all_that_they_lead_to(monkeypatch):
+    model, images, legs = zoo.model("ground_m2_n2"), [], st.Legs.fixed(3, -1)
     torques = st.TorqueTable([0, 0.01], 1e-6 * np.arange(8.0).reshape(2, 4), damping=1e-3)
-    run = st.simulate(model, model.state(position=[0, 0, 1]), controller=torques, **flight)
-    again = vars(run)[AGAIN]
-    run = CompiledRun(again.runs(again.start, again.ground, again.method))
-    arrays = [run.runs.parameters.vectors, *run.runs.state.values(), *run.runs.out.values()]
-    image = Image(run.runs.records, [*arrays, run.runs.peaks])
-    place = image.put(image.translated(run.record))
-    assert behind(image, place, run.record) == BASE + len(image.bytes)
+    law = st.Pfl(model, ([0.0, 0.1], np.tile([0.4, 0.5], (2, 2))), kp=3e4, kd=300)
+    how = {"controller": st.Phases([(0, torques), (0.005, law)]), "output_step": 1e-3}
+    start = model.state(height=1, roll=20, spin=[1, 2, 3], bend=[5, 9, 2, 4])
+    run = st.simulate(model, start, t_span=0.01, legs=legs, **how)
+    monkeypatch.setattr(again, "webassembly", lambda *_: b"")
+    monkeypatch.setattr(again, "Image", lambda *of: images.append(Image(*of)) or images[0])
+    told, (image,) = again.computed_again(model, run, 100), images
+    (record,) = [each for each in image.found.values() if type(each).__name__ == "run"]
+    assert behind(image, told["run"], record) <= BASE + len(image.bytes)
+    for knob in told["knobs"]:
+        for place in knob["places"]:
+            (found,) = struct.unpack_from("<d", image.bytes, place - BASE)
+            assert found == pytest.approx(knob["scale"] * knob["value"], abs=1e-10), knob["name"]
+    assert {"kp of phase 2", "damping of phase 1"} <= {knob["name"] for knob in told["knobs"]}

@@ -17,9 +17,7 @@ SPEEDS = {"up": (0.5, 2.8), "far": (2.6, 2.8), "still": (0.0, 0.0)}
 
 @dataclass
 class Drawn:
-    """The attributes that drawings need of a model with links along -y; it has no generated
-    folder.
-    """
+    """What drawings need of a model with links along -y; it has no generated folder."""
 
     segments: int
     links: int = 4

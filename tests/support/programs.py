@@ -66,9 +66,7 @@ class Narrow(Run):
 
 
 def jacobian(program, arguments, active):
-    """Derivatives of all outputs: name -> rows, with a column for each scalar of the active
-    arrays.
-    """
+    """Derivatives of all outputs: name -> rows, a column for each scalar of the active arrays."""
     count = sum(len(arguments[name]) for name in active)
     units, duals = iter(np.eye(count, dtype=int).tolist()), {}
     for name in active:
