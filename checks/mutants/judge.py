@@ -17,6 +17,7 @@ from .sample import part_of
 STARTING = 40.0  # s that a process may take in addition to its tests
 SLOWER = 6.0  # factor by which a mutant's tests may be slower
 FIRST = 15.0  # s of tests that the first process of a mutant runs; each other four times as many
+HUNG = "Timeout ("  # what faulthandler says before it ends a process
 LONGEST = 1200.0  # s of tests after which a mutant has survived
 
 
@@ -105,6 +106,7 @@ class Tree:
         orders, verdict = self.root / ".build" / "orders", self.root / ".build" / "verdict"
         verdict.unlink(missing_ok=True)
         told = {"witness": str(self._witness), "verdict": str(verdict), "mark": mutation.key}
+        told |= {"most": 1.5 * patience * tree.LONGEST_TEST}
         orders.write_text(json.dumps(told | {"tests": tests}))
         files = list(dict.fromkeys(test.split("::")[0] for test in tests))
         scratch = self.root / ".build" / "scratch"
@@ -120,7 +122,8 @@ class Tree:
         if status is None:
             return "timeout", f"{limit:.0f} s"
         found = json.loads(verdict.read_text()) if verdict.exists() else {}
-        return found.get("by", "process"), found.get("words", output[-300:])
+        by = "timeout" if HUNG in output else "process"
+        return found.get("by", by), found.get("words", output[-300:])
 
 
 def late(found: tuple[str, str]) -> bool:

@@ -2,6 +2,7 @@
 loaded, and what noticed it.
 """
 
+import faulthandler
 import json
 import os
 from pathlib import Path
@@ -10,6 +11,7 @@ from jinja2 import PackageLoader
 
 ORDERS = json.loads(Path(os.environ["SERPENTAIL_MUTANT"]).read_text())
 WITNESS, VERDICT = Path(ORDERS["witness"]), Path(ORDERS["verdict"])
+OUTPUT = os.dup(2)  # which pytest captures from now on
 get_source = PackageLoader.get_source
 
 
@@ -31,6 +33,11 @@ def pytest_collection_modifyitems(config, items):
     kept = [i for i in items if i.nodeid in chosen or i.nodeid.split("::")[0] not in known]
     config.hook.pytest_deselected(items=[item for item in items if item not in kept])
     items[:] = kept
+
+
+def pytest_runtest_logstart():
+    """End the process if its next test computes for ever in C, where no signal ends it."""
+    faulthandler.dump_traceback_later(ORDERS["most"], exit=True, file=OUTPUT)
 
 
 def pytest_runtest_logreport(report):
