@@ -1,6 +1,4 @@
-"""Generated folders are a function of the scene: same bytes, nothing written twice, never half a
-file.
-"""
+"""Generated folders are a function of the scene: same bytes, written once, never half a file."""
 
 import json
 import os

@@ -12,7 +12,7 @@ import pytest
 from scipy.interpolate import BPoly
 
 import serpentail as st
-from serpentail.optimal import fatrop
+from serpentail.optimal import fatrop, terms
 from serpentail.optimal import thread_pool as helpers
 from serpentail.optimal.control_mesh import bernstein
 from serpentail.optimal.library import kernel
@@ -211,3 +211,11 @@ def test_meshes_are_split_and_refined():
     assert refined(uniform(4), errors, 1e-9, 5, 6).intervals <= 6
     halved = uniform(4).halved(np.array([False, True, True, False]), 5)
     np.testing.assert_allclose(halved.ends, [0, 0.25, 0.375, 0.5, 0.75, 1])
+
+
+def test_short_functions_alone_are_compiled(monkeypatch):
+    """Long ones take longer to compile than plans take."""
+    e, given = ca.SX.sym("e", 2), ca.SX.sym("given")
+    for most, compiled in ((terms.MOST_COMPILED, True), (10, False)):
+        monkeypatch.setattr(terms, "MOST_COMPILED", most)
+        assert terms.terms_of(e, given, given * e[0] * ca.sin(e)).compiled == compiled

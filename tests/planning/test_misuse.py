@@ -1,6 +1,4 @@
-"""Planning problems that cannot be posed: the error names field and value, before anything is
-solved.
-"""
+"""Planning problems that cannot be posed: before it solves, the error names field and value."""
 
 import json
 import re

@@ -193,9 +193,7 @@ class Contacts:
         return np.array([f for f, _ in found]), np.concatenate([rate for _, rate in found])
 
     def law(self, place, velocity, bristle, bounding=lambda normal: normal):
-        """Return force and bristle rate of one point; ``bounding`` is the load that bounds
-        friction.
-        """
+        """Return force and bristle rate of one point; ``bounding``: load that bounds friction."""
         P, depth = self.parameters, -place[2]
         normal = self.normal(depth, -velocity[2])
         trial = -(P["K_f"] * bristle + P["D_f"] * P["K_f"] * velocity[:2])

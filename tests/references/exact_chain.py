@@ -1,6 +1,4 @@
-"""Dynamics of the articulated tail from parameters and (m, n), by the paper's recursion to 40
-digits.
-"""
+"""Dynamics of the articulated tail of any (m, n), by the paper's recursion to 40 digits."""
 
 import numpy as np
 

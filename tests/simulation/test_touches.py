@@ -163,6 +163,14 @@ def test_a_touch_is_named_where_its_point_sinks_twice_in_a_step():
     assert run.info["near"]["time"] == pytest.approx(exact.events[0]["time"], abs=1e-3)
 
 
+def test_the_height_of_a_near_pass_is_the_lowest_of_the_run():
+    q, v, _ = (each[25:36] for each in shallow(60))
+    runs = flown(animal(), q, v, output_step=3e-5, rtol=1e-2, method="switching", **FREE)
+    runs = [run for run in runs if "near" in run.info and not run.events]
+    told = [run.info["near"]["height"] - lowest_of(run).min() for run in runs]
+    assert len(told) > 1 and np.abs(told).max() < 1e-6
+
+
 def test_auto_flies_by_tsit5_and_touches_by_ros34pw2():
     """Far above the ground it takes the steps of tsit5; alone as among many."""
     model, (q, v, _) = animal(), shallow(60)

@@ -136,9 +136,7 @@ def carry(downward=False):
 
 
 def accumulators():
-    """A sum, and a sum that grows by a function of itself; both are read while they grow and
-    after.
-    """
+    """A sum, and one that grows by a function of itself; both are read on the way and after."""
     b, mass, x, y, u, w = built()
     a, total = b.array("a", 1), b.array("total", 1)
     b.fill(a[0], 1)
