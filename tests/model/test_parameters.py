@@ -109,6 +109,7 @@ def test_wrong_value_is_named_with_its_unit_or_the_rule_that_it_breaks(manifest)
         ("torso_inertia", [1e-5, 1e-5, 0], "sum of the other two$"),
         ("tail_mount", [1, 2], "here are 2 numbers$"),
         ("tail_mount", [1, 2, np.nan], "3 finite numbers (m)$"),
+        ("tail_mount", [[1, 2]], "3 finite numbers (m)$"),
         ("torso_mass", "217 deg", "an angle where a mass"),
         ("tail_length", "3 s", "a time where a length"),
     ):
