@@ -1,4 +1,4 @@
-"""Planning problems that cannot be posed: before it solves, the error names field and value."""
+"""Planning problems that cannot be posed: the error names field and value, before any solve."""
 
 import json
 import re

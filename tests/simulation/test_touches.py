@@ -53,12 +53,11 @@ def grazes(tail, count):
     v[:, :3], v[:, 3:6] = 0.3 * rng.normal(size=(many, 3)), turning
     # far above the ground, then lowered: a flight does not know its height
     q[:, 2] = 10
-    free, found = {"method": "tsit5", "rtol": 1e-9}, []
-    coarse = flown(model, q, v, output_step=1e-3, rtol=1e-5)
+    found, coarse = [], flown(model, q, v, output_step=1e-3, rtol=1e-5)
     for k, depth in enumerate(10 ** rng.uniform(-4, np.log10(5e-3), many)):
         if not 2 < lowest_of(coarse[k]).argmin() < 118 or len(found) == count:
             continue
-        fine = flown(model, q[k], v[k], output_step=CLOCK, **free)
+        fine = flown(model, q[k], v[k], output_step=CLOCK, method="tsit5", rtol=1e-9)
         height = lowest_of(fine)
         q[k, 2] -= height.min() + depth
         if height[0] > height.min() + depth + 1e-3:

@@ -31,7 +31,7 @@ def rat(segments: int = 1, links: int = 3) -> st.Model:
 
 
 def start(model: st.Model, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """Return q0, v0 of a rat thrown up, pitched by at most a quarter turn, turning in all axes."""
+    """Return q0, v0 of a rat thrown up, pitched by up to a quarter turn, turning about all axes."""
     random = np.random.default_rng(seed)
     q, v = np.zeros(model.nq), np.zeros(model.nv)
     pitch = random.uniform(0.4, 1.2)
