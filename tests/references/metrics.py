@@ -13,7 +13,7 @@ def mass_matrix_error(mass, mass_ref):
 
 
 def block_error(x, x_ref):
-    """Largest max|d| / max|ref| over (force, torque, tail); a zero block is scaled by the others."""
+    """Largest max|d| / max|ref| over (force, torque, tail); a zero block: by the others."""
     x, x_ref = np.asarray(x), np.asarray(x_ref)
     floor = NEGLIGIBLE * np.max(np.abs(x_ref)) or 1.0
     return float(max(_scaled_error(x[block], x_ref[block], floor) for block in BLOCKS))
